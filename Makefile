@@ -1,0 +1,51 @@
+# Two commands: `make up` runs the patrol robot in simulation, `make test` checks everything.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+ROBOT ?= robots/turtlebot/robot.yaml
+
+.PHONY: up test lint types unit docs messages lock clean
+
+up: $(VENV)/.up
+	@$(BIN)/rbxcompose up $(ROBOT)
+
+test: lint types unit
+
+lint: $(VENV)/.test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/.test
+	$(BIN)/mypy
+
+unit: $(VENV)/.test
+	$(BIN)/python -m pytest -q
+
+docs: $(VENV)/.test  ## Write the generated pages of docs/ anew
+	$(BIN)/python docs/generate.py
+
+messages: $(VENV)/.test  ## Write rbxcompose/msgs/ anew from the interface texts
+	$(BIN)/python -m rbxcompose.msgs.generate
+
+lock: $(VENV)/.test  ## Choose newest versions for the lock files
+	$(BIN)/python -m pip install -q pip-tools
+	$(BIN)/pip-compile -q --upgrade --generate-hashes --strip-extras --no-emit-index-url --no-emit-find-links --no-header -o requirements.lock pyproject.toml
+	$(BIN)/pip-compile -q --upgrade --generate-hashes --strip-extras --no-emit-index-url --no-emit-find-links --no-header --extra test -o requirements-test.lock pyproject.toml
+
+# An editable install needs the build backend; what runs is locked with hashes.
+$(VENV)/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit("rbxcompose needs Python 3.11 or newer") if sys.version_info < (3, 11) else None'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.up: requirements.lock pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install -q --disable-pip-version-check --no-deps -e .
+	@touch $@
+
+$(VENV)/.test: requirements-test.lock pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements-test.lock
+	$(BIN)/python -m pip install -q --disable-pip-version-check --no-deps -e .
+	@touch $@
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info

@@ -1,0 +1,1 @@
+"""The body of a robot: its frames and where they are."""

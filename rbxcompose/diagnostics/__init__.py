@@ -1,0 +1,1 @@
+"""Pure core of the robot's diagnostics: levels, statuses and the aggregated tree."""

@@ -1,0 +1,28 @@
+"""Levels of the robot's diagnostics and how several of them become one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import IntEnum
+
+
+class Level(IntEnum):
+    """How well something is; STALE means that nothing is known about it any more."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+def level_of(number: int) -> Level:
+    """Return the level of a number on the wire; a number that means no level is an ERROR."""
+    return Level(number) if Level.OK <= number <= Level.STALE else Level.ERROR
+
+
+def combined(levels: Iterable[Level]) -> Level:
+    """Return the level of a group: the worst one, but ERROR when only some are STALE; OK for nothing at all."""
+    found = set(levels)
+    if Level.STALE in found and len(found) > 1:
+        return Level.ERROR
+    return max(found, default=Level.OK)

@@ -1,0 +1,18 @@
+"""One status of one part of the robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rbxcompose.diagnostics.levels import Level
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What a part says of itself; `name` is `component` or `component: detail`, `values` are key and text."""
+
+    name: str
+    level: Level
+    message: str = ""
+    hardware_id: str = ""
+    values: tuple[tuple[str, str], ...] = ()

@@ -1,0 +1,147 @@
+"""Geometry of poses: planar ones for a base, spatial transforms for frames.
+
+Lengths are metres, angles radians, turning left is positive. `T_a_b` stands for the pose of frame b in frame a, so that
+`T_a_b.compose(T_b_c)` is `T_a_c`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+Vector3 = tuple[float, float, float]  # x, y, z
+Quaternion = tuple[float, float, float, float]  # x, y, z, w
+
+NO_TRANSLATION: Vector3 = (0.0, 0.0, 0.0)
+NO_ROTATION: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+
+def wrap_angle(angle: float) -> float:
+    """Return the same direction as `angle` [rad], within (-pi, pi]."""
+    wrapped = math.remainder(angle, math.tau)
+    return math.pi if wrapped == -math.pi else wrapped
+
+
+@dataclass(frozen=True, slots=True)
+class Velocity2:
+    """Velocity of a base in its own frame: `linear` forwards [m/s], `angular` to the left [rad/s]."""
+
+    linear: float = 0.0
+    angular: float = 0.0
+
+    @property
+    def is_finite(self) -> bool:
+        """Tell whether both parts are numbers that can be driven."""
+        return math.isfinite(self.linear) and math.isfinite(self.angular)
+
+
+AT_REST = Velocity2()
+
+
+@dataclass(frozen=True, slots=True)
+class Pose2:
+    """Pose in the plane: `x`, `y` [m] and `heading` [rad]; what the methods return has its heading in (-pi, pi]."""
+
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+
+    def compose(self, other: Pose2) -> Pose2:
+        """Return `other`, given in the frame of this pose, in the frame in which this pose is given."""
+        cos, sin = math.cos(self.heading), math.sin(self.heading)
+        return Pose2(
+            self.x + cos * other.x - sin * other.y,
+            self.y + sin * other.x + cos * other.y,
+            wrap_angle(self.heading + other.heading),
+        )
+
+    def inverse(self) -> Pose2:
+        """Return the pose of the outer frame in the frame of this pose."""
+        cos, sin = math.cos(self.heading), math.sin(self.heading)
+        return Pose2(-cos * self.x - sin * self.y, sin * self.x - cos * self.y, wrap_angle(-self.heading))
+
+    def distance(self, other: Pose2) -> float:
+        """Return the straight distance to `other` [m]; headings do not count."""
+        return math.hypot(other.x - self.x, other.y - self.y)
+
+    def bearing(self, other: Pose2) -> float:
+        """Return by how much to turn left [rad] in order to face `other`, within (-pi, pi]."""
+        return wrap_angle(math.atan2(other.y - self.y, other.x - self.x) - self.heading)
+
+    def moved(self, velocity: Velocity2, duration: float) -> Pose2:
+        """Return the pose after `duration` [s] at a constant `velocity`: the exact arc, by its chord."""
+        half_turn = velocity.angular * duration / 2
+        chord = velocity.linear * duration * (math.sin(half_turn) / half_turn if half_turn else 1.0)
+        direction = self.heading + half_turn
+        return Pose2(
+            self.x + chord * math.cos(direction),
+            self.y + chord * math.sin(direction),
+            wrap_angle(self.heading + 2 * half_turn),
+        )
+
+
+def quaternion_from_yaw(yaw: float) -> Quaternion:
+    """Return the rotation by `yaw` [rad] about z."""
+    return (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+
+
+def yaw_of(rotation: Quaternion) -> float:
+    """Return the yaw [rad] of a unit quaternion, that is the direction of its x axis seen from above."""
+    x, y, z, w = rotation
+    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Return the rotation that turns by `b` first and then by `a`."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def conjugate(rotation: Quaternion) -> Quaternion:
+    """Return the inverse of a unit quaternion."""
+    x, y, z, w = rotation
+    return (-x, -y, -z, w)
+
+
+def rotate(rotation: Quaternion, vector: Vector3) -> Vector3:
+    """Return `vector` turned by a unit quaternion."""
+    x, y, z, _ = multiply(multiply(rotation, (*vector, 0.0)), conjugate(rotation))
+    return (x, y, z)
+
+
+@dataclass(frozen=True, slots=True)
+class Transform3:
+    """Pose of one frame in another: `translation` [m] and `rotation`, a unit quaternion (x, y, z, w)."""
+
+    translation: Vector3 = NO_TRANSLATION
+    rotation: Quaternion = NO_ROTATION
+
+    @classmethod
+    def from_pose2(cls, pose: Pose2) -> Transform3:
+        """Return the transform of a pose on the ground."""
+        return cls((pose.x, pose.y, 0.0), quaternion_from_yaw(pose.heading))
+
+    def to_pose2(self) -> Pose2:
+        """Return the pose seen from above: height, roll and pitch are left out."""
+        return Pose2(self.translation[0], self.translation[1], yaw_of(self.rotation))
+
+    def apply(self, point: Vector3) -> Vector3:
+        """Return a point [m] of the inner frame in the outer frame."""
+        x, y, z = rotate(self.rotation, point)
+        return (self.translation[0] + x, self.translation[1] + y, self.translation[2] + z)
+
+    def compose(self, other: Transform3) -> Transform3:
+        """Return `T_a_c` from this `T_a_b` and `other`, which is `T_b_c`."""
+        return Transform3(self.apply(other.translation), multiply(self.rotation, other.rotation))
+
+    def inverse(self) -> Transform3:
+        """Return the pose of the outer frame in the inner one."""
+        back = conjugate(self.rotation)
+        x, y, z = rotate(back, self.translation)
+        return Transform3((-x, -y, -z), back)

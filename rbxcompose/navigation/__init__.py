@@ -1,0 +1,1 @@
+"""Pure cores that drive a base to where it is wanted."""

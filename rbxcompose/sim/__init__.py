@@ -1,0 +1,1 @@
+"""Pure cores of the simulated world: the twins of drivers and what they measure."""

@@ -1,0 +1,55 @@
+"""Twin of a battery that drains evenly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rbxcompose.diagnostics.levels import Level
+
+NOTHING_LEFT = 1e-9  # below this the sum of many small steps is rounding, not charge
+
+
+@dataclass(frozen=True, slots=True)
+class BatterySettings:
+    """How fast the battery drains and when it complains; levels are ratios from 0 to 1."""
+
+    runtime: float
+    """Time from full to empty [s], above zero."""
+    warn: float = 0.5
+    """Strictly below this level it warns."""
+    error: float = 0.2
+    """Strictly below this level it is an error."""
+
+
+class BatteryCore:
+    """Charge that falls from 1 to 0 over `settings.runtime`; replacing `settings` keeps the level."""
+
+    def __init__(self, settings: BatterySettings, level: float = 1.0) -> None:
+        self.settings = settings
+        self._level = level
+
+    @property
+    def level(self) -> float:
+        """Charge as a ratio from 0 to 1."""
+        return self._level
+
+    @property
+    def status(self) -> tuple[Level, str]:
+        """Level of the diagnostics and what to tell people."""
+        if self._level < self.settings.error:
+            return Level.ERROR, "Low battery"
+        if self._level < self.settings.warn:
+            return Level.WARN, "Medium battery"
+        return Level.OK, "Battery OK"
+
+    def set(self, level: float) -> str:
+        """Set the charge; return why not if `level` is no ratio from 0 to 1, else nothing."""
+        if not 0.0 <= level <= 1.0:
+            return f"a battery level lies between 0 % and 100 %, not at {level * 100:g} %"
+        self._level = level
+        return ""
+
+    def step(self, dt: float) -> None:
+        """Drain for `dt` [s]."""
+        left = self._level - dt / self.settings.runtime
+        self._level = left if left > NOTHING_LEFT else 0.0

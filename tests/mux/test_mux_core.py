@@ -1,0 +1,329 @@
+"""Promises of the mux; messages are plain numbers here, zero is standing still."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from rbxcompose.mux.core import MuxCore, Source
+
+INPUTS = {"safety": Source(200, 0.2), "teleop": Source(100, 0.5), "navigation": Source(10, 0.5)}
+LOCKS = {"door": Source(150, 0.3)}
+
+
+def still(message: float) -> bool:
+    return message == 0.0
+
+
+def mux(*, locks: dict[str, Source] | None = None, stopped: bool = False) -> MuxCore[float]:
+    return MuxCore(INPUTS, zero=0.0, is_zero=still, locks=locks, stopped=stopped)
+
+
+def test_the_only_live_input_passes() -> None:
+    assert mux().receive("navigation", 1.0, 0.0) == 1.0
+
+
+def test_the_larger_priority_wins_while_it_lives() -> None:
+    core = mux()
+    core.receive("teleop", 2.0, 0.0)
+    assert core.receive("navigation", 1.0, 0.5) is None
+    assert core.active == "teleop"
+
+
+def test_exactly_at_its_timeout_an_input_still_counts_and_just_after_it_does_not() -> None:
+    core = mux()
+    core.receive("teleop", 2.0, 0.0)
+    assert core.receive("navigation", 1.0, 0.5) is None
+    assert core.receive("navigation", 1.0, math.nextafter(0.5, 1.0)) == 1.0
+
+
+def test_hand_back_goes_to_the_next_priority_without_a_leak_from_below() -> None:
+    core = mux()
+    core.receive("safety", 3.0, 0.0)
+    core.receive("teleop", 2.0, 0.1)
+    assert core.receive("navigation", 1.0, 0.3) is None
+    assert core.receive("teleop", 2.0, 0.3) == 2.0
+
+
+def test_when_everything_ends_one_zero_is_sent_and_then_silence() -> None:
+    core = mux()
+    core.receive("navigation", 1.0, 0.0)
+    assert core.tick(0.5) is None
+    assert core.tick(0.51) == 0.0
+    assert core.tick(0.52) is None
+    assert core.tick(100.0) is None
+
+
+def test_no_zero_comes_between_an_input_that_ends_and_one_that_lives() -> None:
+    core = mux()
+    core.receive("teleop", 2.0, 0.0)
+    core.receive("navigation", 1.0, 0.4)
+    assert core.tick(0.6) is None
+    assert core.active == "navigation"
+    assert core.tick(0.95) == 0.0
+
+
+def test_a_mux_that_let_nothing_through_sends_no_zero() -> None:
+    core = mux()
+    assert core.tick(0.0) is None
+    assert core.next_deadline() is None
+
+
+def test_it_must_be_woken_at_the_first_moment_after_the_timeout_of_the_winner() -> None:
+    core = mux()
+    core.receive("teleop", 2.0, 1.0)
+    deadline = core.next_deadline()
+    assert deadline == math.nextafter(1.5, 2.0)
+    assert core.tick(1.5) is None
+    assert core.tick(deadline) == 0.0
+    assert core.next_deadline() is None
+
+
+def test_a_zero_that_is_due_is_not_forgotten_when_another_input_is_refused_first() -> None:
+    core = mux(locks=LOCKS)
+    core.heartbeat("door", 0.0)
+    core.receive("teleop", 2.0, 0.1)
+    core.receive("navigation", 1.0, 0.4)
+    assert core.next_deadline() == 0.4
+    assert core.tick(0.4) == 0.0
+
+
+def test_stop_sends_zero_at_once_and_lets_nothing_through() -> None:
+    core = mux()
+    core.receive("safety", 3.0, 0.0)
+    assert core.stop(0.1) == 0.0
+    assert core.stopped
+    assert core.active is None
+    assert core.receive("safety", 3.0, 0.2) is None
+    assert core.tick(10.0) is None
+
+
+def test_release_moves_nothing_while_an_input_goes_on_as_during_the_stop() -> None:
+    core = mux()
+    core.stop(0.0)
+    core.receive("teleop", 2.0, 0.1)
+    core.release(0.2)
+    for now in (0.3, 0.6, 0.9):
+        assert core.receive("teleop", 2.0, now) is None
+
+
+def test_after_release_an_input_that_sent_zero_moves_again() -> None:
+    core = mux()
+    core.stop(0.0)
+    core.receive("teleop", 2.0, 0.1)
+    core.release(0.2)
+    assert core.receive("teleop", 0.0, 0.3) == 0.0
+    assert core.receive("teleop", 2.0, 0.4) == 2.0
+
+
+def test_after_release_an_input_that_was_silent_for_its_timeout_moves_again() -> None:
+    core = mux()
+    core.stop(0.0)
+    core.receive("teleop", 2.0, 0.1)
+    core.release(0.2)
+    assert core.receive("teleop", 2.0, 0.7) == 2.0
+
+
+def test_an_input_that_came_to_rest_during_the_stop_moves_after_release() -> None:
+    core = mux()
+    core.receive("navigation", 1.0, 0.0)
+    core.stop(0.1)
+    core.receive("navigation", 0.0, 0.2)
+    core.release(0.3)
+    assert core.receive("navigation", 1.0, 0.4) == 1.0
+
+
+def test_an_input_that_waits_does_not_hold_back_a_lower_one() -> None:
+    core = mux()
+    core.stop(0.0)
+    core.receive("teleop", 2.0, 0.1)
+    core.release(0.2)
+    assert core.receive("navigation", 1.0, 0.3) == 1.0
+
+
+def test_a_mux_that_was_stopped_when_it_died_comes_back_stopped() -> None:
+    core = mux(stopped=True)
+    assert core.stopped
+    assert core.receive("teleop", 2.0, 5.0) is None
+
+
+def test_after_a_restart_release_moves_nothing_even_if_nobody_was_heard_yet() -> None:
+    core = mux(stopped=True)
+    core.release(5.0)
+    assert core.receive("teleop", 2.0, 5.1) is None
+    assert core.receive("navigation", 1.0, 6.0) == 1.0
+
+
+def test_release_without_a_stop_changes_nothing() -> None:
+    core = mux()
+    core.receive("teleop", 2.0, 0.0)
+    core.release(0.1)
+    assert core.receive("teleop", 2.0, 0.2) == 2.0
+
+
+def test_a_silent_lock_holds_back_what_has_a_smaller_priority_and_nothing_else() -> None:
+    core = mux(locks=LOCKS)
+    assert core.receive("teleop", 2.0, 0.0) is None
+    assert core.receive("safety", 3.0, 0.1) == 3.0
+
+
+def test_a_lock_of_the_same_priority_holds_nothing_back() -> None:
+    core = mux(locks={"door": Source(100, 0.3)})
+    assert core.receive("teleop", 2.0, 0.0) == 2.0
+
+
+def test_a_lock_that_falls_silent_ends_the_motion_with_a_zero() -> None:
+    core = mux(locks=LOCKS)
+    core.heartbeat("door", 0.0)
+    core.receive("teleop", 2.0, 0.1)
+    deadline = core.next_deadline()
+    assert deadline == math.nextafter(0.3, 1.0)
+    assert core.tick(deadline) == 0.0
+
+
+def test_a_lock_that_is_heard_again_opens() -> None:
+    core = mux(locks=LOCKS)
+    core.receive("teleop", 2.0, 0.0)
+    core.heartbeat("door", 0.1)
+    assert core.active == "teleop"
+    assert core.receive("teleop", 2.0, 0.2) == 2.0
+
+
+def test_closing_sends_one_zero_and_nothing_more() -> None:
+    core = mux()
+    core.receive("teleop", 2.0, 0.0)
+    assert core.close(0.1) == 0.0
+    assert core.receive("safety", 3.0, 0.2) is None
+    assert core.tick(5.0) is None
+    assert core.next_deadline() is None
+
+
+def test_it_says_who_holds_the_output() -> None:
+    core = mux()
+    core.receive("navigation", 1.0, 2.81)
+    assert core.why(3.0) == "navigation holds until 3.31 s"
+
+
+def test_it_says_why_nothing_passes() -> None:
+    core = mux(locks=LOCKS)
+    assert core.why(0.0) == "no input"
+    core.receive("teleop", 2.0, 0.0)
+    assert core.why(0.1) == "door locked: no heartbeat"
+    core.stop(0.2)
+    assert core.why(0.2) == "stopped"
+    core.release(0.3)
+    assert core.why(0.3) == "teleop must come to rest once after the stop"
+    core.close(0.4)
+    assert core.why(0.4) == "closed: the robot is going down"
+
+
+@pytest.mark.parametrize("name", ["moon", ""])
+def test_an_input_that_is_not_configured_is_a_mistake_of_the_caller(name: str) -> None:
+    with pytest.raises(KeyError):
+        mux().receive(name, 1.0, 0.0)
+
+
+MESSAGES = st.sampled_from([0.0, 1.0, 2.0])
+
+
+class AnyHistory(RuleBasedStateMachine):
+    """Whatever happens in whatever order, a model that keeps only what was heard says what comes out."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.core = MuxCore(INPUTS, zero=0.0, is_zero=still, locks=LOCKS)
+        self.now = 0.0
+        self.heard: dict[str, tuple[float, float]] = {}  # input -> when, what
+        self.door = -math.inf
+        self.waiting: set[str] = set()  # went on during the stop, have not come to rest since
+        self.stopped = self.closed = False
+        self.passed = self.zeros_of_ticks = 0
+        self.moving = False  # the last thing that came out was not zero
+
+    def live(self, name: str) -> bool:
+        return name in self.heard and self.now <= self.heard[name][0] + INPUTS[name].timeout
+
+    def winner(self) -> str | None:
+        door_open = self.now <= self.door + LOCKS["door"].timeout
+        free = [
+            name
+            for name, source in INPUTS.items()
+            if self.live(name) and name not in self.waiting and (door_open or source.priority >= LOCKS["door"].priority)
+        ]
+        held = self.stopped or self.closed or not free
+        return None if held else max(free, key=lambda name: INPUTS[name].priority)
+
+    @rule(duration=st.sampled_from([0.0, 0.05, 0.1, 0.25, 0.6]))
+    def time_passes(self, duration: float) -> None:
+        self.now += duration
+
+    @rule()
+    def it_is_woken_in_time(self) -> None:
+        deadline = self.core.next_deadline()
+        if deadline is not None:
+            self.now = max(self.now, deadline)
+            self.tick()
+
+    @rule()
+    def tick(self) -> None:
+        zero = self.core.tick(self.now)
+        if zero is not None:
+            assert zero == 0.0
+            assert self.winner() is None
+            self.zeros_of_ticks += 1
+            self.moving = False
+        assert self.core.tick(self.now) is None
+        assert self.core.active == self.winner()
+        assert not self.moving or self.winner() is not None
+
+    @rule(name=st.sampled_from(sorted(INPUTS)), message=MESSAGES)
+    def receive(self, name: str, message: float) -> None:
+        if still(message) or not self.live(name):
+            self.waiting.discard(name)
+        self.heard[name] = self.now, message
+        out = self.core.receive(name, message, self.now)
+        assert out == (message if name == self.winner() else None)
+        if out is not None:
+            self.passed += 1
+            self.moving = not still(out)
+
+    @rule()
+    def heartbeat(self) -> None:
+        self.door = self.now
+        self.core.heartbeat("door", self.now)
+
+    @rule()
+    def stop(self) -> None:
+        assert self.core.stop(self.now) == 0.0
+        self.stopped = True
+        self.moving = False
+
+    @rule()
+    def release(self) -> None:
+        self.core.release(self.now)
+        if self.stopped:
+            self.waiting |= {name for name in self.heard if self.live(name) and not still(self.heard[name][1])}
+        self.stopped = False
+
+    @precondition(lambda self: self.now > 2.0 and not self.closed)
+    @rule()
+    def close(self) -> None:
+        assert self.core.close(self.now) == 0.0
+        self.closed = True
+        self.moving = False
+
+    @invariant()
+    def a_zero_of_its_own_follows_something_that_passed(self) -> None:
+        assert self.zeros_of_ticks <= self.passed
+
+    @invariant()
+    def while_something_moves_a_wake_up_is_due(self) -> None:
+        assert not self.moving or self.core.next_deadline() is not None
+
+
+TestAnyHistory = AnyHistory.TestCase
+TestAnyHistory.settings = settings(max_examples=80, stateful_step_count=40, deadline=None)
