@@ -1,0 +1,376 @@
+"""Finds what is wrong with an expression before any value is known: names, dimensions, arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Protocol
+
+from rbxcompose.expressions.functions import FUNCTIONS
+from rbxcompose.expressions.tree import (
+    Arithmetic,
+    Call,
+    Comparison,
+    Expression,
+    Field,
+    Flag,
+    Index,
+    Items,
+    Junction,
+    Membership,
+    Minus,
+    Node,
+    Not,
+    Number,
+    Text,
+    Variable,
+    Word,
+)
+from rbxcompose.expressions.types import (
+    COUNT,
+    FLAG,
+    POSE,
+    TEXT,
+    UNKNOWN,
+    Type,
+    TypeKind,
+    accepts,
+    are_comparable,
+    list_of,
+    quantity_of,
+)
+from rbxcompose.findings import suggest
+from rbxcompose.units import LENGTH, NUMBER, QUOTIENT, RATIO, TIME, Dimension, bare_number_help, format_number
+
+
+class StaticScope(Protocol):
+    """The names that exist, and what they will hold."""
+
+    def variable(self, name: str) -> Type | None:
+        """Return the type of `$name`, None if there is no such name."""
+        ...
+
+    def word(self, name: str) -> Type | None:
+        """Return the type of what a bare word names, None if it names nothing; choices need not be known."""
+        ...
+
+    def variables(self) -> Iterable[str]:
+        """Return the names that `variable` knows, without '$'."""
+        ...
+
+    def words(self) -> Iterable[str]:
+        """Return the names that `word` knows."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something wrong at `start` to `end` of an expression's text."""
+
+    message: str
+    start: int
+    end: int
+    help: str = ""
+
+
+def check(expression: Expression, scope: StaticScope) -> tuple[Type, list[Problem]]:
+    """Return the type of an expression, unknown where it is wrong, and what is wrong by place."""
+    checker = _Checker(scope)
+    found = checker.type_of(expression.tree)
+    return found, checker.sorted()
+
+
+def check_value(expression: Expression, scope: StaticScope, expected: Type) -> list[Problem]:
+    """Return what is wrong with an expression that must give a value of the type `expected`."""
+    checker = _Checker(scope)
+    checker.require(expression.tree, expected)
+    return checker.sorted()
+
+
+def check_condition(expression: Expression, scope: StaticScope) -> list[Problem]:
+    """Return what is wrong with an expression that must be true or false."""
+    return check_value(expression, scope, FLAG)
+
+
+class _Checker:
+    """Walks one tree; a node that is wrong is unknown to those above it, so that nothing is said twice."""
+
+    def __init__(self, scope: StaticScope) -> None:
+        self.scope = scope
+        self.problems: list[Problem] = []
+
+    def sorted(self) -> list[Problem]:
+        return sorted(self.problems, key=lambda problem: (problem.start, problem.end))
+
+    def wrong(self, node: Node, message: str, fix: str = "") -> Type:
+        self.problems.append(Problem(message, node.start, node.end, fix))
+        return UNKNOWN
+
+    def type_of(self, node: Node, expected: Type = UNKNOWN) -> Type:
+        """Return the type of a node; `expected` tells which choices a bare word may be."""
+        match node:
+            case Number(value=value, dimension=dimension):
+                return COUNT if dimension == NUMBER and value.is_integer() else quantity_of(dimension)
+            case Text(value=name) | Word(name=name) if name in expected.choices:
+                return expected
+            case Text():
+                return self.text(node, expected)
+            case Flag():
+                return FLAG
+            case Variable():
+                return self.variable(node)
+            case Word():
+                return self.word(node, expected)
+            case Items(items=nodes):
+                types = {self.type_of(item, expected.entry) for item in nodes}
+                return list_of(types.pop() if len(types) == 1 else UNKNOWN)
+            case Field() | Index():
+                return self.part(node)
+            case Call():
+                return self.call(node)
+            case Minus(operand=operand):
+                return self.measured(operand)
+            case Not(operand=operand):
+                return self.require(operand, FLAG)
+            case Junction(operands=operands):
+                for operand in operands:
+                    self.require(operand, FLAG)
+                return FLAG
+            case Comparison():
+                return self.comparison(node)
+            case Membership():
+                return self.membership(node)
+            case Arithmetic():
+                return self.arithmetic(node)
+
+    def require(self, node: Node, expected: Type) -> Type:
+        """Say what is wrong if a node is not of the type `expected`; return that type."""
+        found = self.type_of(node, expected)
+        if accepts(expected, found):
+            return expected
+        if expected.dimension and _is_bare(node):
+            if fix := _missing_unit(node, expected.dimension):
+                self.wrong(node, f"this must be {expected.phrase}; the unit is missing", fix)
+            return expected
+        what = "true or false" if expected == FLAG else expected.detail
+        self.wrong(node, f"this must be {what}; it is {found.detail}", _WHOLE if expected == COUNT else "")
+        return expected
+
+    def text(self, node: Text, expected: Type) -> Type:
+        if expected.kind is TypeKind.CHOICE:
+            return self.wrong(node, f"unknown choice '{node.value}'", suggest(node.value, expected.choices, "choices"))
+        return TEXT
+
+    def variable(self, node: Variable) -> Type:
+        if found := self.scope.variable(node.name):
+            return found
+        if self.scope.word(node.name):
+            return self.wrong(node, f"unknown name '${node.name}'", f"write '{node.name}' without '$'")
+        names = [f"${name}" for name in self.scope.variables()]
+        return self.wrong(node, f"unknown name '${node.name}'", suggest(f"${node.name}", names, "names"))
+
+    def word(self, node: Word, expected: Type) -> Type:
+        if found := self.scope.word(node.name):
+            return found
+        if self.scope.variable(node.name):
+            fix = f"write '${node.name}'"
+        elif expected == TEXT:
+            fix = f"a text needs quotes: '{node.name}'"
+        else:
+            fix = suggest(node.name, expected.choices or self.scope.words())
+        return self.wrong(node, f"unknown name '{node.name}'", fix)
+
+    def part(self, node: Field | Index) -> Type:
+        whole = self.type_of(node.of)
+        if isinstance(node, Field):
+            if whole.kind in (TypeKind.MAP, TypeKind.UNKNOWN):
+                return whole.entry
+            return self.wrong(node, f"{whole.phrase} has no fields")
+        key = self.type_of(node.index, TEXT if whole.kind is TypeKind.MAP else UNKNOWN)
+        match whole.kind:
+            case TypeKind.UNKNOWN:
+                return UNKNOWN
+            case TypeKind.MAP if key.kind in _NAMES:
+                return whole.entry
+            case TypeKind.LIST if key == UNKNOWN or key.measure in (NUMBER, QUOTIENT):
+                return whole.entry
+            case TypeKind.MAP:
+                return self.wrong(node.index, f"an entry of a map is found by a name; this is {key.phrase}")
+            case TypeKind.LIST:
+                return self.wrong(node.index, f"an item of a list is found by a number; this is {key.phrase}")
+        return self.wrong(node, f"{whole.phrase} has no items")
+
+    def comparison(self, node: Comparison) -> Type:
+        left, right = self.pair(node.left, node.right)
+        if node.operator in ("==", "!="):
+            self.equality(node, left, right)
+        elif self.is_measured(left) and self.is_measured(right):
+            self.joined(node, left, right, "is compared with")
+        return FLAG
+
+    def pair(self, left: Node, right: Node) -> tuple[_Typed, _Typed]:
+        """Return two nodes with their types; a bare word may be a choice of the other one's type."""
+        if isinstance(left, Word | Text):
+            other = self.type_of(right)
+            return _Typed(left, self.type_of(left, other)), _Typed(right, other)
+        one = self.type_of(left)
+        return _Typed(left, one), _Typed(right, self.type_of(right, one))
+
+    def membership(self, node: Membership) -> Type:
+        if isinstance(node.group, Items):
+            for one in node.group.items:
+                self.equality(one, *self.pair(node.item, one))
+            return FLAG
+        group = self.type_of(node.group)
+        item = self.type_of(node.item, group.entry if group.kind is TypeKind.LIST else TEXT)
+        match group.kind:
+            case TypeKind.LIST:
+                self.equality(node, _Typed(node.item, item), _Typed(node.group, group.entry))
+            case TypeKind.MAP:
+                if item.kind not in _NAMES:
+                    self.wrong(node.item, f"a map holds names; this is {item.phrase}")
+            case TypeKind.UNKNOWN:
+                pass
+            case _:
+                self.wrong(node.group, f"'in' needs a list or a map; this is {group.phrase}")
+        return FLAG
+
+    def equality(self, node: Node, left: _Typed, right: _Typed) -> None:
+        if left.type.measure and right.type.measure:
+            self.joined(node, left, right, "is compared with")
+        elif not are_comparable(left.type, right.type):
+            poses = TypeKind.POSE in (left.type.kind, right.type.kind)
+            fix = "write 'distance(a, b) < 10 cm'" if poses else ""
+            self.wrong(node, f"{left.type.phrase} is compared with {right.type.phrase}", fix)
+
+    def joined(self, node: Node, left: _Typed, right: _Typed, verb: str) -> Type:
+        """Return the type of a sum, of the least or the greatest of two measured values."""
+        one, other = left.type.measure, right.type.measure
+        if not one or not other:
+            return UNKNOWN
+        if one.is_comparable(other):
+            return _wider(left.type, right.type)
+        for bare, measured in ((left, right), (right, left)):
+            if _is_bare(bare.node) and measured.type.dimension:
+                if fix := _missing_unit(bare.node, measured.type.dimension):
+                    return self.wrong(node, f"{measured.type.phrase} {verb} a bare number", fix)
+                return measured.type
+        return self.wrong(node, f"{left.type.phrase} {verb} {right.type.phrase}")
+
+    def is_measured(self, typed: _Typed) -> bool:
+        """Tell whether a value can be computed with, and say so if not."""
+        if typed.type != UNKNOWN and not typed.type.measure:
+            self.wrong(typed.node, f"this must be a number; it is {typed.type.phrase}")
+        return typed.type.measure is not None
+
+    def measured(self, node: Node) -> Type:
+        found = self.type_of(node)
+        return found if self.is_measured(_Typed(node, found)) else UNKNOWN
+
+    def arithmetic(self, node: Arithmetic) -> Type:
+        left = _Typed(node.left, self.type_of(node.left))
+        right = _Typed(node.right, self.type_of(node.right))
+        kinds = {left.type.kind, right.type.kind}
+        if node.operator == "+" and kinds <= {TypeKind.TEXT, TypeKind.CHOICE}:
+            return TEXT
+        if node.operator == "+" and kinds == {TypeKind.LIST}:
+            return left.type if left.type == right.type else list_of(UNKNOWN)
+        if node.operator == "+" and TypeKind.UNKNOWN in kinds:
+            return UNKNOWN
+        # Both are asked, so that both are told.
+        if not all([self.is_measured(left), self.is_measured(right)]):
+            return UNKNOWN
+        if node.operator in _SUMS:
+            return self.joined(node, left, right, _SUMS[node.operator])
+        return _product(node.operator, left.type, right.type)
+
+    def call(self, node: Call) -> Type:
+        name, arguments = node.function, node.arguments
+        if wrong := FUNCTIONS[name].wrong_count(len(arguments)):
+            self.wrong(node, f"{name}() {wrong}")
+            return _RESULTS.get(name, UNKNOWN)
+        match name:
+            case "age" | "new":
+                if isinstance(arguments[0], Variable):
+                    self.type_of(arguments[0])
+                else:
+                    self.wrong(arguments[0], f"{name}() needs a name with '$'", f"such as {name}($scan)")
+            case "count":
+                found = self.type_of(arguments[0])
+                if found.kind not in (TypeKind.LIST, TypeKind.MAP, TypeKind.UNKNOWN):
+                    self.wrong(arguments[0], f"count() needs a list or a map; this is {found.phrase}")
+            case "distance":
+                for argument in arguments:
+                    self.require(argument, POSE)
+            case "round":
+                found = self.measured(arguments[0])
+                if found.measure not in (None, NUMBER, QUOTIENT):
+                    fix = "divide by a unit first, such as '1 cm' or '1 %'"
+                    self.wrong(arguments[0], f"round() needs a number without a unit; this is {found.phrase}", fix)
+            case "abs":
+                return self.measured(arguments[0])
+            case _:
+                return self.extreme(node)
+        return _RESULTS[name]
+
+    def extreme(self, node: Call) -> Type:
+        """Return the type of the least or the greatest of several values, or of the items of one list."""
+        first, *others = node.arguments
+        if others:
+            found = self.measured(first)
+            for other in others:
+                found = self.joined(node, _Typed(first, found), _Typed(other, self.measured(other)), "is compared with")
+            return found
+        group = self.type_of(first)
+        if group.kind not in (TypeKind.LIST, TypeKind.UNKNOWN):
+            return self.wrong(first, f"{node.function}() needs several values or a list; this is {group.phrase}")
+        return group.entry if self.is_measured(_Typed(first, group.entry)) else UNKNOWN
+
+
+@dataclass(frozen=True, slots=True)
+class _Typed:
+    """A node with its type."""
+
+    node: Node
+    type: Type
+
+
+_NAMES = frozenset({TypeKind.TEXT, TypeKind.CHOICE, TypeKind.PLACE, TypeKind.UNKNOWN})
+_SUMS = {"+": "is added to", "-": "is reduced by"}
+_WHOLE = "write round(...) for a whole number"
+_RESULTS = {
+    "age": quantity_of(TIME),
+    "new": FLAG,
+    "count": COUNT,
+    "distance": quantity_of(LENGTH),
+    "round": COUNT,
+}
+
+
+def _is_bare(node: Node) -> bool:
+    """Tell whether a node is a number as written, without a unit."""
+    while isinstance(node, Minus):
+        node = node.operand
+    return isinstance(node, Number) and node.dimension == NUMBER
+
+
+def _missing_unit(node: Node, dimension: Dimension) -> str:
+    """Return what to write instead of a bare number, or nothing if it is understood as SI."""
+    if dimension == RATIO and isinstance(node, Number):
+        percentage = node.value * 100 if node.value < 1 else node.value
+        return f"write '{format_number(percentage)} %'"
+    return bare_number_help(dimension)
+
+
+def _wider(one: Type, other: Type) -> Type:
+    if one == other:
+        return one
+    vague = (COUNT, quantity_of(QUOTIENT))
+    return next((found for found in (one, other) if found not in vague), quantity_of(NUMBER))
+
+
+def _product(operator: str, left: Type, right: Type) -> Type:
+    if operator == "*" and left == right == COUNT:
+        return COUNT
+    one, other = left.measure or NUMBER, right.measure or NUMBER
+    return quantity_of(one * other if operator == "*" else one / other)

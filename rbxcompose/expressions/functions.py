@@ -1,0 +1,104 @@
+"""The functions of the expression language: the whole list, how many values each takes, and what it computes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from rbxcompose.expressions.values import MOST_ITEMS, Located, Value
+from rbxcompose.units import MOST
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """A function: it takes `least` to `most` arguments; `compute` raises ValueError in plain words.
+
+    Without `compute` it asks the scope about a `$name`.
+    """
+
+    least: int
+    most: int
+    compute: Callable[..., Value] | None = None
+
+    def wrong_count(self, given: int) -> str:
+        """Return what is wrong with this number of arguments, or nothing."""
+        if self.least <= given <= self.most:
+            return ""
+        takes = f"{self.least}" if self.least == self.most else f"at least {self.least}"
+        return f"takes {takes} argument{'' if self.least == 1 else 's'}, not {given}"
+
+
+def items(value: Value) -> list[Value]:
+    """Return the items of a list, the keys of a map.
+
+    Raises:
+        ValueError: if it is neither, or has too many.
+    """
+    if not isinstance(value, list | tuple | Mapping):
+        raise ValueError("needs a list or a map")
+    if len(value) > MOST_ITEMS:
+        raise ValueError(f"takes a list of at most {MOST_ITEMS:,} items")
+    return list(value)
+
+
+def _count(value: Value) -> float:
+    if not isinstance(value, list | tuple | Mapping):
+        raise ValueError("needs a list or a map")
+    return float(len(value))
+
+
+def _distance(one: Value, other: Value) -> float:
+    if not (isinstance(one, Located) and isinstance(other, Located)):
+        raise ValueError("needs two places or poses")
+    return math.hypot(one.x - other.x, one.y - other.y)
+
+
+def _least(*values: Value) -> float:
+    return min(_numbers(values))
+
+
+def _greatest(*values: Value) -> float:
+    return max(_numbers(values))
+
+
+def _numbers(values: tuple[Value, ...]) -> list[float]:
+    numbers = [_number(value) for value in (values if len(values) > 1 else items(values[0]))]
+    if not numbers:
+        raise ValueError("needs a list that is not empty")
+    return numbers
+
+
+def _number(value: Value) -> float:
+    if isinstance(value, float) and value == value:
+        return value
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) < MOST:
+        return float(value)
+    raise ValueError("needs numbers")
+
+
+def _absolute(value: Value) -> float:
+    return abs(_number(value))
+
+
+def _rounded(value: Value) -> float:
+    """Round to a whole number, halves away from zero as people do."""
+    number = _number(value)
+    if math.isinf(number):
+        raise ValueError("needs a finite number")
+    whole = float(math.trunc(number))
+    return whole + math.copysign(1.0, number) if abs(number - whole) >= 0.5 else whole
+
+
+_MANY = 1000  # no expression is long enough for more
+
+FUNCTIONS: Mapping[str, Function] = {
+    "count": Function(1, 1, _count),
+    "age": Function(1, 1),
+    "new": Function(1, 1),
+    "distance": Function(2, 2, _distance),
+    "min": Function(1, _MANY, _least),
+    "max": Function(1, _MANY, _greatest),
+    "abs": Function(1, 1, _absolute),
+    "round": Function(1, 1, _rounded),
+}

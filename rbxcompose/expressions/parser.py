@@ -1,0 +1,249 @@
+"""Tokens to a tree, by binding strength: or, and, not, comparisons, + -, * /, minus, then `.field` and `[index]`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.expressions.functions import FUNCTIONS
+from rbxcompose.expressions.tokens import KEYWORDS, Token, TokenKind, tokens
+from rbxcompose.expressions.tree import (
+    Arithmetic,
+    Call,
+    Comparison,
+    Expression,
+    ExpressionError,
+    Field,
+    Flag,
+    Index,
+    Items,
+    Junction,
+    Membership,
+    Minus,
+    Node,
+    Not,
+    Number,
+    Text,
+    Variable,
+    Word,
+    walk,
+)
+from rbxcompose.findings import suggest
+
+LONGEST = 1000  # characters
+LEVELS = 50  # of the tree, and of brackets
+STEPS = 500  # nodes; an expression has no loops, so this bounds its evaluation
+
+_OR, _AND, _NOT, _COMPARED, _SUM, _PRODUCT, _MINUS = range(1, 8)
+_BINDING = {
+    "or": _OR,
+    "and": _AND,
+    **dict.fromkeys(("<", "<=", ">", ">=", "==", "!=", "in", "not"), _COMPARED),  # 'not' as in 'not in'
+    **dict.fromkeys("+-", _SUM),
+    **dict.fromkeys("*/", _PRODUCT),
+}
+
+# Words of other languages; the names of places and choices never look like these.
+_FOREIGN = {
+    "True": "write 'true'",
+    "False": "write 'false'",
+    "AND": "write 'and'",
+    "OR": "write 'or'",
+    "NOT": "write 'not'",
+    "is": "write '=='",
+    "lambda": f"the functions are {', '.join(FUNCTIONS)}",
+}
+
+
+def parse(text: str) -> Expression:
+    """Read a condition, a value or an argument, in which `$name` is looked up while the robot runs.
+
+    Raises:
+        ExpressionError: if it is none, or exceeds a limit.
+    """
+    return _parse(text, running=True)
+
+
+def parse_fill(text: str) -> Expression:
+    """Read what stands between `${` and `}`, which is filled in when the files are put together: no `$name` there.
+
+    Raises:
+        ExpressionError: if it is no expression, or exceeds a limit.
+    """
+    return _parse(text, running=False)
+
+
+def _parse(text: str, *, running: bool) -> Expression:
+    if len(text) > LONGEST:
+        message = f"an expression may have {LONGEST:,} characters; this one has {len(text):,}"
+        raise ExpressionError(message, LONGEST, len(text))
+    parser = _Parser(tokens(text), running)
+    tree = parser.expression()
+    parser.end()
+    for steps, (node, level) in enumerate(walk(tree), start=1):
+        if level > LEVELS or steps > STEPS:
+            raise _too_much(node.start, node.end)
+    return Expression(text, tree)
+
+
+def _too_much(start: int, end: int) -> ExpressionError:
+    limits = f"an expression may have {LEVELS} levels and {STEPS} parts"
+    return ExpressionError(limits, start, end, "compute a part of it with 'set' first")
+
+
+class _Parser:
+    """Reads the tokens from left to right; a method that returns a node takes its tokens."""
+
+    def __init__(self, read: Iterator[Token], running: bool) -> None:
+        self.tokens = read
+        self.running = running
+        self.level = 0
+        self.now = next(read)
+
+    def take(self) -> Token:
+        token = self.now
+        self.now = next(self.tokens, token)  # END stays
+        return token
+
+    def at(self, *symbols: str) -> bool:
+        return self.now.kind is TokenKind.SYMBOL and self.now.text in symbols
+
+    def close(self, symbol: str, opened: Token) -> Token:
+        """Take the bracket that closes `opened`."""
+        if self.now.kind is TokenKind.END:
+            raise ExpressionError(f"'{opened.text}' is not closed", opened.start, opened.end, f"write '{symbol}'")
+        if not self.at(symbol):
+            raise self.unexpected()
+        return self.take()
+
+    def end(self) -> None:
+        if self.now.kind is not TokenKind.END:
+            raise self.unexpected()
+
+    def unexpected(self) -> ExpressionError:
+        """Return what is wrong with a token that stands where an operator should."""
+        token = self.now
+        if token.kind is TokenKind.SYMBOL:
+            return ExpressionError(f"'{token.text}' does not belong here", token.start, token.end)
+        message = f"an operator is missing before '{token.text}'"
+        return ExpressionError(message, token.start, token.end, _FOREIGN.get(token.text, ""))
+
+    def expression(self, binding: int = 0) -> Node:
+        """Read operands and all operators between them that bind more strongly than `binding`."""
+        self.level += 1
+        if self.level > LEVELS:
+            raise _too_much(self.now.start, self.now.end)
+        left = self.operand()
+        compared = False
+        while self.now.kind is TokenKind.SYMBOL and (strength := _BINDING.get(self.now.text, 0)) > binding:
+            if compared and strength == _COMPARED:
+                help_text = "write 'a < b and b < c'"
+                raise ExpressionError("comparisons cannot be chained", self.now.start, self.now.end, help_text)
+            compared = strength == _COMPARED
+            left = self.operation(left, strength)
+        self.level -= 1
+        return left
+
+    def operation(self, left: Node, strength: int) -> Node:
+        operator = self.take()
+        if operator.text in ("and", "or"):
+            operands = [left, self.expression(strength)]
+            while self.at(operator.text):
+                self.take()
+                operands.append(self.expression(strength))
+            return Junction(left.start, operands[-1].end, operator.text, tuple(operands))
+        if operator.text == "not":
+            if not self.at("in"):
+                raise self.unexpected()
+            self.take()
+        right = self.expression(strength)
+        start, end = left.start, right.end
+        match operator.text:
+            case "in":
+                return Membership(start, end, left, right)
+            case "not":
+                return Not(start, end, Membership(start, end, left, right))
+            case "+" | "-" | "*" | "/":
+                return Arithmetic(start, end, operator.text, left, right)
+            case _:
+                return Comparison(start, end, operator.text, left, right)
+
+    def operand(self) -> Node:
+        token = self.take()
+        match token.kind:
+            case TokenKind.NUMBER if token.quantity:
+                return Number(token.start, token.end, token.quantity.value, token.quantity.dimension)
+            case TokenKind.TEXT:
+                return Text(token.start, token.end, token.text[1:-1])
+            case TokenKind.VARIABLE:
+                return self.parts(self.variable(token))
+            case TokenKind.WORD:
+                return self.call(token) if self.at("(") else self.parts(self.word(token))
+            case TokenKind.SYMBOL:
+                return self.symbol(token)
+        raise ExpressionError("a value is missing at the end", token.start, token.end)
+
+    def symbol(self, token: Token) -> Node:
+        match token.text:
+            case "true" | "false":
+                return Flag(token.start, token.end, token.text == "true")
+            case "-":
+                operand = self.expression(_MINUS)
+                return Minus(token.start, operand.end, operand)
+            case "not":
+                operand = self.expression(_NOT)
+                return Not(token.start, operand.end, operand)
+            case "(":
+                inner = self.expression()
+                self.close(")", token)
+                return self.parts(inner) if isinstance(inner, Variable | Word | Field | Index) else inner
+            case "[":
+                items, end = self.items("]", token)
+                return Items(token.start, end, items)
+        raise ExpressionError(f"a value is missing before '{token.text}'", token.start, token.end)
+
+    def variable(self, token: Token) -> Variable:
+        if not self.running:
+            message = f"'${token.text}' is known only while the robot runs"
+            help_text = "'${...}' is filled in before: write a name without '$', such as 'args.speed'"
+            raise ExpressionError(message, token.start, token.end, help_text)
+        return Variable(token.start, token.end, token.text)
+
+    def word(self, token: Token) -> Word:
+        if token.text in _FOREIGN:
+            message = f"'{token.text}' has no meaning in an expression"
+            raise ExpressionError(message, token.start, token.end, _FOREIGN[token.text])
+        return Word(token.start, token.end, token.text)
+
+    def call(self, name: Token) -> Call:
+        if name.text not in FUNCTIONS:
+            help_text = suggest(name.text, FUNCTIONS, "the functions are")
+            raise ExpressionError(f"unknown function '{name.text}'", name.start, name.end, help_text)
+        arguments, end = self.items(")", self.take())
+        return Call(name.start, end, name.text, arguments)
+
+    def items(self, closing: str, opened: Token) -> tuple[tuple[Node, ...], int]:
+        """Read values between commas up to the closing bracket; return them and where it ends."""
+        read: list[Node] = []
+        if not self.at(closing):
+            read.append(self.expression())
+            while self.at(","):
+                self.take()
+                read.append(self.expression())
+        return tuple(read), self.close(closing, opened).end
+
+    def parts(self, node: Node) -> Node:
+        """Read the fields and indices that follow data."""
+        while self.at(".", "["):
+            opened = self.take()
+            if opened.text == "[":
+                index = self.expression()
+                node = Index(node.start, self.close("]", opened).end, node, index)
+                continue
+            names = self.take()
+            if names.kind is not TokenKind.WORD and names.text not in KEYWORDS:
+                raise ExpressionError("a field's name is missing after '.'", opened.start, names.end)
+            end = names.start - 1
+            for name in names.text.split("."):
+                end += 1 + len(name)
+                node = Field(node.start, end, node, name)
+        return node

@@ -1,0 +1,111 @@
+"""Text arguments: `$name` and `$name.field` are filled in, `$$` is a dollar, everything else is text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rbxcompose.expressions.evaluate import evaluate
+from rbxcompose.expressions.parser import parse
+from rbxcompose.expressions.tokens import NAME
+from rbxcompose.expressions.tree import Expression, ExpressionError, Reference
+from rbxcompose.expressions.values import LONGEST_TEXT, EvaluationError, Located, Place, Scope, Value
+from rbxcompose.units import format_number
+
+Show: TypeAlias = Callable[[str, Value], str]
+"""Writes the value of a name (`battery`, `result.count`) for people."""
+
+_SLOT = re.compile(rf"\$(?:(?P<dollar>\$)|(?P<path>{NAME}(?:\.{NAME})*))")
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """A place in a text, from `start` to `end`, that the value of `path` fills."""
+
+    path: str
+    value: Expression
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """A text with its slots: `parts` follow each other."""
+
+    text: str
+    parts: tuple[str | Slot, ...]
+
+    @property
+    def names(self) -> tuple[Reference, ...]:
+        """Return the names to be filled in, without '$' and fields, with their places."""
+        slots = (part for part in self.parts if isinstance(part, Slot))
+        roots = ((slot, slot.path.partition(".")[0]) for slot in slots)
+        return tuple(Reference(root, slot.start, slot.start + 1 + len(root)) for slot, root in roots)
+
+
+def parse_template(text: str) -> Template:
+    """Read a text argument.
+
+    Raises:
+        ExpressionError: if a name in it is longer or has more fields than an expression may have.
+    """
+    parts: list[str | Slot] = []
+    end = 0
+    for match in _SLOT.finditer(text):
+        parts.append(text[end : match.start()])
+        end = match.end()
+        path = match["path"]
+        parts.append(_slot(path, match.start(), end) if path else "$")
+    parts.append(text[end:])
+    return Template(text, tuple(part for part in parts if part))
+
+
+def _slot(path: str, start: int, end: int) -> Slot:
+    try:
+        return Slot(path, parse(f"${path}"), start, end)
+    except ExpressionError as error:
+        raise ExpressionError(error.message, start, end) from None
+
+
+def fill(template: Template, scope: Scope, show: Show | None = None) -> str:
+    """Return the text with each value written by `show`, else by `show_value`.
+
+    Raises:
+        NotArrivedError: if a value has not arrived yet.
+        EvaluationError: if there is no such value, or the text grows beyond its limit.
+    """
+    filled = "".join(
+        part if isinstance(part, str) else _filled(part, scope, show or show_value) for part in template.parts
+    )
+    if len(filled) > LONGEST_TEXT:
+        raise EvaluationError(f"the text has more than {LONGEST_TEXT:,} characters", 0, len(template.text))
+    return filled
+
+
+def _filled(slot: Slot, scope: Scope, show: Show) -> str:
+    try:
+        value = evaluate(slot.value, scope)
+    except EvaluationError as error:
+        raise EvaluationError(error.message, slot.start, slot.end) from None
+    return show(slot.path, value)
+
+
+def show_value(name: str, value: Value) -> str:
+    """Write a value for people: short numbers, places by their names without underscores."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return value
+    if isinstance(value, int | float):
+        return format_number(value)
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key}: {show_value(name, each)}" for key, each in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(show_value(name, each) for each in value)
+    if isinstance(value, Place):
+        return value.name.replace("_", " ")
+    if isinstance(value, Located):
+        return f"({format_number(value.x)} m, {format_number(value.y)} m)"
+    return str(value)

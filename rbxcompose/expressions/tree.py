@@ -1,0 +1,224 @@
+"""What an expression is once it has been read: a tree of frozen nodes, each with its place in the text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from rbxcompose.units import Dimension
+
+
+class ExpressionError(ValueError):
+    """Raised when a text is no expression; `start` and `end` are offsets in it, `help` may be empty."""
+
+    def __init__(self, message: str, start: int, end: int, help: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.start = start
+        self.end = end
+        self.help = help
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """Something at `start` to `end` (exclusive) of the text."""
+
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Number(_Placed):
+    """`0.3 m/s`: a value in SI with its dimension."""
+
+    value: float
+    dimension: Dimension
+
+
+@dataclass(frozen=True, slots=True)
+class Text(_Placed):
+    """`'hello'`, without its quotes."""
+
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class Flag(_Placed):
+    """`true` or `false`."""
+
+    value: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Variable(_Placed):
+    """`$name`, looked up while the robot runs."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Word(_Placed):
+    """A bare word, dots included: a place, a choice, a result, `args.speed`."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Items(_Placed):
+    """`[a, b]`: a list that is written out."""
+
+    items: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Field(_Placed):
+    """`of.name`: an entry of a map."""
+
+    of: Node
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Index(_Placed):
+    """`of[index]`: an entry of a list, counted from 0, or of a map."""
+
+    of: Node
+    index: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Call(_Placed):
+    """`function(arguments)`, one of the few functions that exist."""
+
+    function: str
+    arguments: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Minus(_Placed):
+    """`-operand`."""
+
+    operand: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Not(_Placed):
+    """`not operand`."""
+
+    operand: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Arithmetic(_Placed):
+    """`left + right`, and `-`, `*`, `/` alike."""
+
+    operator: str
+    left: Node
+    right: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison(_Placed):
+    """`left < right`, and `<=`, `>`, `>=`, `==`, `!=` alike."""
+
+    operator: str
+    left: Node
+    right: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Membership(_Placed):
+    """`item in group`."""
+
+    item: Node
+    group: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Junction(_Placed):
+    """`a and b and c`, or the same with `or`: read from the left until decided."""
+
+    operator: str
+    operands: tuple[Node, ...]
+
+
+Node: TypeAlias = (
+    Number
+    | Text
+    | Flag
+    | Variable
+    | Word
+    | Items
+    | Field
+    | Index
+    | Call
+    | Minus
+    | Not
+    | Arithmetic
+    | Comparison
+    | Membership
+    | Junction
+)
+
+
+def children(node: Node) -> tuple[Node, ...]:
+    """Return the nodes right below this one, in the order of the text."""
+    match node:
+        case Items(items=nodes) | Call(arguments=nodes) | Junction(operands=nodes):
+            return nodes
+        case Field(of=of):
+            return (of,)
+        case Index(of=first, index=second) | Membership(item=first, group=second):
+            return (first, second)
+        case Arithmetic(left=first, right=second) | Comparison(left=first, right=second):
+            return (first, second)
+        case Minus(operand=operand) | Not(operand=operand):
+            return (operand,)
+        case _:
+            return ()
+
+
+def walk(tree: Node) -> Iterator[tuple[Node, int]]:
+    """Yield each node with its level, the root's being 1, in the order of the text; needs no recursion."""
+    waiting = [(tree, 1)]
+    while waiting:
+        node, level = waiting.pop()
+        yield node, level
+        waiting.extend((child, level + 1) for child in reversed(children(node)))
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A name that an expression uses, without its `$`, and the place where it does."""
+
+    name: str
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Expression:
+    """A text that was read; two are equal if they mean the same at the same places."""
+
+    text: str
+    tree: Node
+    names: tuple[Reference, ...] = field(init=False, compare=False, repr=False)
+    """`$names`: for `$data.field[0]` it is `data`."""
+    words: tuple[Reference, ...] = field(init=False, compare=False, repr=False)
+    """Bare words, with their dots."""
+    calls: tuple[Reference, ...] = field(init=False, compare=False, repr=False)
+    """Functions."""
+
+    def __post_init__(self) -> None:
+        nodes = [node for node, _ in walk(self.tree)]
+        for name, found in {
+            "names": [Reference(node.name, node.start, node.end) for node in nodes if isinstance(node, Variable)],
+            "words": [Reference(node.name, node.start, node.end) for node in nodes if isinstance(node, Word)],
+            "calls": [
+                Reference(node.function, node.start, node.start + len(node.function))
+                for node in nodes
+                if isinstance(node, Call)
+            ],
+        }.items():
+            object.__setattr__(self, name, tuple(found))

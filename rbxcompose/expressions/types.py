@@ -1,0 +1,135 @@
+"""What kind of value an expression gives, known without its values; and what may stand for what."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from types import MappingProxyType
+
+from rbxcompose.units import DIMENSIONS, NUMBER, Dimension
+
+
+class TypeKind(Enum):
+    """The kinds of types; the values are the words for them in a sentence."""
+
+    QUANTITY = "a quantity"
+    COUNT = "a count"
+    TEXT = "a text"
+    FLAG = "a flag"
+    PLACE = "a place"
+    POSE = "a pose"
+    CHOICE = "a choice"
+    LIST = "a list"
+    MAP = "a map"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class Type:
+    """The type of a value: quantities have a dimension, choices their words, lists and maps the type of an entry."""
+
+    kind: TypeKind
+    dimension: Dimension | None = None
+    choices: tuple[str, ...] = ()
+    of: Type | None = None
+
+    @property
+    def phrase(self) -> str:
+        """Return the type as it stands in a sentence: 'a ratio'."""
+        if self.kind is TypeKind.QUANTITY and self.dimension:
+            return self.dimension.phrase
+        return self.kind.value
+
+    @property
+    def detail(self) -> str:
+        """Return the phrase with what is inside: 'one of red, green', 'a list, each a place'."""
+        if self.choices:
+            return f"one of {', '.join(self.choices)}"
+        return f"{self.phrase}, each {self.of.detail}" if self.of and self.of != UNKNOWN else self.phrase
+
+    @property
+    def measure(self) -> Dimension | None:
+        """Return the dimension of what can be computed with; a count is a number."""
+        return NUMBER if self.kind is TypeKind.COUNT else self.dimension
+
+    @property
+    def entry(self) -> Type:
+        """Return the type of an entry of a list or a map."""
+        return self.of or UNKNOWN
+
+
+COUNT = Type(TypeKind.COUNT)
+TEXT = Type(TypeKind.TEXT)
+FLAG = Type(TypeKind.FLAG)
+PLACE = Type(TypeKind.PLACE)
+POSE = Type(TypeKind.POSE)
+UNKNOWN = Type(TypeKind.UNKNOWN)
+
+
+def quantity_of(dimension: Dimension) -> Type:
+    """Return the type of quantities of a dimension."""
+    return Type(TypeKind.QUANTITY, dimension)
+
+
+def choice_of(*choices: str) -> Type:
+    """Return the type of one of these words."""
+    return Type(TypeKind.CHOICE, choices=choices)
+
+
+def list_of(entry: Type) -> Type:
+    """Return the type of lists of `entry`."""
+    return Type(TypeKind.LIST, of=entry)
+
+
+def map_of(entry: Type) -> Type:
+    """Return the type of maps from names to `entry`."""
+    return Type(TypeKind.MAP, of=entry)
+
+
+TYPES: Mapping[str, Type] = MappingProxyType(
+    {
+        **{name: quantity_of(dimension) for name, dimension in DIMENSIONS.items()},
+        "count": COUNT,
+        "text": TEXT,
+        "flag": FLAG,
+        "place": PLACE,
+        "pose": POSE,
+        "list": list_of(UNKNOWN),
+        "map": map_of(UNKNOWN),
+    }
+)
+"""The types that a manifest names by one word; a `choice` needs its choices: `choice_of`."""
+
+# A text becomes a place where one is expected, and a place a pose.
+_STANDS_FOR = {
+    (TypeKind.TEXT, TypeKind.PLACE),
+    (TypeKind.TEXT, TypeKind.POSE),
+    (TypeKind.PLACE, TypeKind.POSE),
+    (TypeKind.CHOICE, TypeKind.TEXT),
+}
+_EQUAL_ACROSS = {frozenset({TypeKind.TEXT, TypeKind.PLACE}), frozenset({TypeKind.TEXT, TypeKind.CHOICE})}
+
+
+def accepts(expected: Type, given: Type) -> bool:
+    """Tell whether a value of the type `given` may stand where `expected` is."""
+    if UNKNOWN in (expected, given):
+        return True
+    if expected.dimension:
+        return given.measure is not None and expected.dimension.is_comparable(given.measure)
+    if expected.kind is not given.kind:
+        return (given.kind, expected.kind) in _STANDS_FOR
+    if expected.kind is TypeKind.CHOICE:
+        return set(given.choices) <= set(expected.choices)
+    return accepts(expected.entry, given.entry)
+
+
+def are_comparable(one: Type, other: Type) -> bool:
+    """Tell whether it makes sense to ask if values of the two types are equal; poses never are, to the last digit."""
+    if UNKNOWN in (one, other):
+        return True
+    if one.measure and other.measure:
+        return one.measure.is_comparable(other.measure)
+    if one.kind is other.kind:
+        return one.kind is not TypeKind.POSE
+    return frozenset({one.kind, other.kind}) in _EQUAL_ACROSS

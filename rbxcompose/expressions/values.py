@@ -1,0 +1,103 @@
+"""What an evaluation meets: values, the scope that knows them, and the errors that it may end in."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Final, Protocol, TypeAlias, runtime_checkable
+
+LONGEST_TEXT = 4096  # characters
+MOST_ITEMS = 1000  # of a list or a map
+
+Value: TypeAlias = object
+"""A number in SI (float), bool, str, list, dict with text keys, or something opaque such as a place or a pose."""
+
+
+class NotArrived(Enum):
+    """The type of `NOT_ARRIVED`."""
+
+    NOT_ARRIVED = "not arrived"
+
+
+NOT_ARRIVED: Final = NotArrived.NOT_ARRIVED
+"""Stands for a value of which no message has come yet."""
+
+
+@runtime_checkable
+class Located(Protocol):
+    """Something that is somewhere."""
+
+    @property
+    def x(self) -> float:
+        """Return x in `map` [m]."""
+        ...
+
+    @property
+    def y(self) -> float:
+        """Return y in `map` [m]."""
+        ...
+
+
+@runtime_checkable
+class Place(Located, Protocol):
+    """A pose with a name."""
+
+    @property
+    def name(self) -> str:
+        """Return the name that missions use."""
+        ...
+
+    @property
+    def heading(self) -> float:
+        """Return the heading in `map` [rad]."""
+        ...
+
+
+class Scope(Protocol):
+    """What is known while the robot runs."""
+
+    def variable(self, name: str) -> Value | NotArrived:
+        """Return the value of `$name`; raise KeyError if there is no such name."""
+        ...
+
+    def word(self, name: str) -> Value:
+        """Return what a bare word names: a place, else (a choice, a result) its own text; KeyError if nothing."""
+        ...
+
+    def age(self, name: str) -> float | NotArrived:
+        """Return the time since the last message of `$name` [s]; raise KeyError if there is no such name."""
+        ...
+
+    def is_new(self, name: str) -> bool:
+        """Tell whether a message of `$name` came since this node started; KeyError if there is no such name."""
+        ...
+
+
+class EvaluationError(Exception):
+    """Raised when an expression has no value; `start` and `end` are offsets in its text."""
+
+    def __init__(self, message: str, start: int, end: int) -> None:
+        super().__init__(message)
+        self.message = message
+        self.start = start
+        self.end = end
+
+
+class NotArrivedError(Exception):
+    """Raised when a value is needed of which no message has come yet."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"'${name}' has not arrived yet")
+        self.name = name
+
+
+def is_number(value: Value) -> bool:
+    """Tell whether a value is a number; a flag is none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def is_same(one: Value, other: Value) -> bool:
+    """Tell whether two values are equal; a text equals the place of that name, a flag equals no number."""
+    if isinstance(one, str) != isinstance(other, str):
+        text, thing = (one, other) if isinstance(one, str) else (other, one)
+        return isinstance(thing, Place) and thing.name == text
+    return isinstance(one, bool) == isinstance(other, bool) and one == other

@@ -1,0 +1,31 @@
+"""Foreign text made fit for a terminal or a log line: nothing in it can move the cursor, hide or reorder text."""
+
+from __future__ import annotations
+
+import re
+
+FORBIDDEN = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufeff\ufffe\uffff]"
+)
+"""Characters that no manifest may hold: control characters but tab and newline, bidi controls, non-characters."""
+
+_INVISIBLE = re.compile(r"[\t\n]|" + FORBIDDEN.pattern)
+_SHORT = {"\t": "\\t", "\n": "\\n", "\r": "\\r"}
+
+
+def code_point(character: str) -> str:
+    """Return the name of a character as `U+001B`."""
+    return f"U+{ord(character):04X}"
+
+
+def _visible(match: re.Match[str]) -> str:
+    character = match.group()
+    if character in _SHORT:
+        return _SHORT[character]
+    return f"\\x{ord(character):02x}" if ord(character) < 0x100 else f"\\u{ord(character):04x}"
+
+
+def plain(text: str, limit: int = 200) -> str:
+    """Return `text` on one line with what is invisible spelt out, cut after `limit` characters with a count."""
+    shown = _INVISIBLE.sub(_visible, text[:limit])
+    return f"{shown}... ({len(text) - limit:,} more characters)" if len(text) > limit else shown

@@ -1,0 +1,311 @@
+"""Quantities: numbers with units, read from text and written for people. Inside, everything is SI.
+
+Exceptions to SI, by convention: ratios run from 0 to 1, temperatures are in degC, data in B, bit rates in bit/s.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from rbxcompose.findings import suggest
+
+MOST = 1e15  # magnitudes from here on are refused: they are slips, and whole floats end soon after
+LONGEST_NUMBER = 40  # characters of a number's text
+NUMBER_TEXT = r"(?:[0-9]+(?:\.[0-9]+)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+
+# The units that dimensions are made of. An angle is one of them, so that rad/s is no Hz and Nm no J; so is the bit,
+# because B/s and bit/s differ by a factor that must not get lost.
+BASES = ("m", "s", "rad", "kg", "A", "degC", "B", "bit")
+
+
+class UnitError(ValueError):
+    """Raised when a text or a number is not the quantity that it should be.
+
+    `message` says what is wrong, `detail` what stands there instead, `help` what to do; the last two may be empty.
+    """
+
+    def __init__(self, message: str, *, detail: str = "", help: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.detail = detail
+        self.help = help
+
+
+@dataclass(frozen=True, slots=True)
+class Dimension:
+    """What a quantity measures: a name, and the exponents over `BASES`.
+
+    `ratio`, `number` and `quotient` (what a division of equal dimensions gives) have no exponents but differ by name:
+    a ratio is not compared with a bare number, a quotient is compared with either.
+    """
+
+    name: str
+    exponents: tuple[int, ...]
+
+    @property
+    def phrase(self) -> str:
+        """Return the name as it stands in a sentence: 'an angular speed'."""
+        if self != QUOTIENT and self.name not in DIMENSIONS:
+            return f"a quantity in {self.name}"
+        if self is DATA:
+            return "an amount of data"
+        return f"{'an' if self.name[0] in 'aeiou' else 'a'} {self.name.replace('_', ' ')}"
+
+    def is_comparable(self, other: Dimension) -> bool:
+        """Tell whether values of the two may be compared or added."""
+        return self.exponents == other.exponents and {self, other} != {RATIO, NUMBER}
+
+    def __mul__(self, other: Dimension) -> Dimension:
+        if not any(self.exponents) and not any(other.exponents):
+            return next(pure for pure in (RATIO, QUOTIENT, NUMBER) if pure in (self, other))
+        return _measured(tuple(a + b for a, b in zip(self.exponents, other.exponents, strict=True)))
+
+    def __truediv__(self, other: Dimension) -> Dimension:
+        if self == RATIO and other in (NUMBER, QUOTIENT):
+            return RATIO
+        return _measured(tuple(a - b for a, b in zip(self.exponents, other.exponents, strict=True)))
+
+
+def _dimension(name: str, **exponents: int) -> Dimension:
+    return Dimension(name, tuple(exponents.get(base, 0) for base in BASES))
+
+
+LENGTH = _dimension("length", m=1)
+TIME = _dimension("time", s=1)
+SPEED = _dimension("speed", m=1, s=-1)
+ACCELERATION = _dimension("acceleration", m=1, s=-2)
+ANGLE = _dimension("angle", rad=1)
+ANGULAR_SPEED = _dimension("angular_speed", rad=1, s=-1)
+ANGULAR_ACCELERATION = _dimension("angular_acceleration", rad=1, s=-2)
+FREQUENCY = _dimension("frequency", s=-1)
+RATIO = _dimension("ratio")
+MASS = _dimension("mass", kg=1)
+FORCE = _dimension("force", kg=1, m=1, s=-2)
+TORQUE = _dimension("torque", kg=1, m=2, s=-2, rad=-1)
+VOLTAGE = _dimension("voltage", kg=1, m=2, s=-3, A=-1)
+CURRENT = _dimension("current", A=1)
+POWER = _dimension("power", kg=1, m=2, s=-3)
+ENERGY = _dimension("energy", kg=1, m=2, s=-2)
+CHARGE = _dimension("charge", A=1, s=1)
+TEMPERATURE = _dimension("temperature", degC=1)
+VOLUME = _dimension("volume", m=3)
+DATA = _dimension("data", B=1)
+BIT_RATE = _dimension("bit_rate", bit=1, s=-1)
+NUMBER = _dimension("number")
+QUOTIENT = _dimension("quotient")
+
+
+# Each dimension with an example and its units; a value in SI is `value * times / per`. Two factors, because 35 / 100
+# is exact and 35 * 0.01 is not.
+_TABLE: Mapping[Dimension, tuple[str, Mapping[str, tuple[float, float]]]] = {
+    LENGTH: ("0.5 m", {"m": (1, 1), "cm": (1, 100), "mm": (1, 1000), "km": (1000, 1), "in": (254, 10_000)}),
+    TIME: ("5 s", {"s": (1, 1), "ms": (1, 1000), "us": (1, 1_000_000), "min": (60, 1), "h": (3600, 1)}),
+    SPEED: ("0.3 m/s", {"m/s": (1, 1), "cm/s": (1, 100), "km/h": (1000, 3600)}),
+    ACCELERATION: ("0.5 m/s^2", {"m/s^2": (1, 1)}),
+    ANGLE: ("90 deg", {"rad": (1, 1), "deg": (math.pi, 180)}),
+    ANGULAR_SPEED: ("90 deg/s", {"rad/s": (1, 1), "deg/s": (math.pi, 180), "rpm": (math.pi, 30)}),
+    ANGULAR_ACCELERATION: ("180 deg/s^2", {"rad/s^2": (1, 1), "deg/s^2": (math.pi, 180)}),
+    FREQUENCY: ("20 Hz", {"Hz": (1, 1), "kHz": (1000, 1)}),
+    RATIO: ("50 %", {"%": (1, 100)}),
+    MASS: ("2 kg", {"kg": (1, 1), "g": (1, 1000)}),
+    FORCE: ("10 N", {"N": (1, 1)}),
+    TORQUE: ("1.5 Nm", {"Nm": (1, 1)}),
+    VOLTAGE: ("12 V", {"V": (1, 1), "mV": (1, 1000)}),
+    CURRENT: ("2 A", {"A": (1, 1), "mA": (1, 1000)}),
+    POWER: ("20 W", {"W": (1, 1)}),
+    ENERGY: ("50 Wh", {"Wh": (3600, 1)}),
+    CHARGE: ("2.2 Ah", {"Ah": (3600, 1)}),
+    TEMPERATURE: ("50 degC", {"degC": (1, 1)}),
+    VOLUME: ("0.5 l", {"l": (1, 1000), "ml": (1, 1_000_000)}),
+    DATA: ("64 kB", {"B": (1, 1), "kB": (1000, 1), "MB": (1_000_000, 1)}),
+    BIT_RATE: ("1 Mbit/s", {"bit/s": (1, 1), "kbit/s": (1000, 1), "Mbit/s": (1_000_000, 1)}),
+    NUMBER: ("2", {}),
+}
+DIMENSIONS: Mapping[str, Dimension] = MappingProxyType({dimension.name: dimension for dimension in _TABLE})
+_BY_EXPONENTS = {dimension.exponents: dimension for dimension in (*DIMENSIONS.values(), QUOTIENT)}
+
+# Two conventions exist for these, so that a bare number does not say what is meant.
+_AMBIGUOUS: Mapping[Dimension, str] = {
+    ANGLE: "write '90 deg' or '1.57 rad'",
+    RATIO: "write '50 %'",
+    TEMPERATURE: "write '50 degC'",
+}
+
+
+def _measured(exponents: tuple[int, ...]) -> Dimension:
+    """Return the dimension with these exponents; one without a name of its own is called by its unit: 'm^2/s'."""
+    if known := _BY_EXPONENTS.get(exponents):
+        return known
+    above = [_power(base, size) for base, size in zip(BASES, exponents, strict=True) if size > 0]
+    below = [_power(base, -size) for base, size in zip(BASES, exponents, strict=True) if size < 0]
+    return Dimension("/".join(["*".join(above) or "1", *below]), exponents)
+
+
+def _power(base: str, size: int) -> str:
+    return base if size == 1 else f"{base}^{size}"
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """One unit of the closed list, with its two factors to SI."""
+
+    name: str
+    dimension: Dimension
+    times: float
+    per: float
+
+    def to_si(self, value: float) -> float:
+        """Convert from this unit to SI."""
+        return value * self.times / self.per
+
+    def from_si(self, value: float) -> float:
+        """Convert from SI to this unit."""
+        return value * self.per / self.times
+
+
+UNITS: Mapping[str, Unit] = MappingProxyType(
+    {name: Unit(name, dimension, *scale) for dimension, (_, scales) in _TABLE.items() for name, scale in scales.items()}
+)
+_SHOWN_IN = {dimension: UNITS[text.split()[1]] for dimension, (text, _) in _TABLE.items() if " " in text}
+_SHOWN_IN |= {DATA: UNITS["B"], BIT_RATE: UNITS["bit/s"]}
+
+# What people write for a unit that looks nothing like it.
+_OTHER_NAMES: Mapping[str, str] = {
+    name: unit
+    for unit, names in {
+        "m": "meter meters metre metres",
+        "in": 'inch inches "',
+        "s": "sec secs second seconds",
+        "min": "minute minutes mins",
+        "h": "hour hours hr hrs",
+        "km/h": "kmh kph",
+        "deg": "degree degrees °",
+        "degC": "c °c celsius",
+        "%": "percent pct",
+        "us": "µs μs",
+    }.items()
+    for name in names.split()
+}
+_QUANTITY = re.compile(rf"\s*([+-]?{NUMBER_TEXT})\s*(.*?)\s*", re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A value in SI with what it measures."""
+
+    value: float
+    dimension: Dimension
+
+
+def example(dimension: Dimension) -> str:
+    """Return a sample text of a named dimension: '0.3 m/s'."""
+    return _TABLE[dimension][0]
+
+
+def unit_help(name: str) -> str:
+    """Return what to do about an unknown unit: the one that was probably meant, or the beginning of the list."""
+    folded = name.casefold()
+    meant = _OTHER_NAMES.get(folded) or next((unit for unit in UNITS if unit.casefold() == folded), None)
+    return f"did you mean '{meant}'?" if meant else suggest(name, UNITS, "units")
+
+
+def bare_number_help(dimension: Dimension) -> str:
+    """Return what to write instead of a bare number, or nothing if a bare number is understood as SI."""
+    return _AMBIGUOUS.get(dimension, "")
+
+
+def quantity(number: str, unit: Unit | None) -> Quantity:
+    """Return the quantity that the text of a number and a unit stand for.
+
+    Raises:
+        UnitError: if the number is too long or too large.
+    """
+    if len(number) > LONGEST_NUMBER:
+        raise UnitError(f"a number may have {LONGEST_NUMBER} characters; this one has {len(number)}")
+    written = float(number)
+    value = unit.to_si(written) if unit else written
+    _require_moderate(written)
+    _require_moderate(value)
+    return Quantity(value, unit.dimension if unit else NUMBER)
+
+
+def _require_moderate(value: float) -> None:
+    if not abs(value) < MOST:  # false for NaN, too
+        raise UnitError("a number must be finite and below 1e15")
+
+
+def parse_quantity(text: str) -> Quantity:
+    """Read `0.3 m/s`, `5s`, `-90 deg`, `1e-3 m`, `50 %` or a plain number.
+
+    Raises:
+        UnitError: if the text is not a number with a unit of the list.
+    """
+    match = _QUANTITY.fullmatch(text)
+    if not match:
+        raise UnitError("not a number with a unit, such as '0.3 m/s'")
+    number, unit = match.groups()
+    if unit and unit not in UNITS:
+        raise UnitError(f"unknown unit '{_shortened(unit)}'", help=unit_help(unit))
+    return quantity(number, UNITS.get(unit))
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= 20 else f"{text[:20]}..."
+
+
+def to_si(value: object, dimension: Dimension) -> float:
+    """Return the SI value of a text, a bare number (SI already) or a quantity, which must be of this dimension.
+
+    Raises:
+        UnitError: if it is not; a bare number is no angle, ratio or temperature, for which two conventions exist.
+    """
+    must_be = f"must be {dimension.phrase}, such as '{example(dimension)}'"
+    if isinstance(value, str):
+        try:
+            read = parse_quantity(value)
+        except UnitError as error:
+            raise UnitError(must_be, detail=error.message, help=error.help) from None
+    elif isinstance(value, Quantity):
+        read = value
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        read = _bare(value)
+    else:
+        raise UnitError(must_be)
+    if read.dimension == NUMBER and (fix := bare_number_help(dimension)):
+        raise UnitError(must_be, detail="the unit is missing", help=fix)
+    if read.dimension not in (dimension, NUMBER):
+        raise UnitError(must_be, detail=f"this is {read.dimension.phrase}")
+    _require_moderate(read.value)
+    return read.value
+
+
+def _bare(value: float) -> Quantity:
+    # Compared before it is converted: a whole number may be too large to become a float at all.
+    _require_moderate(value)
+    return Quantity(float(value), NUMBER)
+
+
+def format_number(value: float) -> str:
+    """Write a number for people: six digits or all those before the point, no exponent between 1e-4 and 1e15."""
+    text = f"{value:.6g}"
+    if "e" in text and 1 <= abs(value) < MOST:
+        text = f"{value:.0f}"
+    return "0" if text == "-0" else text
+
+
+def format_quantity(value: float, dimension: Dimension, unit: str | None = None) -> str:
+    """Write an SI value for people in `unit`, else in the dimension's usual one: '90 deg'.
+
+    Raises:
+        UnitError: if the unit is not one of this dimension.
+    """
+    shown = _SHOWN_IN.get(dimension) if unit is None else UNITS.get(unit)
+    if unit is not None and (shown is None or shown.dimension != dimension):
+        raise UnitError(f"'{unit}' is no unit of {dimension.phrase}")
+    if shown is None:
+        return format_number(value)
+    return f"{format_number(shown.from_si(value))} {shown.name}"
