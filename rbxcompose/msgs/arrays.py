@@ -1,0 +1,75 @@
+"""Arrays of numbers in messages: read-only numpy arrays of one dimension.
+
+numpy is imported when the first such array is made, since most messages have none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from rbxcompose.msgs.definitions import OCTETS, PRIMITIVES, FieldType, Shape, attribute, parse_type
+from rbxcompose.msgs.types import Message
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_NO_NUMBERS = ("bool", "string", *OCTETS)
+
+
+@cache
+def zeros(dtype: str, length: int) -> NDArray[Any]:
+    """Return a read-only array of zeros; the same one each time."""
+    import numpy as np
+
+    return _read_only(np.zeros(length), dtype)
+
+
+def holds_numbers(type_: FieldType) -> bool:
+    """Tell whether a field of this type is a numpy array."""
+    return type_.shape is not Shape.SINGLE and type_.base in PRIMITIVES and type_.base not in _NO_NUMBERS
+
+
+class ArrayMessage(Message):
+    """A message with arrays of numbers: it takes any sequence for them and keeps a read-only array.
+
+    Raises:
+        ValueError: if an array does not have the length that its type states.
+    """
+
+    __slots__ = ()
+    ARRAYS: ClassVar[Mapping[str, FieldType]]
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        types = {attribute(name): parse_type(text) for name, text in cls.FIELDS.items()}
+        cls.ARRAYS = {name: type_ for name, type_ in types.items() if holds_numbers(type_)}
+
+    def __post_init__(self) -> None:
+        for name, type_ in self.ARRAYS.items():
+            array = _read_only(getattr(self, name), type_.base)
+            if type_.shape is Shape.ARRAY and array.size != type_.length:
+                raise ValueError(f"{name} of {self.TYPE} has {array.size} values, not {type_.length}")
+            object.__setattr__(self, name, array)
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(self._is_same(other, attribute(name)) for name in self.FIELDS)
+
+    def _is_same(self, other: object, name: str) -> bool:
+        import numpy as np
+
+        mine, theirs = getattr(self, name), getattr(other, name)
+        return bool(np.array_equal(mine, theirs) if name in self.ARRAYS else mine == theirs)
+
+
+def _read_only(values: Any, dtype: str) -> NDArray[Any]:
+    import numpy as np
+
+    if isinstance(values, np.ndarray) and not values.flags.writeable and values.ndim == 1 and values.dtype == dtype:
+        return values  # whoever made it cannot change it either
+    array = np.array(values, dtype).reshape(-1)
+    array.flags.writeable = False
+    return array

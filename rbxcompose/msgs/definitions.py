@@ -1,0 +1,251 @@
+"""Interface definitions: the ROS 2 text of a message, service or action as data, with the parts that ROS derives.
+
+A service is made of two structures and an action of three, separated by `---`. ROS adds to them what goes over the
+wire beside them (the services and the message of an action, the event of a service); `parts` returns all of it.
+"""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+INTERFACES = Path(__file__).with_name("interfaces")  # <package>/<kind>/<Name>.<kind>
+KINDS = ("msg", "srv", "action")
+INTEGERS = ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")
+FLOATS = ("float32", "float64")
+OCTETS = ("uint8", "byte", "char")  # arrays of these are bytes in Python
+PRIMITIVES = ("bool", "byte", "char", *INTEGERS, *FLOATS, "string")
+
+_TYPE = re.compile(r"(?P<base>[A-Za-z][\w/]*)(?:<=(?P<limit>\d+))?(?P<array>\[(?P<most><=)?(?P<length>\d*)\])?")
+_CONSTANT = re.compile(r"(?P<type>\S+)\s+(?P<name>[A-Z][A-Z0-9_]*)\s*=\s*(?P<value>.+)")
+_FIELD = re.compile(r"(?P<type>\S+)\s+(?P<name>[a-z][a-z0-9_]*)(?:\s+(?P<default>\S.*))?")
+_CODE_AND_COMMENT = re.compile(r"""(?P<code>(?:"[^"]*"|'[^']*'|[^#"'])*)(?:#\s?(?P<comment>.*))?""")
+_TRUTH = {"true": True, "1": True, "false": False, "0": False}
+
+Value = bool | int | float | str
+
+
+class DefinitionError(ValueError):
+    """Raised when an interface text is not valid ROS 2."""
+
+
+class Shape(Enum):
+    """How many values a field holds."""
+
+    SINGLE = "one"
+    ARRAY = "exactly `length`"
+    BOUNDED = "at most `length`"
+    UNBOUNDED = "any number"
+
+
+@dataclass(frozen=True, slots=True)
+class FieldType:
+    """The type of a field: `base` is a primitive or the full name of a message."""
+
+    base: str
+    shape: Shape = Shape.SINGLE
+    length: int = 0  # of an array or bounded sequence
+    text_limit: int = 0  # most bytes of a string, 0: any number
+
+    @property
+    def is_message(self) -> bool:
+        """Tell whether the values are messages."""
+        return self.base not in PRIMITIVES
+
+    def __str__(self) -> str:
+        limit = f"<={self.text_limit}" if self.text_limit else ""
+        most = {Shape.ARRAY: f"[{self.length}]", Shape.BOUNDED: f"[<={self.length}]", Shape.UNBOUNDED: "[]"}
+        return f"{self.base}{limit}{most.get(self.shape, '')}"
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A named value of a structure."""
+
+    name: str
+    value: Value
+    comment: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A field of a structure; without a default of its own it starts at zero, empty or false."""
+
+    name: str
+    type: FieldType
+    default: Value | None = None
+    comment: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """What CDR writes at once: a message, or one part of a service or an action."""
+
+    name: str  # such as "geometry_msgs/msg/Twist" or "std_srvs/srv/SetBool_Request"
+    fields: tuple[Field, ...] = ()
+    constants: tuple[Constant, ...] = ()
+    comment: str = ""
+
+
+def attribute(field: str) -> str:
+    """Return the Python name of a field: the same, with an underscore after a keyword."""
+    return f"{field}_" if keyword.iskeyword(field) else field
+
+
+def parse_type(text: str, package: str = "") -> FieldType:
+    """Read a type such as `float64[36]`, `string<=8[]` or `Point`; a bare message name belongs to `package`.
+
+    Raises:
+        DefinitionError: if there is no such type.
+    """
+    found = _TYPE.fullmatch(text)
+    base = found["base"] if found else ""
+    if not found or base in ("wstring", "wchar") or (found["limit"] and base != "string"):
+        raise DefinitionError(f"no such type: {text!r}")
+    if found["most"] and not found["length"]:
+        raise DefinitionError(f"a bound without a number: {text!r}")
+    shape = Shape.SINGLE
+    if found["array"]:
+        shape = Shape.BOUNDED if found["most"] else Shape.ARRAY if found["length"] else Shape.UNBOUNDED
+    full = base if base in PRIMITIVES else _full_name(base, package)
+    return FieldType(full, shape, int(found["length"] or 0), int(found["limit"] or 0))
+
+
+def _full_name(name: str, package: str) -> str:
+    match name.split("/"):
+        case [bare] if package and bare[0].isupper():
+            return f"{package}/msg/{bare}"
+        case [owner, bare]:
+            return f"{owner}/msg/{bare}"
+        case [_, _, _]:
+            return name
+    raise DefinitionError(f"no such type: {name!r}")
+
+
+def parse(name: str, text: str) -> tuple[Structure, ...]:
+    """Read an interface text: one structure for a message, two for a service, three for an action.
+
+    Raises:
+        DefinitionError: names the interface and the line.
+    """
+    kind = name.split("/")[1]
+    endings = {"msg": ("",), "srv": ("_Request", "_Response"), "action": ("_Goal", "_Result", "_Feedback")}[kind]
+    sections: list[list[tuple[int, str]]] = [[]]
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.rstrip() == "---":
+            sections.append([])
+        else:
+            sections[-1].append((number, line))
+    if len(sections) != len(endings):
+        raise DefinitionError(f"{name}: {len(sections)} sections, not {len(endings)}")
+    return tuple(_structure(name + ending, lines) for ending, lines in zip(endings, sections, strict=True))
+
+
+def _structure(name: str, lines: list[tuple[int, str]]) -> Structure:
+    heading: list[str] = []
+    members: list[Constant | Field] = []
+    for number, line in lines:
+        try:
+            code, comment = _split(line)
+            if code:
+                members.append(_member(code, comment, package=name.split("/")[0]))
+            elif comment and not members:
+                heading.append(comment)
+        except ValueError as error:
+            raise DefinitionError(f"{name}, line {number}: {error}") from error
+    fields = tuple(member for member in members if isinstance(member, Field))
+    constants = tuple(member for member in members if isinstance(member, Constant))
+    return Structure(name, fields, constants, " ".join(heading))
+
+
+def _split(line: str) -> tuple[str, str]:
+    found = _CODE_AND_COMMENT.fullmatch(line)
+    if not found:
+        raise DefinitionError("a quote is not closed")
+    return found["code"].strip(), (found["comment"] or "").strip()
+
+
+def _member(code: str, comment: str, package: str) -> Constant | Field:
+    if constant := _CONSTANT.fullmatch(code):
+        return Constant(constant["name"], _value(parse_type(constant["type"]), constant["value"]), comment)
+    if field := _FIELD.fullmatch(code):
+        type_ = parse_type(field["type"], package)
+        default = _value(type_, field["default"]) if field["default"] else None
+        return Field(field["name"], type_, default, comment)
+    raise DefinitionError(f"neither a field nor a constant: {code!r}")
+
+
+def _value(type_: FieldType, text: str) -> Value:
+    if type_.shape is not Shape.SINGLE or type_.is_message:
+        raise DefinitionError(f"{type_} cannot have a value here")
+    if type_.base == "string":
+        return text[1:-1] if text[0] == text[-1] and text[0] in "\"'" and len(text) > 1 else text
+    if type_.base == "bool":
+        if text.lower() not in _TRUTH:
+            raise DefinitionError(f"not a truth value: {text!r}")
+        return _TRUTH[text.lower()]
+    return float(text) if type_.base in FLOATS else int(text, 0)
+
+
+def parts(name: str, written: tuple[Structure, ...]) -> dict[str, Structure]:
+    """Return by name all structures of an interface: those that were `written`, and those that ROS derives."""
+    kind = name.split("/")[1]
+    derived = {"msg": _no_more, "srv": _service, "action": _action}[kind](name)
+    return {structure.name: structure for structure in (*written, *derived)}
+
+
+def _no_more(_name: str) -> Iterator[Structure]:
+    return iter(())
+
+
+def _service(name: str) -> Iterator[Structure]:
+    request, response = f"{name}_Request", f"{name}_Response"
+    yield _of(
+        f"{name}_Event", info="service_msgs/ServiceEventInfo", request=f"{request}[<=1]", response=f"{response}[<=1]"
+    )
+    yield _of(name, request_message=request, response_message=response, event_message=f"{name}_Event")
+
+
+def _action(name: str) -> Iterator[Structure]:
+    goal, result, feedback, identity = (
+        f"{name}_Goal",
+        f"{name}_Result",
+        f"{name}_Feedback",
+        "unique_identifier_msgs/UUID",
+    )
+    send_goal, get_result, message = f"{name}_SendGoal", f"{name}_GetResult", f"{name}_FeedbackMessage"
+    yield _of(f"{send_goal}_Request", goal_id=identity, goal=goal)
+    yield _of(f"{send_goal}_Response", accepted="bool", stamp="builtin_interfaces/Time")
+    yield from _service(send_goal)
+    yield _of(f"{get_result}_Request", goal_id=identity)
+    yield _of(f"{get_result}_Response", status="int8", result=result)
+    yield from _service(get_result)
+    yield _of(message, goal_id=identity, feedback=feedback)
+    yield _of(
+        name,
+        goal=goal,
+        result=result,
+        feedback=feedback,
+        send_goal_service=send_goal,
+        get_result_service=get_result,
+        feedback_message=message,
+    )
+
+
+def _of(structure: str, **types: str) -> Structure:
+    return Structure(structure, tuple(Field(name, parse_type(text)) for name, text in types.items()))
+
+
+def interface_names(kind: str, root: Path = INTERFACES) -> list[str]:
+    """Return the sorted names of all interfaces of a kind that have a text below `root`."""
+    return sorted(f"{path.parts[-3]}/{kind}/{path.stem}" for path in root.glob(f"*/{kind}/*.{kind}"))
+
+
+def read(name: str, root: Path = INTERFACES) -> tuple[Structure, ...]:
+    """Read the structures that are written in the text of an interface."""
+    package, kind, bare = name.split("/")
+    return parse(name, (root / package / kind / f"{bare}.{kind}").read_text(encoding="utf-8"))

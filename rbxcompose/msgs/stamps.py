@@ -1,0 +1,19 @@
+"""Times in messages: `builtin_interfaces` from and to nanoseconds and seconds."""
+
+from __future__ import annotations
+
+from rbxcompose.msgs.builtin_interfaces import Duration, Time
+
+NANOSECONDS = 1_000_000_000
+
+
+def to_time(nanoseconds: int) -> Time:
+    """Return a stamp [ns] as a message."""
+    sec, nanosec = divmod(nanoseconds, NANOSECONDS)
+    return Time(sec=sec, nanosec=nanosec)
+
+
+def to_duration(seconds: float) -> Duration:
+    """Return a length of time [s] as a message."""
+    sec, nanosec = divmod(round(seconds * NANOSECONDS), NANOSECONDS)
+    return Duration(sec=sec, nanosec=nanosec)
