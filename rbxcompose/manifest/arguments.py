@@ -1,0 +1,163 @@
+"""Declared arguments and inputs: their types, limits and choices, and reading a value of one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rbxcompose.config import Config
+from rbxcompose.expressions.types import TYPES, Type, TypeKind, choice_of
+from rbxcompose.findings import Report, suggest
+from rbxcompose.manifest.scalars import describe
+from rbxcompose.manifest.tree import Mapping, Node, Path, Scalar, Sequence, key_span
+from rbxcompose.manifest.validate import (
+    BROKEN,
+    MISSING_KEY,
+    NOT_A_CHOICE,
+    OUT_OF_RANGE,
+    WRONG_TYPE,
+    not_a_choice,
+    to_plain,
+    unit_finding,
+    validate,
+    where,
+)
+from rbxcompose.units import NUMBER, Dimension, Quantity, UnitError, format_number, format_quantity, to_si
+
+CHOICE = "choice"
+
+
+class ArgumentModel(Config):
+    """One entry of `args:` or `inputs:`; the values are read by its type."""
+
+    type: str
+    """What it is: a dimension, `count`, `number`, `text`, `flag`, `place`, `pose`, `choice`, `list` or `map`."""
+    default: Any = None
+    """Its value if nobody gives one."""
+    min: Any = None
+    """Smallest value."""
+    max: Any = None
+    """Largest value."""
+    choices: list[str] = []
+    """The words that a `choice` takes."""
+    about: str = ""
+    """What it is for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """A declared argument: what a value of it must be."""
+
+    name: str
+    type: Type
+    default: Node | None
+    least: object = None
+    most: object = None
+
+    def read(self, node: Node, report: Report) -> object:
+        """Return the typed value of a node, `BROKEN` after a finding: see `read_value`."""
+        value = read_value(node, self.type, self.name, report)
+        for words, bound, sign in (("at least", self.least, 1), ("at most", self.most, -1)):
+            if BROKEN not in (value, bound) and bound is not None and (_size(value) - _size(bound)) * sign < 0:
+                message = f"'{self.name}' must be {words} {show(bound)}"
+                report.add(OUT_OF_RANGE.at(node.span, message, label=f"this is {show(value)}"))
+                return BROKEN
+        return value
+
+
+def read_argument(name: str, node: Node, path: Path, report: Report) -> Argument | None:
+    """Return the declaration of an argument that stands at `path`, or None after its findings."""
+    model = validate(ArgumentModel, node, path, report)
+    if model is None or not isinstance(node, Mapping):
+        return None
+    declared = _type(model, node, path, report)
+    if declared is None:
+        return None
+    bounds: dict[str, object] = {}
+    for key in ("min", "max"):
+        if (bound := node.get(key)) is not None:
+            if declared.measure is None:
+                report.add(WRONG_TYPE.at(key_span(node, (key,)), f"'{key}' has no meaning for {declared.phrase}"))
+                continue
+            bounds[key] = read_value(bound, declared, key, report)
+    return Argument(name, declared, node.get("default"), bounds.get("min"), bounds.get("max"))
+
+
+def _type(model: ArgumentModel, node: Mapping, path: Path, report: Report) -> Type | None:
+    written = node.get("type")
+    if model.type == CHOICE:
+        if model.choices:
+            return choice_of(*model.choices)
+        report.add(MISSING_KEY.at(key_span(node, ("type",)), f"{where(path)} is a choice and needs 'choices'"))
+    elif found := TYPES.get(model.type):
+        return found
+    elif written:
+        fix = suggest(model.type, [*TYPES, CHOICE], "types")
+        report.add(NOT_A_CHOICE.at(written.span, f"there is no type '{model.type}'", help=fix))
+    return None
+
+
+def read_value(node: Node, expected: Type, name: str, report: Report) -> object:
+    """Return a node as a value of the type `expected`, `BROKEN` after a finding.
+
+    Quantities for dimensions, float for `number`, int for `count`, text for words, names and places, bool for flags,
+    the node itself for lists, maps and poses that are written out.
+    """
+    if isinstance(node, Scalar) and node.filled is BROKEN:
+        return BROKEN
+    if expected.dimension and expected.dimension != NUMBER:
+        return _quantity(node, expected.dimension, name, report)
+    value = to_plain(node)
+    read: object = None
+    match expected.kind:
+        case TypeKind.QUANTITY if isinstance(value, int | float) and not isinstance(value, bool):
+            read = float(value)
+        case TypeKind.COUNT if isinstance(value, int) and not isinstance(value, bool) and value >= 0:
+            read = value
+        case TypeKind.FLAG if isinstance(value, bool):
+            read = value
+        case TypeKind.TEXT if isinstance(node, Scalar) and value is not None:
+            read = node.text if node.filled is None else show(value)
+        case TypeKind.CHOICE if isinstance(node, Scalar):
+            if node.text not in expected.choices:
+                report.add(not_a_choice(node.span, name, node, list(expected.choices)))
+                return BROKEN
+            read = node.text
+        case TypeKind.PLACE | TypeKind.POSE if isinstance(value, str):
+            read = value
+        case TypeKind.POSE | TypeKind.MAP if isinstance(node, Mapping):
+            read = node
+        case TypeKind.LIST if isinstance(node, Sequence):
+            read = node
+    if read is None:
+        must_be = {TypeKind.COUNT: "a whole number, not below 0", TypeKind.FLAG: "true or false"}
+        message = f"'{name}' must be {must_be.get(expected.kind, expected.phrase)}"
+        report.add(WRONG_TYPE.at(node.span, message, label=describe(value)))
+        return BROKEN
+    return read
+
+
+def _quantity(node: Node, dimension: Dimension, name: str, report: Report) -> object:
+    try:
+        return Quantity(to_si(to_plain(node), dimension), dimension)
+    except UnitError as error:
+        report.add(unit_finding(error, node, name))
+        return BROKEN
+
+
+def _size(value: object) -> float:
+    if isinstance(value, Quantity):
+        return value.value
+    return float(value) if isinstance(value, int | float) else 0.0
+
+
+def show(value: object) -> str:
+    """Return a typed value as it stands inside a text: `0.3 m/s`, `2`, `true`."""
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case Quantity(value=number, dimension=dimension):
+            return format_quantity(number, dimension)
+        case int() | float():
+            return format_number(value)
+    return str(value)

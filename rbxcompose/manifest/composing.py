@@ -1,0 +1,78 @@
+"""YAML text -> PyYAML's node tree, by its C parser, with limits that hold while the tree is being made."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import yaml
+
+from rbxcompose.findings import Finding, Span, kind
+from rbxcompose.manifest.limits import DEPTH, NODES
+from rbxcompose.manifest.yaml_errors import explain
+
+TOO_LARGE = kind(
+    "RBX1103",
+    """Larger than a manifest may be
+
+A manifest has limits, so that no file can use up time or memory: 2 MB, 200,000 values, 64 levels, 64 kB for one text,
+200 characters for a key, 40 for a number, 10,000 values reached through aliases. Split a large robot into several
+files.
+
+Bad:
+```yaml
+serial: 10000000000000000000000000000000000000000000
+```
+Good:
+```yaml
+serial: "10000000000000000000000000000000000000000000"
+```
+""",
+)
+
+
+class _LimitError(Exception):
+    """Raised inside the parser to end it; carries the place and the words."""
+
+    def __init__(self, mark: Any, message: str) -> None:
+        super().__init__(message)
+        self.mark = mark
+
+
+class _LimitedLoader(yaml.CSafeLoader):
+    """Composes without resolving tags, and counts nodes and depth where the C code calls back for each node."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.nodes = 0
+        self.depth = 0
+
+    def descend_resolver(self, current_node: Any, current_index: Any) -> None:
+        self.nodes += 1
+        self.depth += 1
+        if self.depth > DEPTH:
+            raise _LimitError(current_node.start_mark, f"more than {DEPTH} levels lie inside each other")
+        if self.nodes > NODES:
+            siblings = current_node.value
+            last = siblings[-1] if siblings else current_node
+            last = last[1] if isinstance(last, tuple) else last
+            raise _LimitError(last.start_mark, f"more than {NODES:,} values in one file")
+
+    def ascend_resolver(self) -> None:
+        self.depth -= 1
+
+    def resolve(self, kind: Any, value: Any, implicit: Any) -> str:
+        return ""  # a tag that is written does not come through here
+
+
+def compose(text: str, file: str) -> tuple[yaml.Node | None, Finding | None]:
+    """Return the node tree of one document, or the finding that says why there is none; both None if it is empty."""
+    loader = _LimitedLoader(text)
+    try:
+        return loader.get_single_node(), None
+    except _LimitError as error:
+        line, column = error.mark.line + 1, error.mark.column + 1
+        return None, TOO_LARGE.at(Span(file, line, column, line, column + 1), str(error))
+    except yaml.YAMLError as error:
+        return None, explain(error, text, file)
+    finally:
+        loader.dispose()

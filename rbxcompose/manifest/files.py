@@ -1,0 +1,91 @@
+"""Paths that manifests write: relative to their file, inside the project or the shipped library."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from rbxcompose.findings import Finding, Span, kind, suggest
+from rbxcompose.manifest.library import PREFIX, library_root
+from rbxcompose.manifest.reader import UNREADABLE
+from rbxcompose.plain import plain
+
+OUTSIDE = kind(
+    "RBX1306",
+    """A path that leads out of the project
+
+A robot's files lie together: below the nearest folder that holds `robots/` or `missions/`, or in the shipped library
+(`rbx:...`). A path may not leave it, not by `..`, and not by a link.
+
+Bad:
+```yaml
+missions:
+  patrol: /home/someone/patrol.yaml
+```
+Good:
+```yaml
+missions:
+  patrol: ../../missions/patrol.yaml
+```
+""",
+)
+ROBOT_FILE = "robot.yaml"  # what a folder stands for
+_MOST_NEIGHBOURS = 1000
+
+
+def shown_name(path: Path) -> str:
+    """Return how findings call a file: relative to the current folder where it lies below it."""
+    relative = os.path.relpath(path)
+    return str(path) if relative.startswith("..") else relative
+
+
+def project_of(path: Path) -> Path:
+    """Return the nearest folder above a file that holds `robots/` or `missions/`, else the file's own."""
+    folders = path.resolve().parents
+    return next(
+        (folder for folder in folders if any((folder / n).is_dir() for n in ("robots", "missions"))), folders[0]
+    )
+
+
+def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
+    """Return the file that a manifest names, or the finding that says why it may not or cannot."""
+    path = _absolute(written, writer.resolve().parent)
+    if path is None or not any(path.is_relative_to(root) for root in (project_of(writer), library_root())):
+        message = f"'{plain(written)}' leads out of the project '{plain(shown_name(project_of(writer)))}'"
+        return OUTSIDE.at(span, message, help="move the file into the project, or use what 'rbx:' has")
+    return path if path.is_file() else _missing(written, path, span)
+
+
+def find(written: str) -> Path | Finding:
+    """Return the file that a command names: a manifest, a robot's folder, or `rbx:...`."""
+    path = _absolute(written, Path.cwd())
+    if path is None:
+        return OUTSIDE.at(None, f"'{plain(written)}' leads out of the library")
+    return path if path.is_file() else _missing(written, path, None)
+
+
+def _absolute(written: str, folder: Path) -> Path | None:
+    """Return the real path, that of its robot if it is a folder; None if it cannot be one or leaves the library."""
+    is_library = written.startswith(PREFIX)
+    base = library_root() if is_library else folder
+    try:
+        path = (base / written.removeprefix(PREFIX)).resolve()
+        if path.is_dir():
+            path = (path / ROBOT_FILE).resolve()
+    except (OSError, ValueError, RuntimeError):  # a name too long for the system, a zero byte, links in a circle
+        return None
+    return None if is_library and not path.is_relative_to(base) else path
+
+
+def _missing(written: str, path: Path, span: Span | None) -> Finding:
+    try:
+        neighbours = [entry.name for entry in list(path.parent.iterdir())[:_MOST_NEIGHBOURS]]
+    except OSError:
+        return UNREADABLE.at(span, f"'{plain(written)}' does not exist", help=_nearest_folder(path))
+    fix = suggest(path.name, neighbours, f"in '{plain(shown_name(path.parent))}'")
+    return UNREADABLE.at(span, f"'{plain(written)}' does not exist", help=fix)
+
+
+def _nearest_folder(path: Path) -> str:
+    there = next((folder for folder in path.parents if folder.is_dir()), path.parent)
+    return f"the path ends at the folder '{plain(shown_name(there))}'"

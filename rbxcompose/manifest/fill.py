@@ -1,0 +1,322 @@
+"""Filling in `${...}` after composition: arguments, the robot's name, the environment, expressions over them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from rbxcompose.expressions import types
+from rbxcompose.expressions.check import check
+from rbxcompose.expressions.evaluate import evaluate
+from rbxcompose.expressions.parser import parse_fill
+from rbxcompose.expressions.tree import Expression, ExpressionError
+from rbxcompose.expressions.types import Type, TypeKind
+from rbxcompose.expressions.values import EvaluationError
+from rbxcompose.findings import Report, kind, suggest
+from rbxcompose.manifest import tree
+from rbxcompose.manifest.arguments import show
+from rbxcompose.manifest.parts import part_span
+from rbxcompose.manifest.scalars import describe
+from rbxcompose.manifest.tree import Entry, Node, Scalar, Sequence
+from rbxcompose.manifest.validate import BROKEN, to_plain
+from rbxcompose.plain import plain
+from rbxcompose.units import NUMBER, QUOTIENT, Quantity
+
+SYNTAX = kind(
+    "RBX1201",
+    """`${...}` that cannot be read
+
+Between `${` and `}` stands a name or an expression.
+
+Bad:
+```yaml
+speed: ${args.speed * }
+```
+Good:
+```yaml
+speed: ${args.speed * 2}
+```
+""",
+)
+UNKNOWN_NAME = kind(
+    "RBX1202",
+    """Unknown name in `${...}`
+
+What can be filled in: `args.NAME`, `robot.name`, `sim`, `env.NAME`. What is known only while the robot runs, such as
+`$battery`, has no braces and belongs in missions.
+
+Bad:
+```yaml
+speed: ${args.sped}
+```
+Good:
+```yaml
+speed: ${args.speed}
+```
+""",
+)
+WRONG_OPERATION = kind(
+    "RBX1203",
+    """`${...}` that has no value
+
+The expression can be read but not computed: it adds a length to a time, or divides by zero.
+
+Bad:
+```yaml
+speed: ${args.speed + 1 s}
+```
+Good:
+```yaml
+speed: ${args.speed + 0.1 m/s}
+```
+""",
+)
+ENVIRONMENT = kind(
+    "RBX1204",
+    """A variable of the environment is not set
+
+`${env.NAME}` needs the variable; `${env.NAME:-default}` does without; `${env.NAME:?why}` says why it is needed.
+
+Bad:
+```yaml
+port: ${env.SERVO_PORT}
+```
+Good:
+```yaml
+port: ${env.SERVO_PORT:-/dev/ttyUSB0}
+```
+""",
+)
+NOT_RUNNING = kind(
+    "RBX1205",
+    """`$name` where `${...}` belongs
+
+A robot's file is put together before the robot runs: what is to be filled in has braces. `$name` is looked up while
+the robot runs and belongs in missions. A dollar is written `$$`.
+
+Bad:
+```yaml
+speed: $speed
+```
+Good:
+```yaml
+speed: ${args.speed}
+```
+""",
+)
+
+_PIECE = re.compile(r"\$\$|\$\{(?P<body>[^}]*)(?P<end>\}?)|\$(?P<name>[A-Za-z][A-Za-z0-9_.]*)")
+_ENVIRONMENT = re.compile(r"\s*env\.(?P<name>[A-Za-z_][A-Za-z0-9_]*)(:(?P<mode>[-?])(?P<rest>.*))?\s*", re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """What `${...}` may name: a type and a typed value by dotted name, and the variables of the environment."""
+
+    values: Mapping[str, tuple[Type, object]] = field(default_factory=dict)
+    environment: Mapping[str, str] = field(default_factory=dict)
+
+
+def names_of(robot: str, sim: bool, environment: Mapping[str, str]) -> Names:
+    """Return the names that every file of a robot knows."""
+    return Names({"robot.name": (types.TEXT, robot), "sim": (types.FLAG, sim)}, environment)
+
+
+def with_arguments(names: Names, arguments: Mapping[str, tuple[Type, object]]) -> Names:
+    """Return `names` with `args.NAME` for each argument; the value of a broken one is `BROKEN`."""
+    return replace(names, values={**names.values, **{f"args.{name}": value for name, value in arguments.items()}})
+
+
+def fill(root: tree.Mapping, names: Names, report: Report, *, runs: bool = False) -> tree.Mapping:
+    """Return the tree with every `${...}` filled in; `runs` tells that `$name` has a meaning in it (missions).
+
+    A scalar that is nothing but `${...}` holds the typed value in `filled`, or is the list or map that it names; one
+    that could not be filled in holds `BROKEN`.
+    """
+    return _Filler(names, report, runs).mapping(root)
+
+
+class _Filler:
+    """One pass over a tree; what holds no `$` stays the same object."""
+
+    def __init__(self, names: Names, report: Report, runs: bool) -> None:
+        self.names = names
+        self.report = report
+        self.runs = runs
+
+    def node(self, node: Node) -> Node:
+        match node:
+            case Scalar():
+                return self.scalar(node) if "$" in node.text else node
+            case Sequence(items=items):
+                filled = tuple(map(self.node, items))
+                return node if all(a is b for a, b in zip(filled, items, strict=True)) else replace(node, items=filled)
+        return self.mapping(node)
+
+    def mapping(self, mapping: tree.Mapping) -> tree.Mapping:
+        entries = {}
+        for name, entry in mapping.entries.items():
+            value = self.node(entry.value)
+            entries[name] = entry if value is entry.value else Entry(entry.key, value)
+        is_same = all(entries[name] is entry for name, entry in mapping.entries.items())
+        return mapping if is_same else replace(mapping, entries=entries)
+
+    def scalar(self, scalar: Scalar) -> Node:
+        pieces = list(_PIECE.finditer(scalar.text))
+        values = {piece: value for piece in pieces if (value := self.piece(scalar, piece)) is not None}
+        is_whole = len(pieces) == 1 and pieces[0].group() == scalar.text
+        if any(value is BROKEN for value in values.values()):
+            return replace(scalar, filled=BROKEN)
+        if is_whole and values:
+            return _typed(scalar, values[pieces[0]])
+        for piece, value in values.items():
+            if isinstance(value, Sequence | tree.Mapping):
+                span = part_span(scalar, piece.start(), piece.end())
+                message = f"{describe(to_plain(value)).removeprefix('this is ')} cannot stand inside a text"
+                self.report.add(WRONG_OPERATION.at(span, message))
+                return replace(scalar, filled=BROKEN)
+        parts, position = [], 0
+        for piece, value in values.items():
+            parts += [scalar.text[position : piece.start()], _as_text(value)]
+            position = piece.end()
+        return replace(scalar, text="".join(parts) + scalar.text[position:]) if parts else scalar
+
+    def piece(self, scalar: Scalar, piece: re.Match[str]) -> object:
+        """Return the value of one `${...}`, None for what stays as it is, `BROKEN` after a finding."""
+        body, name = piece["body"], piece["name"]
+        if body is None:
+            return self.running_name(scalar, piece) if name and not self.runs else None
+        span = part_span(scalar, piece.start(), piece.end())
+        if not piece["end"]:
+            self.report.add(SYNTAX.at(span, "this '${' is never closed", help="write '}' at its end"))
+            return BROKEN
+        if variable := _ENVIRONMENT.fullmatch(body):
+            return self.variable(scalar, piece, variable)
+        try:
+            expression = parse_fill(body)
+        except ExpressionError as error:
+            span = part_span(scalar, piece.start("body") + error.start, piece.start("body") + error.end)
+            self.report.add(SYNTAX.at(span, error.message, help=error.help))
+            return BROKEN
+        return self.expression(scalar, piece.start("body"), expression)
+
+    def running_name(self, scalar: Scalar, piece: re.Match[str]) -> object:
+        name = piece["name"].rstrip(".")
+        known = [key for key in self.names.values if name in (key, key.removeprefix("args."))]
+        fix = f"write '${{{known[0]}}}'" if known else "what is filled in has braces; a dollar is written '$$'"
+        message = f"'${plain(name, 60)}' is looked up while the robot runs, and this is filled in before"
+        self.report.add(NOT_RUNNING.at(part_span(scalar, piece.start(), piece.end()), message, help=fix))
+        return BROKEN
+
+    def variable(self, scalar: Scalar, piece: re.Match[str], variable: re.Match[str]) -> object:
+        name, mode, rest = variable["name"], variable["mode"], variable["rest"]
+        value = self.names.environment.get(name)
+        if value or (value is not None and not mode):
+            return _FromEnvironment(value)
+        if mode == "-":
+            return _FromEnvironment(rest)
+        why = plain(rest) if mode and rest else ""
+        span = part_span(scalar, piece.start(), piece.end())
+        message = f"the variable '{name}' of the environment is not set"
+        self.report.add(ENVIRONMENT.at(span, message, label=why, help=f"set it, or write '${{env.{name}:-DEFAULT}}'"))
+        return BROKEN
+
+    def expression(self, scalar: Scalar, offset: int, expression: Expression) -> object:
+        known = self.names.values
+        unknown = [word for word in expression.words if word.name not in known]
+        for word in unknown:
+            span = part_span(scalar, offset + word.start, offset + word.end)
+            self.report.add(UNKNOWN_NAME.at(span, f"unknown name '{word.name}'", help=self.name_help(word.name)))
+        if unknown or any(known[word.name][1] is BROKEN for word in expression.words):
+            return BROKEN
+        if expression.text.strip() in known:
+            return known[expression.text.strip()][1]
+        type_, problems = check(expression, _Types(known))
+        for problem in problems:
+            span = part_span(scalar, offset + problem.start, offset + problem.end)
+            self.report.add(WRONG_OPERATION.at(span, problem.message, help=problem.help))
+        if problems:
+            return BROKEN
+        try:
+            return _with_type(evaluate(expression, _Values(known)), type_)
+        except EvaluationError as error:
+            span = part_span(scalar, offset + error.start, offset + error.end)
+            self.report.add(WRONG_OPERATION.at(span, error.message))
+            return BROKEN
+
+    def name_help(self, name: str) -> str:
+        if name.startswith("env."):
+            return "a variable of the environment stands alone: '${" + name + "}'"
+        fix = suggest(name, self.names.values, "what can be filled in")
+        if self.runs and not fix.startswith("did you mean"):
+            return f"what is known while the robot runs is written '${name}'"
+        return fix
+
+
+@dataclass(frozen=True, slots=True)
+class _FromEnvironment:
+    """Text that nothing is known of: it counts as if it had been written in the manifest without quotes."""
+
+    text: str
+
+
+def _typed(scalar: Scalar, value: object) -> Node:
+    if isinstance(value, _FromEnvironment):
+        return replace(scalar, text=value.text, plain=True)
+    if isinstance(value, Scalar | Sequence | tree.Mapping):
+        return value
+    return replace(scalar, filled=value)
+
+
+def _as_text(value: object) -> str:
+    return value.text if isinstance(value, _FromEnvironment) else show(value)
+
+
+def _with_type(value: object, type_: Type) -> object:
+    """Return a computed value as manifests hold it: with its dimension, whole numbers as such."""
+    if isinstance(value, float) and type_.dimension and type_.dimension not in (NUMBER, QUOTIENT):
+        return Quantity(value, type_.dimension)
+    is_whole = isinstance(value, float) and type_.kind is TypeKind.COUNT and value.is_integer()
+    return int(value) if is_whole and isinstance(value, float) else value
+
+
+@dataclass(frozen=True, slots=True)
+class _Types:
+    """The names as the static check of an expression sees them."""
+
+    names: Mapping[str, tuple[Type, object]]
+
+    def variable(self, name: str) -> Type | None:
+        return None
+
+    def word(self, name: str) -> Type | None:
+        return self.names[name][0] if name in self.names else None
+
+    def variables(self) -> Iterable[str]:
+        return ()
+
+    def words(self) -> Iterable[str]:
+        return self.names
+
+
+@dataclass(frozen=True, slots=True)
+class _Values:
+    """The names as the evaluation of an expression sees them: numbers in SI, lists and maps as plain data."""
+
+    names: Mapping[str, tuple[Type, object]]
+
+    def variable(self, name: str) -> object:
+        raise KeyError(name)
+
+    def word(self, name: str) -> object:
+        value = self.names[name][1]
+        if isinstance(value, Quantity):
+            return value.value
+        return to_plain(value) if isinstance(value, Scalar | Sequence | tree.Mapping) else value
+
+    def age(self, name: str) -> float:
+        raise KeyError(name)
+
+    def is_new(self, name: str) -> bool:
+        raise KeyError(name)

@@ -1,0 +1,14 @@
+"""The robots and missions that ship with the package, named `rbx:...`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+PREFIX = "rbx:"
+_PACKAGE = Path(__file__).resolve().parent.parent
+
+
+def library_root() -> Path:
+    """Return the folder that `rbx:` names: inside the package where it is installed, beside it in a checkout."""
+    inside = _PACKAGE / "library"
+    return inside if inside.is_dir() else _PACKAGE.parent

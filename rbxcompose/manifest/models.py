@@ -1,0 +1,242 @@
+"""The sections of a robot's file as types, and the robot as it comes out of the front end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as AnyMapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, StringConstraints
+
+from rbxcompose.config import Angle, Config, Length, Name, Place, Time
+from rbxcompose.findings import Span
+from rbxcompose.manifest.tree import Mapping
+
+SECTIONS = (
+    *("args", "bus", "components", "include", "body", "buses", "actuators", "joints", "controllers", "safety"),
+    *("places", "missions", "start", "muxes", "diagnostics", "values", "profiles"),
+    *("devices", "console", "security", "record"),
+)
+"""The words that a section of a robot's file has or will have."""
+
+ALWAYS_THERE = ("transforms", "mission")
+"""Components that every robot runs, beside `diagnostics`."""
+
+TopicName = Annotated[str, StringConstraints(pattern=r"^/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*$", max_length=255)]
+PortName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)?$", max_length=121)]
+
+
+def _short_for(key: str) -> BeforeValidator:
+    """Let one word stand for a map with that one key."""
+    return BeforeValidator(lambda value: {key: value} if isinstance(value, str) else value)
+
+
+class Header(Config):
+    """The keys that every manifest begins with."""
+
+    rbx: Literal[1]
+    """Version of the language."""
+    kind: str
+    """What this file describes."""
+    name: Name
+    """Its name."""
+    about: str = ""
+    """What it is for, in a sentence."""
+
+
+class RobotFile(Header):
+    """A robot: what it is made of and how that is connected."""
+
+    args: Any = None
+    """Typed arguments by name."""
+    bus: Any = None
+    """How its messages travel."""
+    components: Any = None
+    """What runs, by name."""
+    muxes: Any = None
+    """Who may command what, by output topic."""
+    diagnostics: Any = None
+    """How the states of components are grouped."""
+    places: Any = None
+    """Named poses in `map`."""
+    values: Any = None
+    """Short names for data that missions read."""
+    missions: Any = None
+    """Mission files by name."""
+    start: Any = None
+    """The mission that `up` runs."""
+    profiles: Any = None
+    """Named overlays."""
+
+
+class Bus(Config):
+    """How the robot's messages travel."""
+
+    domain: int = Field(0, ge=0, le=232)
+    """ROS domain; robots of different domains do not hear each other."""
+    namespace: TopicName | None = None
+    """Prefix of all relative topics."""
+    port: int = Field(7447, ge=1, le=65535)
+    """TCP port of the robot's router; the next free one is taken if it is in use."""
+    wire: Literal["jazzy"] = "jazzy"
+    """The ROS 2 distribution whose wire format is spoken."""
+    router: str | None = None
+    """An existing router to use instead of an own one, such as `tcp/192.168.0.2:7447`."""
+
+
+class Restart(Config):
+    """When and how often a component is started again."""
+
+    when: Literal["on_failure", "always", "never"] = "on_failure"
+    """After what it is restarted."""
+    max: int = Field(5, ge=0)
+    """Restarts within `within`, after which it has failed for good."""
+    within: Time = Field(60.0, gt=0)
+    """The time in which restarts are counted."""
+    backoff: Time = Field(0.1, ge=0)
+    """Pause before the first restart; it doubles with each further one."""
+
+
+class ComponentOptions(Config):
+    """What every component takes beside its own configuration."""
+
+    process: Name | None = None
+    """Its process group; what shares a group shares a process."""
+    starts_after: tuple[Name, ...] = ()
+    """Components that are active before this one."""
+    restart: Annotated[Restart, _short_for("when")] = Restart()
+    """When it is started again."""
+    connect: dict[Name, TopicName] = {}
+    """Topics by port, where they differ from the port's name."""
+
+
+OPTIONS = tuple(ComponentOptions.model_fields)
+
+
+class MuxInput(Config):
+    """One source of a mux."""
+
+    priority: int
+    """The larger one wins."""
+    timeout: Time = Field(gt=0)
+    """It has lost its turn after this long without a message."""
+    source: PortName | None = Field(None, alias="from")
+    """The component, or `component.port`, whose output this is; without it the input is open to the outside."""
+
+
+class MuxLock(Config):
+    """A heartbeat that locks when it is silent."""
+
+    priority: int
+    """Inputs of a lower priority are locked."""
+    timeout: Time = Field(gt=0)
+    """Silence that locks."""
+
+
+class Mux(Config):
+    """Lets one of several sources command an output."""
+
+    inputs: dict[Name, MuxInput] = Field(min_length=1)
+    """Sources by name."""
+    locks: dict[Name, MuxLock] = {}
+    """Locks by name."""
+
+
+class Analyzer(Config):
+    """One group of statuses."""
+
+    match: tuple[str, ...] = Field(min_length=1)
+    """Names of components, or patterns with `*`."""
+    timeout: Time | None = Field(None, gt=0)
+    """A status that is older is stale."""
+    expected: tuple[str, ...] = ()
+    """Names that must report, whatever matches."""
+
+
+class Diagnostics(Config):
+    """How the states of components are grouped."""
+
+    analyzers: dict[Name, Analyzer] = {}
+    """Groups by name."""
+
+
+class PlaceModel(Config):
+    """A named pose in `map`."""
+
+    x: Length
+    """Position along x."""
+    y: Length
+    """Position along y."""
+    heading: Angle = 0.0
+    """Direction, counted from x towards y."""
+    colour: str = ""
+    """How viewers draw it."""
+
+
+class Value(Config):
+    """A short name for data that missions read: `port` of a component, or `topic` and `field` from outside."""
+
+    port: PortName | None = None
+    """`component.port`."""
+    topic: TopicName | None = None
+    """Topic of data from outside."""
+    field: PortName | None = None
+    """Field of its message."""
+    type: str | None = None
+    """What it is: a dimension, `number`, `text`, `flag`, ..."""
+    unit: str | None = None
+    """Unit of the message, where it is another than that of the type."""
+
+
+class Mission(Config):
+    """A mission that the robot has."""
+
+    file: str
+    """The mission's file."""
+    with_: dict[Name, Any] = Field({}, alias="with")
+    """Values of its inputs."""
+
+
+ValueModel = Annotated[Value, _short_for("port")]
+MissionModel = Annotated[Mission, _short_for("file")]
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentEntry:
+    """A component that the user wrote; `config` is None if it has mistakes."""
+
+    name: str
+    type: str
+    options: ComponentOptions
+    config: Config | None
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class MissionEntry:
+    """A mission of the robot: its file, and the values for its inputs as nodes."""
+
+    name: str
+    path: Path
+    with_: Mapping
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class RobotManifest:
+    """A robot after composition: everything that its file says, in the order in which it says it."""
+
+    name: str
+    about: str
+    path: Path
+    root: Mapping  # composed and filled; the places of everything below
+    is_simulated: bool
+    bus: Bus
+    components: AnyMapping[str, ComponentEntry] = field(default_factory=dict)
+    muxes: AnyMapping[str, Mux] = field(default_factory=dict)
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)
+    places: AnyMapping[str, Place] = field(default_factory=dict)
+    values: AnyMapping[str, Value] = field(default_factory=dict)
+    missions: AnyMapping[str, MissionEntry] = field(default_factory=dict)
+    start: str | None = None

@@ -1,0 +1,17 @@
+"""Places inside a scalar."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rbxcompose.findings import Span
+from rbxcompose.manifest.tree import Scalar
+
+
+def part_span(scalar: Scalar, start: int, end: int) -> Span:
+    """Return the place of `scalar.text[start:end]`; of the whole scalar where escapes or line breaks hide it."""
+    span, quote = scalar.span, 0 if scalar.plain else 1
+    if span.line != span.end_line or span.end_column - span.column != len(scalar.text) + 2 * quote:
+        return span
+    first = span.column + quote
+    return replace(span, column=first + start, end_column=first + max(end, start + 1))

@@ -1,0 +1,141 @@
+"""Reading a manifest: bytes -> text -> located tree, with every mistake as a finding."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Iterator, MutableMapping
+from pathlib import Path
+
+from rbxcompose.findings import Finding, Span, kind
+from rbxcompose.manifest.composing import TOO_LARGE, compose
+from rbxcompose.manifest.limits import ALL_BYTES, FILE_BYTES, FILES
+from rbxcompose.manifest.tree import Node
+from rbxcompose.manifest.walk import CHARACTER, Walk
+from rbxcompose.manifest.yaml_errors import NOT_YAML
+from rbxcompose.plain import FORBIDDEN, code_point
+
+NOT_UTF8 = kind(
+    "RBX1111",
+    """The file is not UTF-8 text
+
+Manifests are text in UTF-8. Save the file in this encoding; every editor can.
+
+Bad: a file saved as UTF-16 or Latin-1.
+Good: the same file saved as UTF-8.
+""",
+)
+UNREADABLE = kind(
+    "RBX1301",
+    """A file cannot be read
+
+The file does not exist, may not be read, or is no regular file. Paths are relative to the file that writes them.
+
+Bad:
+```yaml
+missions:
+  patrol: ../missions/patrol.yml
+```
+Good:
+```yaml
+missions:
+  patrol: ../missions/patrol.yaml
+```
+""",
+)
+
+
+def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> tuple[Node | None, list[Finding]]:
+    """Read one manifest and enter its text into `sources` under the name that findings show."""
+    data = _bytes(path, shown, sources)
+    if isinstance(data, Finding):
+        return None, [data]
+    text, findings = _decode(data, shown)
+    sources[shown] = text
+    return (None, findings) if findings else read_text(text, shown)
+
+
+def _bytes(path: Path, shown: str, sources: MutableMapping[str, str]) -> bytes | Finding:
+    if len(sources) >= FILES:
+        return TOO_LARGE.at(None, f"'{shown}' would be file number {FILES + 1} of this robot, {FILES} are the limit")
+    try:
+        # A pipe without a writer must not hold us up, hence O_NONBLOCK before we know what it is.
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                return UNREADABLE.at(None, f"'{shown}' is no regular file")
+            data = file.read(FILE_BYTES + 1)
+    except OSError as error:
+        is_missing = error.errno == errno.ENOENT
+        reason = "does not exist" if is_missing else f"cannot be read: {os.strerror(error.errno or 0)}"
+        return UNREADABLE.at(None, f"'{shown}' {reason}")
+    if len(data) > FILE_BYTES:
+        return TOO_LARGE.at(None, f"'{shown}' is larger than {FILE_BYTES:,} bytes, the limit of a manifest")
+    if sum(map(len, sources.values())) + len(data) > ALL_BYTES:
+        return TOO_LARGE.at(
+            None, f"with '{shown}' the files of this robot are larger than {ALL_BYTES:,} bytes together"
+        )
+    return data
+
+
+def _decode(data: bytes, file: str) -> tuple[str, list[Finding]]:
+    """Return the text with newlines only, and what keeps it from being one."""
+    try:
+        return data.decode("utf-8-sig").replace("\r\n", "\n"), []
+    except UnicodeDecodeError as error:
+        text = data.decode("utf-8-sig", errors="replace").replace("\r\n", "\n")
+        before = data[: error.start].decode("utf-8-sig").replace("\r\n", "\n")
+        span = _character_span(before, len(before), file)
+        message = "this file is not UTF-8 text"
+        return text, [NOT_UTF8.at(span, message, label=f"byte 0x{data[error.start]:02x}", help="save it as UTF-8")]
+
+
+def read_text(text: str | bytes, file: str) -> tuple[Node | None, list[Finding]]:
+    """Read the text of one manifest into a located tree; columns count characters from 1.
+
+    The tree is None if the text cannot be read to its end; with other findings it holds what could be read.
+    """
+    if isinstance(text, bytes):
+        text, findings = _decode(text, file)
+        if findings:
+            return None, findings
+    elif text.startswith("\ufeff"):
+        text = text[1:]
+    if len(text) > FILE_BYTES:
+        return None, [TOO_LARGE.at(None, f"'{file}' is larger than {FILE_BYTES:,} bytes, the limit of a manifest")]
+    if findings := list(_trouble_in_characters(text, file)):
+        return None, findings
+    root, failure = compose(text, file)
+    if failure:
+        return None, [failure]
+    if root is None:
+        return None, [NOT_YAML.at(Span(file, 1, 1, 1, 2), "there is nothing in this file")]
+    walk = Walk(text, file)
+    node = walk.node(root)
+    return node, walk.findings
+
+
+def _trouble_in_characters(text: str, file: str) -> Iterator[Finding]:
+    """Find what must not reach the parser: it would stop there with a byte position, or pass it."""
+    if found := FORBIDDEN.search(text):
+        message = f"a manifest may not hold the character {code_point(found.group())}"
+        yield CHARACTER.at(_character_span(text, found.start(), file), message, help="remove it")
+    tab = text.find("\t")
+    if tab >= 0:
+        span = _character_span(text, tab, file)
+        lines = sum("\t" in line for line in text.split("\n"))
+        label = f"and {lines - 1} more {'line' if lines == 2 else 'lines'}" if lines > 1 else ""
+        help_text = r'use spaces (in text with double quotes a tab is written "\t")'
+        yield CHARACTER.at(span, "there is a tab here, and a manifest has none", label=label, help=help_text)
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.startswith("%"):
+            span = Span(file, number, 1, number, len(line) + 1)
+            yield NOT_YAML.at(span, "a manifest has no lines that begin with '%'", help="remove this line")
+        if line.strip() and not line.lstrip().startswith("#"):
+            return  # directives stand before everything else
+
+
+def _character_span(text: str, offset: int, file: str) -> Span:
+    line = text.count("\n", 0, offset) + 1
+    column = offset - (text.rfind("\n", 0, offset) + 1) + 1
+    return Span(file, line, column, line, column + 1)

@@ -1,0 +1,76 @@
+"""The core types of YAML 1.2: what a scalar without quotes stands for (`on`, `yes` and `12:30` are text)."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from rbxcompose.manifest.limits import NUMBER
+from rbxcompose.manifest.tree import Scalar
+
+PlainValue = bool | int | float | str | None
+
+_WORDS: dict[str, bool | None] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
+_NUMBER = re.compile(
+    r"(?P<decimal>[-+]?[0-9]+)|(?P<based>0o[0-7]+|0x[0-9a-fA-F]+)"
+    r"|(?P<float>[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?)"
+    r"|(?P<infinite>[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))"
+)
+_MAY_BE_NUMBER = frozenset("+-.0123456789")
+
+
+def plain_value(scalar: Scalar) -> PlainValue:
+    """Return the value of a scalar by YAML's core types; a number that `number_trouble` names stays text."""
+    text = scalar.text
+    if not scalar.plain:
+        return text
+    if text in _WORDS:
+        return _WORDS[text]
+    form = _number_form(text)
+    if not form or _trouble(text, form):
+        return text
+    if form == "float":
+        return float(text)
+    return int(text) if form == "decimal" else int(text, 0)
+
+
+def number_trouble(scalar: Scalar) -> str:
+    """Return why the number that a scalar writes cannot be taken, in words after "this number"; else nothing."""
+    form = _number_form(scalar.text) if scalar.plain else ""
+    return _trouble(scalar.text, form) if form else ""
+
+
+def _number_form(text: str) -> str:
+    """Return how a text writes a number (a group of `_NUMBER`), or nothing if it writes none."""
+    match = _NUMBER.fullmatch(text) if text[:1] in _MAY_BE_NUMBER else None
+    return match.lastgroup or "" if match else ""
+
+
+def _trouble(text: str, form: str) -> str:
+    if form == "infinite":
+        return "is not finite"
+    if len(text) > NUMBER:
+        return f"has {len(text):,} characters, {NUMBER} are the limit"
+    return "is too large" if form == "float" and not math.isfinite(float(text)) else ""
+
+
+def describe(value: object) -> str:
+    """Return what a plain value is, in words: "this is text"."""
+    match value:
+        case None:
+            return "this is empty"
+        case bool():
+            return "this is true or false"
+        case int() | float():
+            return "this is a number"
+        case str():
+            return "this is text"
+        case dict():
+            return "this is a map"
+        case list() | tuple():
+            return "this is a list"
+    return "this is another type of value"

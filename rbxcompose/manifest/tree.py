@@ -1,0 +1,107 @@
+"""The located tree: YAML as plain nodes that know their place, before any meaning is given to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from rbxcompose.findings import Span
+
+Key = str | int
+Path = tuple[Key, ...]  # from the root of a file: ("components", "base", "max_speed") or ("do", 0, "go_to")
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """One word, number or text as written.
+
+    `plain` tells whether it stands without quotes, so that YAML 1.2's core types apply. `filled` is the typed value
+    of a scalar that was nothing but `${...}` (a `Quantity`, number, text or flag), else None.
+    """
+
+    text: str
+    span: Span
+    plain: bool = True
+    filled: object = None
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """A list of nodes."""
+
+    items: tuple[Node, ...]
+    span: Span
+    tag: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A key with its value."""
+
+    key: Scalar
+    value: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    """Named nodes, in the order of the text. `tag` is `!replace` where an overlay says so."""
+
+    entries: dict[str, Entry] = field(default_factory=dict)
+    span: Span = Span("", 1, 1, 1, 1)
+    tag: str = ""
+
+    def get(self, name: str) -> Node | None:
+        """Return the value of a key, or None."""
+        entry = self.entries.get(name)
+        return entry.value if entry else None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.entries
+
+
+Node = Scalar | Sequence | Mapping
+
+
+def children(node: Node) -> Iterator[tuple[Key, Node]]:
+    """Yield what stands directly below a node, with its key or index."""
+    match node:
+        case Mapping(entries=entries):
+            for name, entry in entries.items():
+                yield name, entry.value
+        case Sequence(items=items):
+            yield from enumerate(items)
+        case _:
+            return
+
+
+def at(node: Node, path: Path) -> Node | None:
+    """Return the node at `path`, or None if there is none."""
+    found: Node | None = node
+    for key in path:
+        match found:
+            case Mapping():
+                found = found.get(str(key))
+            case Sequence(items=items) if isinstance(key, int) and 0 <= key < len(items):
+                found = items[key]
+            case _:
+                return None
+    return found
+
+
+def key_span(node: Node, path: Path) -> Span:
+    """Return the place of the key at `path`; of the nearest place above it, where there is no key."""
+    for length in range(len(path), 0, -1):
+        above = at(node, path[: length - 1])
+        if isinstance(above, Mapping) and str(path[length - 1]) in above.entries:
+            return above.entries[str(path[length - 1])].key.span
+        if isinstance(above, Sequence) and (item := at(above, path[length - 1 : length])):
+            return item.span
+    return node.span
+
+
+def value_span(node: Node, path: Path) -> Span:
+    """Return the place of the value at `path`; of the nearest node above it, where there is none."""
+    for length in range(len(path), -1, -1):
+        if (found := at(node, path[:length])) is not None:
+            return found.span
+    return node.span

@@ -1,0 +1,376 @@
+"""A located tree against a model: what pydantic objects to, at its place and in plain words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Mapping as AnyMapping
+from difflib import get_close_matches
+from functools import cache
+from itertools import islice
+from typing import Any, TypeVar, cast
+
+from pydantic import TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
+
+from rbxcompose.findings import SIMILAR, Finding, Report, Span, kind, suggest
+from rbxcompose.manifest.scalars import describe, plain_value
+from rbxcompose.manifest.shapes import dimension_at, keys_at
+from rbxcompose.manifest.tree import Mapping, Node, Path, Scalar, Sequence, at, key_span, value_span
+from rbxcompose.plain import plain
+from rbxcompose.units import Quantity, UnitError, format_quantity
+
+UNKNOWN_KEY = kind(
+    "RBX1001",
+    """Unknown key
+
+Every map has a fixed set of keys; this one is not among them, so that it would have no effect. Mostly it is misspelt.
+
+Bad:
+```yaml
+base:
+  type: diff_drive_sim
+  max_sped: 0.5 m/s
+```
+Good:
+```yaml
+base:
+  type: diff_drive_sim
+  max_speed: 0.5 m/s
+```
+""",
+)
+MISSING_KEY = kind(
+    "RBX1002",
+    """Missing key
+
+This map needs a key that is not there and has no default.
+
+Bad:
+```yaml
+teleop:
+  timeout: 0.5 s
+```
+Good:
+```yaml
+teleop:
+  priority: 100
+  timeout: 0.5 s
+```
+""",
+)
+WRONG_TYPE = kind(
+    "RBX1003",
+    """Wrong type or unit
+
+The value is not what this key takes: text where a number stands, a time where a speed stands, an angle without its
+unit.
+
+Bad:
+```yaml
+max_speed: fast
+```
+Good:
+```yaml
+max_speed: 0.3 m/s
+```
+""",
+)
+NOT_A_CHOICE = kind(
+    "RBX1004",
+    """Not one of the choices
+
+This key takes one of a few words, or the name of something that exists.
+
+Bad:
+```yaml
+restart: sometimes
+```
+Good:
+```yaml
+restart: on_failure
+```
+""",
+)
+OUT_OF_RANGE = kind(
+    "RBX1005",
+    """Out of range
+
+The value has the right type and is too small or too large, or a list has too few or too many items.
+
+Bad:
+```yaml
+bus:
+  domain: -1
+```
+Good:
+```yaml
+bus:
+  domain: 0
+```
+""",
+)
+BAD_NAME = kind(
+    "RBX1006",
+    """A name of the wrong form
+
+Names begin with a small letter and go on with small letters, digits and underscores, at most 60 of them, so that they
+can stand in topics, in paths and in expressions.
+
+Bad:
+```yaml
+components:
+  Front-Camera:
+    type: camera
+```
+Good:
+```yaml
+components:
+  front_camera:
+    type: camera
+```
+""",
+)
+
+BROKEN = object()
+"""What `Scalar.filled` holds if filling it in failed: that was said, and nothing more is said of the value."""
+
+T = TypeVar("T")
+_SINGULAR = {"components": "component", "muxes": "mux", "places": "place", "args": "argument", "missions": "mission"}
+_MOST_FINDINGS = 100  # of one part: nobody writes more by mistake, and each costs a search for the nearest name
+_ROUNDS = 8  # of repairs; each one goes at least one level deeper into a value
+
+
+def to_plain(node: Node) -> object:
+    """Return plain data: scalars by YAML's core types, filled ones with their typed value, maps and lists of these."""
+    match node:
+        case Scalar(filled=None):
+            return plain_value(node)
+        case Scalar():
+            return node.filled
+        case Sequence(items=items):
+            return [to_plain(item) for item in items]
+        case Mapping(entries=entries):
+            return {name: to_plain(entry.value) for name, entry in entries.items()}
+
+
+@cache
+def _adapter(model: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(model)
+
+
+def validate(
+    model: type[T],
+    node: Node,
+    path: Path,
+    report: Report,
+    context: AnyMapping[str, object] | None = None,
+    *,
+    also: Iterable[str] = (),
+) -> T | None:
+    """Return the node as an instance of `model` (any type that pydantic knows), or None after its findings.
+
+    Nothing is converted: text is no number, and `yes` no flag; only a text field takes a number as it is written.
+    `path` tells where `node` stands in its file, for the wording; `context` is what the model's validators need;
+    `also` are keys that stand beside the model's own, which an unknown key may be a misspelling of.
+    """
+    data = to_plain(node)
+    for _ in range(_ROUNDS):
+        try:
+            return cast(T, _adapter(cast(Any, model)).validate_python(data, strict=True, context=dict(context or {})))
+        except ValidationError as error:
+            errors = error.errors(include_url=False)
+        before = data
+        for details in errors:
+            data = _repaired(data, details, node)
+        if data is before:
+            break
+    report.extend(islice(_findings(model, node, path, errors, tuple(also)), _MOST_FINDINGS))
+    return None
+
+
+def _repaired(data: Any, error: ErrorDetails, node: Node) -> Any:
+    """Return `data` with what a strict field takes and YAML cannot write: text for a number, a tuple for a list."""
+    convert = _REPAIRS.get(error["type"])
+    if convert is None:
+        return data
+    try:
+        return _changed(data, error["loc"], lambda value: convert(value, at(node, error["loc"])))
+    except (KeyError, IndexError, TypeError):  # a place that is not in the data, such as a member of a union
+        return data
+
+
+def _changed(data: Any, path: Path, convert: Callable[[object], object]) -> Any:
+    """Return `data` with the value at `path` converted; the same object if the value stays the same."""
+    if not path:
+        return convert(data)
+    key = path[0]
+    inner = _changed(data[key], path[1:], convert)
+    if inner is data[key]:
+        return data
+    if isinstance(data, dict):
+        return {**data, key: inner}
+    return type(data)(inner if index == key else item for index, item in enumerate(data))
+
+
+def _as_text(value: object, node: Node | None) -> object:
+    if isinstance(value, Quantity):
+        return format_quantity(value.value, value.dimension)
+    if isinstance(node, Scalar) and node.filled is None and value is not None:
+        return node.text
+    return str(value) if isinstance(value, int | float) else value
+
+
+def _as_tuple(value: object, _node: Node | None) -> object:
+    return tuple(value) if isinstance(value, list) else value
+
+
+_REPAIRS: dict[str, Callable[[object, Node | None], object]] = {"string_type": _as_text, "tuple_type": _as_tuple}
+
+
+def _findings(
+    model: Any, node: Node, path: Path, errors: list[ErrorDetails], also: tuple[str, ...]
+) -> Iterator[Finding]:
+    """Turn pydantic's errors into findings: one for each place, none for what was said before."""
+    located = [(_locate(node, error), error) for error in errors]
+    lacking = {loc for loc, error in located if error["type"] == "missing"}
+    said: set[Path] = set()
+    for loc, error in located:
+        if error["type"] == "extra_forbidden":
+            known = [*keys_at(model, loc[:-1]), *(() if len(loc) > 1 else also)]
+            finding, meant = _unknown_key(known, node, path, loc, lacking)
+            said |= {loc, (*loc[:-1], meant)}  # what is misspelt is not missing as well
+            yield finding
+    for loc, error in located:
+        if loc not in said and not is_broken(at(node, loc)):
+            said.add(loc)
+            yield _finding(model, node, path, loc, error)
+
+
+def _locate(node: Node, error: ErrorDetails) -> Path:
+    """Return the place of an error in the tree; pydantic's own steps, such as members of a union, are left out."""
+    found: Path = ()
+    for step in error["loc"]:
+        if at(node, (*found, step)) is not None:
+            found = (*found, step)
+    if error["type"] == "missing":
+        found = (*found, error["loc"][-1])
+    return found
+
+
+def where(path: Path) -> str:
+    """Return how a map at `path` is called: "component 'gui'", "'inputs.teleop' of mux 'cmd_vel'"."""
+    match path:
+        case ():
+            return "this file"
+        case (str(section), name) if section in _SINGULAR:
+            return f"{_SINGULAR[section]} '{name}'"
+        case (str(section), name, *below) if section in _SINGULAR:
+            return f"'{'.'.join(map(str, below))}' of {_SINGULAR[section]} '{name}'"
+    return f"'{'.'.join(map(str, path))}'"
+
+
+def _unknown_key(known: Iterable[str], node: Node, path: Path, loc: Path, lacking: set[Path]) -> tuple[Finding, str]:
+    """Return the finding for an unknown key, and the missing key that it is a misspelling of, if any."""
+    key = str(loc[-1])
+    missing = [str(place[-1]) for place in lacking if place[:-1] == loc[:-1]]
+    meant = get_close_matches(key, missing, n=1, cutoff=SIMILAR)
+    fix = suggest(key, meant or known, "keys that it takes")
+    message = f"unknown key '{plain(key, 60)}' in {where((*path, *loc[:-1]))}"
+    return UNKNOWN_KEY.at(key_span(node, loc), message, help=fix), meant[0] if meant else ""
+
+
+def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails) -> Finding:
+    name = _called((*path, *loc))
+    value = at(node, loc)
+    context = error.get("ctx", {})
+    span = value_span(node, loc)
+    if error["loc"][-1:] == ("[key]",) or error["type"] == "string_pattern_mismatch":
+        place = key_span(node, loc) if error["loc"][-1:] == ("[key]",) else span
+        text = value.text if isinstance(value, Scalar) and place is span else name
+        help_text = "small letters, digits and underscores, beginning with a letter"
+        return BAD_NAME.at(place, f"'{text}' is no name", help=help_text)
+    match error["type"]:
+        case "missing":
+            message = f"{where((*path, *loc[:-1]))} needs the key '{name}'"
+            return MISSING_KEY.at(key_span(node, loc[:-1]), message)
+        case "literal_error" | "enum":
+            choices = re.findall(r"'([^']*)'|(\d+)", str(context.get("expected", "")))
+            return not_a_choice(span, name, value, ["".join(choice) for choice in choices])
+        case "value_error" if isinstance(cause := context.get("error"), UnitError):
+            return unit_finding(cause, value or node, name)
+        case "value_error":
+            return WRONG_TYPE.at(span, f"'{name}': {context.get('error')}")
+        case "string_too_long" | "too_long" | "string_too_short" | "too_short":
+            words, key = ("at most", "max_length") if "long" in error["type"] else ("at least", "min_length")
+            one, more = ("character", "characters") if "string" in error["type"] else ("entry", "entries")
+            size = context[key]
+            return OUT_OF_RANGE.at(span, f"'{name}' must have {words} {size} {one if size == 1 else more}")
+        case kind_of_error if kind_of_error in _BOUNDS:
+            words, key = _BOUNDS[kind_of_error]
+            dimension = dimension_at(model, loc)
+            bound = format_quantity(context[key], dimension) if dimension else context[key]
+            return OUT_OF_RANGE.at(span, f"'{name}' must be {words} {bound}")
+        case kind_of_error if kind_of_error in _EXPECTED:
+            return WRONG_TYPE.at(span, f"'{name}' must be {_EXPECTED[kind_of_error]}", label=label_of(value))
+    if "help" in context:  # a validator of ours, which brings its own words
+        return NOT_A_CHOICE.at(span, f"'{name}': {error['msg']}", help=str(context["help"]))
+    return WRONG_TYPE.at(span, f"'{name}': {error['msg'][:1].lower()}{error['msg'][1:]}", label=label_of(value))
+
+
+def not_a_choice(span: Span, name: str, value: Node | None, choices: list[str]) -> Finding:
+    """Return the finding for a value that is none of the few words that its key takes."""
+    written = value.text if isinstance(value, Scalar) else ""
+    if len(choices) == 1:
+        return NOT_A_CHOICE.at(span, f"'{name}' must be '{choices[0]}'", label=label_of(value) if not written else "")
+    message = f"'{name}' must be one of {', '.join(choices)}"
+    close = get_close_matches(written, choices, n=1, cutoff=SIMILAR)
+    return NOT_A_CHOICE.at(span, message, help=f"did you mean '{close[0]}'?" if close else "")
+
+
+def _called(path: Path) -> str:
+    """Return how a value is called: by its key, or by its list and number."""
+    *above, last = path or ("this file",)
+    return f"{above[-1]}[{last}]" if isinstance(last, int) and above else str(last)
+
+
+def is_broken(node: Node | None) -> bool:
+    """Tell whether a value could not be filled in, which was said."""
+    return isinstance(node, Scalar) and node.filled is BROKEN
+
+
+def label_of(node: Node | None) -> str:
+    """Return what a node is, for the label of a finding: "this is text"."""
+    if isinstance(node, Scalar) and isinstance(node.filled, Quantity):
+        return f"this is {node.filled.dimension.phrase}"
+    return describe(to_plain(node)) if node is not None else ""
+
+
+def unit_finding(error: UnitError, node: Node, name: str) -> Finding:
+    """Return the finding for a value that is not the quantity that it should be."""
+    # What does not even look like a number needs no lesson on numbers.
+    is_word = isinstance(node, Scalar) and node.filled is None and node.text[:1] not in "+-.0123456789"
+    label = label_of(node) if is_word or not error.detail else error.detail
+    return WRONG_TYPE.at(node.span, f"'{name}' {error.message}", label=label, help="" if is_word else error.help)
+
+
+_BOUNDS = {
+    "greater_than": ("greater than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+    "multiple_of": ("a multiple of", "multiple_of"),
+}
+_EXPECTED = {
+    "string_type": "text",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "bool_type": "true or false",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "dict_type": "a map of keys and values",
+    "model_type": "a map of keys and values",
+    "model_attributes_type": "a map of keys and values",
+    "dataclass_type": "a map of keys and values",
+}

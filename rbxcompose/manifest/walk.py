@@ -1,0 +1,355 @@
+"""PyYAML's node tree -> the located tree, with what YAML allows and a manifest does not as findings.
+
+The tree is at most `DEPTH` levels deep, aliases included, so that everything behind it may recurse.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import Any
+
+import yaml
+
+from rbxcompose.findings import Finding, Related, Severity, Span, kind
+from rbxcompose.manifest.composing import TOO_LARGE
+from rbxcompose.manifest.limits import ALIAS_NODES, DEPTH, KEY, TEXT
+from rbxcompose.manifest.scalars import number_trouble
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.yaml_errors import QUOTE_HELP, QUOTES_NEEDED
+from rbxcompose.plain import FORBIDDEN, code_point, plain
+
+TWICE = kind(
+    "RBX1104",
+    """A key is written twice
+
+A map names each thing once; of two equal keys YAML silently takes the last.
+
+Bad:
+```yaml
+runtime: 45 s
+warn: 50 %
+runtime: 30 s
+```
+Good:
+```yaml
+runtime: 30 s
+warn: 50 %
+```
+""",
+)
+NOT_A_KEY = kind(
+    "RBX1105",
+    """A key that is no plain word, or a key without a value
+
+Keys are words. Inside `{}` each key has a value; text with a comma in it is cut in two there and needs quotes.
+
+Bad:
+```yaml
+home: {check: f($a, $b) < 1}
+```
+Good:
+```yaml
+home:
+  check: f($a, $b) < 1
+```
+""",
+)
+CHARACTER = kind(
+    "RBX1106",
+    """A character that a manifest may not hold
+
+Control characters and characters that turn the direction of writing make a text look different from what it is. Tabs
+have no fixed width, so that YAML does not allow them for indentation; write spaces.
+
+Bad:
+```yaml
+about: "red \\e[31m text"
+```
+Good:
+```yaml
+about: red text
+```
+""",
+)
+TAG = kind(
+    "RBX1107",
+    """A tag that manifests do not have
+
+The only tags are `!remove` and `!replace`, in profiles and overlays. Text that begins with `!` stands in quotes.
+
+Bad:
+```yaml
+about: !important drives slowly
+```
+Good:
+```yaml
+about: "!important drives slowly"
+```
+""",
+)
+ALIAS = kind(
+    "RBX1108",
+    """An alias that leads to itself or multiplies
+
+`*name` repeats what `&name` marks. It may not lie inside what it repeats, and all aliases of a file may repeat at most
+10,000 values.
+
+Bad:
+```yaml
+corners: &corners [*corners]
+```
+Good:
+```yaml
+corners: [corner_1, corner_2]
+```
+""",
+)
+NUMBER = kind(
+    "RBX1109",
+    """A number that cannot be taken
+
+Numbers are finite and have at most 40 characters.
+
+Bad:
+```yaml
+speed: .inf
+```
+Good:
+```yaml
+speed: 0.5 m/s
+```
+""",
+)
+HASH = kind(
+    "RBX1110",
+    """Text after `#` is a comment
+
+A ` #` begins a comment, and what follows is not part of the value. Put quotes round the text if it is, and a space
+behind the `#` if it is not.
+
+Bad:
+```yaml
+about: Room #3
+```
+Good:
+```yaml
+about: "Room #3"
+```
+""",
+    Severity.WARNING,
+)
+
+REMOVE, REPLACE = "!remove", "!replace"
+_MOST_FINDINGS = 100  # of one file: nobody makes more of these mistakes by hand
+_SWALLOWED = re.compile(r" +(#[^\s#].*)")
+
+
+def span_of(node: yaml.Node, file: str) -> Span:
+    """Return the place of one of PyYAML's nodes."""
+    start, end = node.start_mark, node.end_mark
+    return Span(file, start.line + 1, start.column + 1, end.line + 1, end.column + 1)
+
+
+class Walk:
+    """One walk over a composed document; `findings` holds what it came upon."""
+
+    def __init__(self, text: str, file: str) -> None:
+        self.text = text
+        self.file = file
+        self.lines = text.split("\n") if "#" in text else []
+        self.findings: list[Finding] = []
+        self._done: dict[int, tuple[Node, int, int]] = {}  # by id: the node, how many nodes it has, how deep it is
+        self._open: set[int] = set()  # ids of the nodes that are being walked, from the root to here
+        self._alias_nodes = 0
+
+    def add(self, finding: Finding) -> None:
+        """Keep a finding, unless there are too many to be read."""
+        if len(self.findings) < _MOST_FINDINGS:
+            self.findings.append(finding)
+
+    def node(self, node: yaml.Node) -> Node:
+        """Return a node with all below it; a second visit is an alias and is counted."""
+        return self._visit(node)[0]
+
+    def _visit(self, node: yaml.Node) -> tuple[Node, int, int]:
+        if id(node) in self._open:
+            self._refuse_alias(node, "this alias leads back to what it lies in")
+            return Mapping({}, span_of(node, self.file)), 1, 1
+        if (done := self._done.get(id(node))) is not None:
+            return self._repeat(node, done)
+        self._open.add(id(node))
+        done = self._read(node)
+        self._open.remove(id(node))
+        if self._first_character(node) in ("&", "!"):  # only what has an anchor is visited again
+            self._done[id(node)] = done
+        return done
+
+    def _first_character(self, node: yaml.Node) -> str:
+        index = node.start_mark.index
+        return self.text[index : index + 1]
+
+    def _repeat(self, node: yaml.Node, done: tuple[Node, int, int]) -> tuple[Node, int, int]:
+        _, size, height = done
+        self._alias_nodes += size
+        if self._alias_nodes > ALIAS_NODES:
+            self._refuse_alias(node, f"the aliases of this file repeat more than {ALIAS_NODES:,} values")
+        elif len(self._open) + height > DEPTH:
+            self._refuse_alias(node, f"with its aliases this file has more than {DEPTH} levels inside each other")
+        else:
+            return done
+        return Mapping({}, span_of(node, self.file)), 1, 1
+
+    def _refuse_alias(self, node: yaml.Node, message: str) -> None:
+        if not any(finding.code == ALIAS.code for finding in self.findings):  # one bomb makes thousands of them
+            place, anchor = self._alias_places(node)
+            self.add(ALIAS.at(place, message, related=[Related(anchor, "what it repeats is marked here")]))
+
+    def _alias_places(self, node: yaml.Node) -> tuple[Span, Span]:
+        """Return the places of the first alias of a node and of its anchor; the composer does not keep the former."""
+        anchor = span_of(node, self.file)
+        name = ""
+        events: Iterable[Any] = yaml.parse(self.text, Loader=yaml.CSafeLoader)
+        for event in events:
+            start, end = event.start_mark, event.end_mark
+            if (start.line + 1, start.column + 1) == (anchor.line, anchor.column):
+                name = getattr(event, "anchor", None) or name
+            elif isinstance(event, yaml.AliasEvent) and event.anchor == name:
+                return Span(self.file, start.line + 1, start.column + 1, end.line + 1, end.column + 1), anchor
+        return anchor, anchor
+
+    def _read(self, node: yaml.Node) -> tuple[Node, int, int]:
+        tag = self._tag(node)
+        if tag == REMOVE:
+            return Mapping({}, span_of(node, self.file), REMOVE), 1, 1
+        match node:
+            case yaml.ScalarNode():
+                return self._scalar(node), 1, 1
+            case yaml.SequenceNode():
+                return self._sequence(node, tag)
+            case yaml.MappingNode():
+                return self._mapping(node, tag)
+        raise AssertionError(f"PyYAML composes no {type(node).__name__}")
+
+    def _tag(self, node: yaml.Node) -> str:
+        written: str = node.tag or ("!" if self._first_character(node) == "!" else "")
+        is_alone = isinstance(node, yaml.ScalarNode) and not node.value
+        if not written or written == REPLACE or (written == REMOVE and is_alone):
+            return written
+        short = written.replace("tag:yaml.org,2002:", "!!")
+        if short == REMOVE:
+            message, help_text = "'!remove' stands alone and takes no value", "remove the value behind it"
+        else:
+            message = f"manifests have no tag '{plain(short, 60)}'"
+            help_text = "put quotes round it if it is text; the only tags are '!remove' and '!replace'"
+        self.add(TAG.at(span_of(node, self.file), message, help=help_text))
+        return ""
+
+    def _scalar(self, node: yaml.ScalarNode) -> Scalar:
+        scalar = Scalar(node.value, span_of(node, self.file), not node.style)
+        if len(scalar.text) > TEXT:
+            message = f"this text has {len(scalar.text):,} characters, {TEXT:,} are the limit"
+            self.add(TOO_LARGE.at(scalar.span, message))
+        if not scalar.text.isprintable() and (found := FORBIDDEN.search(scalar.text)):
+            message = f"this text holds the character {code_point(found.group())}, which cannot be seen"
+            self.add(CHARACTER.at(scalar.span, message))
+        if trouble := number_trouble(scalar):
+            self.add(NUMBER.at(scalar.span, f"this number {trouble}"))
+        return scalar
+
+    def _check_comment(self, value: Node) -> None:
+        if isinstance(value, Scalar) and value.plain and value.span.end_line <= len(self.lines):
+            span = value.span
+            if found := _SWALLOWED.match(self.lines[span.end_line - 1], span.end_column - 1):
+                start, end = found.span(1)
+                place = Span(self.file, span.end_line, start + 1, span.end_line, end + 1)
+                help_text = "put quotes round the whole text, or a space behind the '#'"
+                self.add(HASH.at(place, "this is a comment, not part of the value", help=help_text))
+
+    def _check_cut(self, items: list[yaml.Node]) -> None:
+        """Find text with brackets that a comma inside `{}` or `[]` has cut in two."""
+        for item, following in pairwise(items):
+            if isinstance(item, yaml.ScalarNode) and not item.style and item.value.count("(") > item.value.count(")"):
+                start, end = span_of(item, self.file), span_of(following, self.file)
+                span = Span(self.file, start.line, start.column, end.end_line, end.end_column)
+                message = "inside {} and [] a comma ends the text, so that this is cut in two"
+                self.add(QUOTES_NEEDED.at(span, message, label=QUOTE_HELP))
+                return
+
+    def _sequence(self, node: yaml.SequenceNode, tag: str) -> tuple[Node, int, int]:
+        if node.flow_style:
+            self._check_cut(node.value)
+        items, size, height = [], 1, 0
+        for child in node.value:
+            item, item_size, item_height = self._visit(child)
+            self._check_comment(item)
+            items.append(item)
+            size += item_size
+            height = max(height, item_height)
+        return Sequence(tuple(items), span_of(node, self.file), tag), size, height + 1
+
+    def _mapping(self, node: yaml.MappingNode, tag: str) -> tuple[Node, int, int]:
+        own: dict[str, Entry] = {}
+        merged: dict[str, Entry] = {}
+        size, height = 1, 0
+        cut = len(self.findings)
+        if node.flow_style:
+            self._check_cut([part for pair in node.value for part in pair])
+        is_cut = len(self.findings) > cut
+        for key_node, value_node in node.value:
+            value, value_size, value_height = self._visit(value_node)
+            size += value_size + 1
+            height = max(height, value_height)
+            if isinstance(key_node, yaml.ScalarNode) and key_node.value == "<<" and not key_node.style:
+                self._merge(merged, value, value_node, span_of(key_node, self.file))
+                continue
+            key = self._key(key_node)
+            if key is None:
+                continue
+            if node.flow_style and not is_cut and self._is_missing(value):
+                message = f"'{plain(key.text, 60)}' has no value"
+                help_text = "inside {} each key has a value: 'key: value'"
+                self.add(NOT_A_KEY.at(key.span, message, help=help_text))
+            self._check_comment(value)
+            self._enter(own, Entry(key, value))
+        return Mapping({**merged, **own}, span_of(node, self.file), tag), size + len(merged), height + 1
+
+    def _is_missing(self, value: Node) -> bool:
+        return isinstance(value, Scalar) and value.plain and not value.text
+
+    def _key(self, node: yaml.Node) -> Scalar | None:
+        span = span_of(node, self.file)
+        self._tag(node)
+        if not isinstance(node, yaml.ScalarNode):
+            self.add(NOT_A_KEY.at(span, "a key is one word", help="put quotes round it if it is text"))
+            return None
+        key = self._scalar(node)
+        if len(key.text) > KEY:
+            message = f"this key has {len(key.text):,} characters, {KEY} are the limit"
+            self.add(TOO_LARGE.at(span, message))
+        if not key.text:
+            self.add(NOT_A_KEY.at(span, "a key is missing before the colon"))
+        return key
+
+    def _enter(self, entries: dict[str, Entry], entry: Entry) -> None:
+        first = entries.setdefault(entry.key.text, entry)
+        if first is not entry:
+            related = [Related(first.key.span, "the first")]
+            message = f"the key '{plain(entry.key.text, 60)}' is written twice"
+            self.add(TWICE.at(entry.key.span, message, label="the second", related=related))
+
+    def _merge(self, merged: dict[str, Entry], value: Node, node: yaml.Node, span: Span) -> None:
+        """Take over the entries of the map or maps that `<<` names; the earlier one wins."""
+        sources = value.items if isinstance(value, Sequence) else (value,)
+        for source in sources:
+            if not isinstance(source, Mapping):
+                related = [Related(span_of(node, self.file), "this is none")]
+                self.add(ALIAS.at(span, "'<<' takes a map, or a list of maps", related=related))
+                return
+            self._alias_nodes += len(source.entries)
+            if self._alias_nodes > ALIAS_NODES:
+                self._refuse_alias(node, f"the aliases of this file repeat more than {ALIAS_NODES:,} values")
+                return
+            for name, entry in source.entries.items():
+                merged.setdefault(name, entry)

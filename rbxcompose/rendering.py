@@ -1,0 +1,132 @@
+"""Findings -> text for a person or JSON for a program. Pure: nothing is printed here."""
+
+from __future__ import annotations
+
+import json
+import unicodedata
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding, Report, Severity, Sources, Span
+from rbxcompose.plain import plain
+
+MOST_SHOWN = 20
+_LINE_CELLS = 160  # of a source line; of a longer one only what surrounds the caret is shown
+_BEFORE_CARET = 60
+_WORDS = 400  # characters of a message, label or help
+_RESET = "\x1b[0m"
+_COLOURS = {"error": "\x1b[1;31m", "warning": "\x1b[1;33m", "gutter": "\x1b[1;34m", "bold": "\x1b[1m"}
+
+
+class _Painter:
+    """Paints pieces of text, or leaves them as they are."""
+
+    def __init__(self, colour: bool) -> None:
+        self.colour = colour
+
+    def __call__(self, style: str, text: str) -> str:
+        return f"{_COLOURS[style]}{text}{_RESET}" if self.colour and text else text
+
+
+def render_text(report: Report, sources: Sources, colour: bool = False) -> str:
+    """Return all findings, sorted by place, at most 20 of them in full, and a line that counts them; "" if none."""
+    findings = list(report)
+    if not findings:
+        return ""
+    paint = _Painter(colour)
+    lines = [line for finding in findings[:MOST_SHOWN] for line in _finding(finding, sources, paint)]
+    if len(findings) > MOST_SHOWN:
+        lines.append(f"... and {len(findings) - MOST_SHOWN} more")
+    lines.append(summary(findings))
+    return "\n".join(lines) + "\n"
+
+
+def summary(findings: list[Finding]) -> str:
+    """Return how many there are of each severity: "3 errors, 1 warning"."""
+    counts = {severity: sum(finding.severity is severity for finding in findings) for severity in Severity}
+    return ", ".join(f"{count} {severity}{'' if count == 1 else 's'}" for severity, count in counts.items() if count)
+
+
+def _finding(finding: Finding, sources: Sources, paint: _Painter) -> Iterator[str]:
+    head = paint(finding.severity, f"{finding.severity}[{finding.code}]")
+    yield f"{head}: {paint('bold', plain(finding.message, _WORDS))}"
+    width = 1
+    label = plain(finding.label, _WORDS)
+    if finding.span:
+        width = len(str(finding.span.line))
+        yield f"{paint('gutter', '  -->')} {plain(str(finding.span), _WORDS)}"
+        source = _source_line(finding.span, sources)
+        if source is not None:
+            yield from _caret(finding.span, source, label, finding.severity, paint)
+            label = ""
+    if label:
+        yield f"{' ' * width} {paint('gutter', '=')} {label}"
+    for related in finding.related:
+        yield f"{paint('gutter', '  :::')} {plain(str(related.span), _WORDS)}   {plain(related.message, _WORDS)}"
+    if finding.help:
+        yield f"{' ' * width} {paint('gutter', '=')} help: {plain(finding.help, _WORDS)}"
+
+
+def _source_line(span: Span, sources: Sources) -> str | None:
+    lines = sources.get(span.file, "").split("\n")
+    return lines[span.line - 1] if span.file in sources and span.line <= len(lines) else None
+
+
+def _caret(span: Span, source: str, label: str, severity: Severity, paint: _Painter) -> Iterator[str]:
+    start = min(span.column - 1, len(source))
+    end = span.end_column - 1 if span.end_line == span.line else len(source.rstrip())
+    first = start - _BEFORE_CARET if len(source) > _LINE_CELLS and start > _BEFORE_CARET else 0
+    last = first + _LINE_CELLS
+    before, after = "..." if first else "", "..." if len(source) > last else ""
+    cells = [_cell(character) for character in source[first:last]]
+    text = before + "".join(cells) + after
+    indent = _width(before) + sum(map(_width, cells[: start - first]))
+    carets = "^" * max(1, sum(map(_width, cells[start - first : max(end, start + 1) - first])))
+    number = str(span.line)
+    yield f"{paint('gutter', number + ' |')} {text}".rstrip()
+    pointer = paint(severity, f"{carets} {label}".rstrip())
+    yield f"{paint('gutter', ' ' * len(number) + ' |')} {' ' * indent}{pointer}"
+
+
+def _cell(character: str) -> str:
+    """Return what is shown for one character of a source line."""
+    return "    " if character == "\t" else plain(character)
+
+
+def _width(text: str) -> int:
+    """Return how many columns of a terminal a text takes."""
+    return sum(_columns(character) for character in text)
+
+
+def _columns(character: str) -> int:
+    if unicodedata.combining(character) or unicodedata.category(character) in ("Mn", "Me", "Cf"):
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in ("W", "F") else 1
+
+
+def render_json(report: Report) -> str:
+    """Return all findings as a JSON list, sorted by place."""
+    return json.dumps([_as_data(finding) for finding in report], indent=2, ensure_ascii=False)
+
+
+def _as_data(finding: Finding) -> dict[str, object]:
+    return {
+        "code": finding.code,
+        "severity": finding.severity,
+        "message": finding.message,
+        **_place(finding.span),
+        "label": finding.label,
+        "help": finding.help,
+        "related": [{**_place(related.span), "message": related.message} for related in finding.related],
+    }
+
+
+def _place(span: Span | None) -> dict[str, object]:
+    if span is None:
+        return dict.fromkeys(("file", "line", "column", "end_line", "end_column"))
+    return {
+        "file": span.file,
+        "line": span.line,
+        "column": span.column,
+        "end_line": span.end_line,
+        "end_column": span.end_column,
+    }

@@ -1,0 +1,84 @@
+"""Paths are relative to their file, stay inside the project, and missing ones name their neighbours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.findings import Finding, Span
+from rbxcompose.manifest.files import find, project_of, resolve, shown_name
+
+HERE = Span("robot.yaml", 1, 1, 1, 2)
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    for name in ("home/robots/one/robot.yaml", "home/missions/patrol.yaml", "secret.yaml"):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("rbx: 1\n")
+    return tmp_path / "home"
+
+
+def resolved(written: str, project: Path) -> Path | Finding:
+    return resolve(written, project / "robots/one/robot.yaml", HERE)
+
+
+def refused(written: str, project: Path) -> Finding:
+    found = resolved(written, project)
+    assert isinstance(found, Finding)
+    return found
+
+
+def test_a_project_is_the_nearest_folder_with_robots_or_missions(project: Path) -> None:
+    assert project_of(project / "robots/one/robot.yaml") == project
+    assert project_of(project.parent / "secret.yaml") == project.parent
+
+
+def test_a_path_is_relative_to_the_file_that_writes_it(project: Path) -> None:
+    assert resolved("../../missions/patrol.yaml", project) == project / "missions/patrol.yaml"
+
+
+def test_a_folder_means_its_robot(project: Path) -> None:
+    assert resolved("../one", project) == project / "robots/one/robot.yaml"
+
+
+def test_the_library_is_named_rbx() -> None:
+    found = find("rbx:robots/turtlebot")
+    assert found == find("rbx:robots/turtlebot/robot.yaml")
+    assert isinstance(found, Path)
+    assert found.name == "robot.yaml"
+
+
+@pytest.mark.parametrize(
+    "written", ["../../../secret.yaml", "/etc/passwd", "rbx:../../../etc/passwd", "../../link.yaml"]
+)
+def test_a_path_that_leads_out_of_the_project_is_a_finding(project: Path, written: str) -> None:
+    (project / "link.yaml").symlink_to(project.parent / "secret.yaml")
+    assert refused(written, project).code == "RBX1306"
+
+
+def test_a_missing_file_names_the_nearest_neighbour(project: Path) -> None:
+    finding = refused("../../missions/patrl.yaml", project)
+    assert (finding.code, finding.span, finding.help) == ("RBX1301", HERE, "did you mean 'patrol.yaml'?")
+
+
+def test_a_missing_folder_names_the_folder_where_the_path_ends(project: Path) -> None:
+    assert "the path ends at the folder" in refused("../../mission/x/patrol.yaml", project).help
+
+
+@pytest.mark.parametrize("written", ["a" * 5000, "loop/robot.yaml", "x\x00y", ""])
+def test_an_impossible_path_is_a_finding(project: Path, written: str) -> None:
+    loop = project / "robots/one/loop"
+    loop.symlink_to(loop)
+    (project / "robots/one/robot.yaml").unlink()
+    assert isinstance(resolved(written, project), Finding)
+
+
+def test_files_below_the_current_folder_are_shown_relative_to_it(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(project)
+    assert shown_name(project / "missions/patrol.yaml") == "missions/patrol.yaml"
+    assert shown_name(project.parent / "secret.yaml") == str(project.parent / "secret.yaml")
