@@ -1,0 +1,135 @@
+"""Action clients: a goal is sent, perhaps cancelled, and its end comes exactly once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import count
+from typing import Any, Generic, TypeVar
+
+import xxhash
+
+from rbxcompose.bus.goals import GoalState
+from rbxcompose.bus.local import Node
+from rbxcompose.bus.names import ActionNames
+from rbxcompose.bus.services import Client, Services
+from rbxcompose.bus.topics import Subscription, Topics
+from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo
+from rbxcompose.msgs.types import Action, Message
+from rbxcompose.msgs.unique_identifier_msgs import UUID
+from rbxcompose.qos import Qos
+from rbxcompose.sdk.bound import Ended, Outcome, Reply
+
+G = TypeVar("G", bound=Message)
+R = TypeVar("R", bound=Message)
+F = TypeVar("F", bound=Message)
+
+OUTCOMES = {
+    GoalState.SUCCEEDED: Outcome.SUCCEEDED,
+    GoalState.CANCELED: Outcome.CANCELED,
+    GoalState.ABORTED: Outcome.ABORTED,
+}
+
+
+class SentGoal(Generic[R]):
+    """A goal as its client sees it."""
+
+    def __init__(self, client: ActionClient[Any, R, Any], id: bytes, then: Callable[[Ended[R]], None]) -> None:
+        self.id = id
+        self._client, self._then = client, then
+        self._is_accepted = False
+        self._is_unwanted = False
+
+    def cancel(self) -> None:
+        """Ask the server to end it; `Ended` still comes."""
+        self._is_unwanted = True
+        if self._is_accepted:
+            self._client.ask_to_cancel(self.id)
+
+    def answered(self, reply: Reply[Any]) -> None:
+        """Hear whether the server accepted it."""
+        if reply.response is None:
+            self._client.ask_to_cancel(self.id)  # the answer may have been late, and the goal accepted
+            self._end(Ended(Outcome.LOST, message=reply.error))
+        elif not reply.response.accepted:
+            self._end(Ended(Outcome.REJECTED, message="the server refused it"))
+        else:
+            self._is_accepted = True
+            self._client.ask_for_result(self)
+            if self._is_unwanted:
+                self._client.ask_to_cancel(self.id)
+
+    def resulted(self, reply: Reply[Any]) -> None:
+        """Hear how it ended."""
+        if reply.response is None:
+            self._end(Ended(Outcome.LOST, message=reply.error))
+        elif reply.response.status in OUTCOMES:
+            self._end(Ended(OUTCOMES[reply.response.status], reply.response.result))
+        else:
+            self._end(Ended(Outcome.LOST, message="the server does not know it"))
+
+    def _end(self, ended: Ended[R]) -> None:
+        self._client.forget(self.id)
+        self._then(ended)
+
+
+class ActionClient(Generic[G, R, F]):
+    """Sends goals to an action server."""
+
+    def __init__(
+        self, topics: Topics, services: Services, node: Node, name: str, action: type[Action[G, R, F]]
+    ) -> None:
+        names = ActionNames.of(name)
+        self._action = action
+        self._ids = count(1)
+        self._listeners: dict[bytes, Callable[[F], None]] = {}  # for feedback, by goal
+        self._feedback = Subscription(
+            topics, node, names.feedback, action.FeedbackMessage, Qos.STATE, self._on_feedback
+        )
+        self._send: Client[Any, Any] = Client(services, node, names.send_goal, action.SendGoal)
+        self._cancel = Client(services, node, names.cancel_goal, CancelGoal)
+        self._result: Client[Any, Any] = Client(services, node, names.get_result, action.GetResult)
+
+    @property
+    def is_available(self) -> bool:
+        """Tell whether a server is known."""
+        return self._send.is_available and self._cancel.is_available and self._result.is_available
+
+    def watch(self, changed: Callable[[bool], None]) -> None:
+        """Have `changed` called when a server comes to be known, and when none is known any more."""
+        self._send.watch(changed)  # the last that a server declares
+
+    def __call__(
+        self, goal: G, then: Callable[[Ended[R]], None], feedback: Callable[[F], None] | None = None, /
+    ) -> SentGoal[R]:
+        """Send `goal`; `then` gets its end exactly once."""
+        # Unique among all clients, and the same in each run on a stepped clock.
+        id_ = xxhash.xxh3_128_digest(self._send.gid + next(self._ids).to_bytes(8, "little"))
+        sent: SentGoal[R] = SentGoal(self, id_, then)
+        if feedback is not None:
+            self._listeners[id_] = feedback
+        self._send(self._action.SendGoal.Request(goal_id=UUID(id_), goal=goal), sent.answered)
+        return sent
+
+    def ask_for_result(self, goal: SentGoal[R]) -> None:
+        """Wait for the end of a goal, however long it takes."""
+        self._result(self._action.GetResult.Request(goal_id=UUID(goal.id)), goal.resulted, timeout=math.inf)
+
+    def ask_to_cancel(self, id: bytes) -> None:
+        """Ask for the end of a goal; whether it can still be cancelled, its result will tell."""
+        self._cancel(CancelGoal.Request(goal_info=GoalInfo(goal_id=UUID(id))), lambda reply: None)
+
+    def forget(self, id: bytes) -> None:
+        """Listen no more to feedback on a goal."""
+        self._listeners.pop(id, None)
+
+    def close(self) -> None:
+        """Withdraw the client; the server cancels its goals."""
+        self._feedback.close()
+        for client in (self._send, self._cancel, self._result):
+            client.close()
+
+    def _on_feedback(self, message: Any) -> None:
+        listener = self._listeners.get(message.goal_id.uuid)
+        if listener is not None:
+            listener(message.feedback)

@@ -1,0 +1,175 @@
+"""Action servers: three services and two topics around the core in `goals`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from rbxcompose.bus.goals import Goal, Goals, GoalState
+from rbxcompose.bus.local import Node
+from rbxcompose.bus.names import ActionNames
+from rbxcompose.bus.services import Request, Server, Services
+from rbxcompose.bus.topics import Publisher, Topics
+from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo, GoalStatus, GoalStatusArray
+from rbxcompose.msgs.stamps import NANOSECONDS, to_time
+from rbxcompose.msgs.types import Action, Message
+from rbxcompose.msgs.unique_identifier_msgs import UUID
+from rbxcompose.qos import Qos
+
+G = TypeVar("G", bound=Message)
+R = TypeVar("R", bound=Message)
+F = TypeVar("F", bound=Message)
+
+
+class ServedGoal(Generic[G, R, F]):
+    """A goal as its server sees it. Once it has ended, or a newer one has replaced it, its methods do nothing."""
+
+    def __init__(self, server: ActionServer[G, R, F], goal: Goal[G, R]) -> None:
+        self._server, self._goal = server, goal
+
+    @property
+    def request(self) -> G:
+        """Return the goal as it was sent."""
+        return self._goal.request
+
+    @property
+    def cancel_requested(self) -> bool:
+        """Tell whether the goal should end soon, by `canceled`."""
+        return self._goal.state is GoalState.CANCELING
+
+    def feedback(self, message: F, /) -> None:
+        """Tell the client how far it got."""
+        self._server.tell(self._goal, message)
+
+    def succeeded(self, result: R | None = None, /) -> None:
+        """End the goal well; without a result its zero value is sent."""
+        self._server.end(self._goal, GoalState.SUCCEEDED, result)
+
+    def aborted(self, reason: str = "", result: R | None = None, /) -> None:
+        """End the goal badly; the reason goes to the log."""
+        self._server.end(self._goal, GoalState.ABORTED, result, reason)
+
+    def canceled(self, result: R | None = None, /) -> None:
+        """End the goal because its client or a stop asked for it."""
+        self._server.end(self._goal, GoalState.CANCELED, result)
+
+
+class ActionServer(Generic[G, R, F]):
+    """Carries out one goal at a time. `accept` returns why it refuses a goal, or nothing."""
+
+    def __init__(
+        self,
+        topics: Topics,
+        services: Services,
+        node: Node,
+        name: str,
+        action: type[Action[G, R, F]],
+        accept: Callable[[G], str],
+    ) -> None:
+        names = ActionNames.of(name)
+        self.current: ServedGoal[G, R, F] | None = None  # the goal to carry out; a newer one replaces it
+        self._name, self._action, self._accept = name, action, accept
+        self._process, self._owner = node.process, node.owner
+        self._goals: Goals[G, R] = Goals()
+        self._asked: dict[bytes, list[Request[Any, Any]]] = {}  # for the results of goals that have not ended
+        self._feedback = Publisher(topics, node, names.feedback, action.FeedbackMessage, Qos.STATE)
+        self._status = Publisher(topics, node, names.status, GoalStatusArray, Qos.LATCHED)
+        self._servers: list[Server[Any, Any]] = [
+            Server(services, node, names.cancel_goal, CancelGoal, self._on_cancel),
+            Server(services, node, names.get_result, action.GetResult, self._on_get_result),
+            Server(services, node, names.send_goal, action.SendGoal, self._on_send, self._on_client_left),
+        ]
+
+    def cancel_all(self) -> None:
+        """Ask for the end of the current goal."""
+        self._goals.cancel()
+        self._tell_status()
+
+    def tell(self, goal: Goal[G, R], message: F) -> None:
+        """Publish feedback on a goal that has not ended."""
+        if goal is self._goals.current:
+            self._feedback(self._action.FeedbackMessage(goal_id=UUID(goal.id), feedback=message))
+
+    def end(self, goal: Goal[G, R], state: GoalState, result: R | None, reason: str = "") -> None:
+        """End a goal that has not ended and answer those who asked for its result."""
+        if not self._goals.end(goal, state, self._action.Result() if result is None else result, self._now):
+            return
+        self.current = None
+        if reason:
+            self._log(f"a goal was aborted: {reason}")
+        self._tell_status()
+        for request in self._asked.pop(goal.id, []):
+            self._reply_result(request, goal)
+
+    def close(self) -> None:
+        """Withdraw the server; its goal ends as aborted, its clients hear that the server went away."""
+        if self._goals.current is not None:
+            # Its client must not take this for the goal's own failure, so the result is not sent.
+            self._goals.end(self._goals.current, GoalState.ABORTED, self._action.Result(), self._now)
+            self._tell_status()
+        self.current = None
+        while self._servers:
+            self._servers.pop().close()
+        self._status.close()
+        self._feedback.close()
+
+    @property
+    def _now(self) -> float:
+        return self._process.clock.now()
+
+    def _log(self, text: str) -> None:
+        self._process.log(self._owner, f"{self._name}: {text}")
+
+    def _on_send(self, request: Request[Any, Any]) -> None:
+        response, id_ = self._action.SendGoal.Response, request.message.goal_id.uuid
+        self._goals.forget(self._now)
+        reason = self._accept(request.message.goal) if self._goals.find(id_) is None else "it was sent before"
+        if reason:
+            self._log(f"a goal was refused: {reason}")
+            request.reply(response(accepted=False))
+            return
+        if self._goals.current is not None:
+            self._replace(self._goals.current)
+        goal: Goal[G, R] = Goal(id_, request.message.goal, request.client, self._process.clock.stamp())
+        self._goals.accept(goal)
+        self.current = ServedGoal(self, goal)
+        self._tell_status()
+        request.reply(response(accepted=True, stamp=to_time(goal.accepted)))
+
+    def _replace(self, goal: Goal[G, R]) -> None:
+        if goal.state is GoalState.CANCELING:
+            self.end(goal, GoalState.CANCELED, None)
+        else:
+            self.end(goal, GoalState.ABORTED, None, "replaced by a newer goal")
+
+    def _on_cancel(self, request: Request[CancelGoal.Request, CancelGoal.Response]) -> None:
+        info = request.message.goal_info
+        code, goals = self._goals.cancel(info.goal_id.uuid, info.stamp.sec * NANOSECONDS + info.stamp.nanosec)
+        self._tell_status()
+        request.reply(CancelGoal.Response(return_code=code, goals_canceling=tuple(map(_info, goals))))
+
+    def _on_get_result(self, request: Request[Any, Any]) -> None:
+        self._goals.forget(self._now)
+        goal = self._goals.find(request.message.goal_id.uuid)
+        if goal is None:
+            request.reply(self._action.GetResult.Response(status=GoalState.UNKNOWN, result=self._action.Result()))
+        elif goal.state.is_end:
+            self._reply_result(request, goal)
+        else:
+            self._asked.setdefault(goal.id, []).append(request)
+
+    def _on_client_left(self, client: bytes) -> None:
+        if self._goals.cancel_from(client):
+            self._log("its goal is cancelled: the client went away")
+            self._tell_status()
+
+    def _reply_result(self, request: Request[Any, Any], goal: Goal[G, R]) -> None:
+        request.reply(self._action.GetResult.Response(status=goal.state, result=goal.result))
+
+    def _tell_status(self) -> None:
+        statuses = (GoalStatus(goal_info=_info(goal), status=goal.state) for goal in self._goals)
+        self._status(GoalStatusArray(status_list=tuple(statuses)))
+
+
+def _info(goal: Goal[Any, Any]) -> GoalInfo:
+    return GoalInfo(goal_id=UUID(goal.id), stamp=to_time(goal.accepted))

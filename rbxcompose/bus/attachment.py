@@ -1,0 +1,33 @@
+"""The attachment of every message, request and reply: who sent it, when, and as the how manieth."""
+
+from __future__ import annotations
+
+import struct
+from typing import NamedTuple
+
+_LAYOUT = struct.Struct("<qqB16s")
+_GID_SIZE = 16
+
+
+class Attachment(NamedTuple):
+    """Where a message comes from; ROS drops what comes without it."""
+
+    sequence: int  # counts from 1 for each publisher or client
+    stamp: int  # [ns] when it was sent, by the sender's clock
+    gid: bytes  # 16 bytes that name the sender
+
+    def encode(self) -> bytes:
+        """Return the 33 bytes of the wire."""
+        return _LAYOUT.pack(self.sequence, self.stamp, _GID_SIZE, self.gid)
+
+
+def decode_attachment(data: bytes) -> Attachment:
+    """Read an attachment.
+
+    Raises:
+        ValueError: if `data` is not one.
+    """
+    if len(data) != _LAYOUT.size or data[16] != _GID_SIZE:
+        raise ValueError(f"expected an attachment of {_LAYOUT.size} bytes, got {len(data)}")
+    sequence, stamp, _, sender = _LAYOUT.unpack(data)
+    return Attachment(sequence, stamp, sender)

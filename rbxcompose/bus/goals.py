@@ -1,0 +1,115 @@
+"""Pure core of an action server: its goals and their states, as ROS 2 defines them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Generic, TypeVar
+
+G = TypeVar("G")
+R = TypeVar("R")
+
+KEPT_FOR = 10.0  # [s] that the result of a goal can be asked for after its end
+MOST_KEPT = 100  # ended goals
+
+ANY_GOAL = bytes(16)  # the goal id that stands for none in particular
+
+
+class GoalState(IntEnum):
+    """The states of `action_msgs/GoalStatus`."""
+
+    UNKNOWN = 0
+    ACCEPTED = 1
+    EXECUTING = 2
+    CANCELING = 3
+    SUCCEEDED = 4
+    CANCELED = 5
+    ABORTED = 6
+
+    @property
+    def is_end(self) -> bool:
+        """Tell whether a goal stays in this state."""
+        return self >= GoalState.SUCCEEDED
+
+
+class CancelCode(IntEnum):
+    """The return codes of `action_msgs/CancelGoal`."""
+
+    NONE = 0
+    REJECTED = 1
+    UNKNOWN_GOAL = 2
+    GOAL_TERMINATED = 3
+
+
+@dataclass(slots=True, eq=False)
+class Goal(Generic[G, R]):
+    """A goal that was accepted."""
+
+    id: bytes  # 16 bytes
+    request: G
+    client: bytes  # GID of who sent it
+    accepted: int  # [ns]
+    state: GoalState = GoalState.EXECUTING
+    result: R | None = None
+    ended: float = 0.0  # [s] of robot time
+
+
+class Goals(Generic[G, R]):
+    """The goals of one action: one is carried out at a time, those that ended are remembered for a while."""
+
+    def __init__(self) -> None:
+        self.current: Goal[G, R] | None = None  # the one that has not ended
+        self._goals: dict[bytes, Goal[G, R]] = {}
+
+    def __iter__(self) -> Iterator[Goal[G, R]]:
+        return iter(self._goals.values())
+
+    def find(self, id: bytes) -> Goal[G, R] | None:
+        """Return the goal of that id, if it is still remembered."""
+        return self._goals.get(id)
+
+    def accept(self, goal: Goal[G, R]) -> None:
+        """Take a goal; what was current must have ended, and its id must be new."""
+        if self.current is not None or goal.id in self._goals:
+            raise ValueError("a goal can be accepted only after the current one has ended, and only once")
+        self._goals[goal.id] = self.current = goal
+
+    def end(self, goal: Goal[G, R], state: GoalState, result: R, now: float) -> bool:
+        """Bring a goal to its end at `now` [s]; return False if it had ended before."""
+        if goal is not self.current:
+            return False
+        goal.state, goal.result, goal.ended = state, result, now
+        self.current = None
+        return True
+
+    def cancel(self, id: bytes = ANY_GOAL, stamp: int = 0) -> tuple[CancelCode, list[Goal[G, R]]]:
+        """Ask for the end of goals and return which of them will.
+
+        `id` names one goal, `stamp` [ns] all that were accepted until then; with neither it is all goals.
+        """
+        named = self.find(id)
+        if id != ANY_GOAL and not stamp and named is None:
+            return CancelCode.UNKNOWN_GOAL, []
+        if id != ANY_GOAL and not stamp and named is not self.current:
+            return CancelCode.GOAL_TERMINATED, []
+        goal = self.current
+        is_old = goal is not None and stamp > 0 and goal.accepted <= stamp
+        if goal is None or not (goal is named or is_old or (id == ANY_GOAL and not stamp)):
+            return CancelCode.NONE, []
+        goal.state = GoalState.CANCELING
+        return CancelCode.NONE, [goal]
+
+    def cancel_from(self, client: bytes) -> bool:
+        """Ask for the end of the goal of a client that went away; return whether it has one."""
+        if self.current is None or self.current.client != client:
+            return False
+        self.current.state = GoalState.CANCELING
+        return True
+
+    def forget(self, now: float) -> None:
+        """Drop ended goals that nobody will ask for any more."""
+        ended = [goal for goal in self if goal is not self.current]  # in the order of their ends
+        for place, goal in enumerate(reversed(ended)):
+            if place >= MOST_KEPT or goal.ended < now - KEPT_FOR:
+                del self._goals[goal.id]

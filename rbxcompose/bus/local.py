@@ -1,0 +1,107 @@
+"""What the ends of one process share: by whom a name is served here, and all they need to declare themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import count
+from typing import Generic, TypeVar
+
+from rbxcompose.bus.names import data_key, dds_type, resolve
+from rbxcompose.bus.tokens import EntityKind, NodeToken, endpoint_pattern, gid
+from rbxcompose.bus.transport import Closable, Transport
+from rbxcompose.bus.wire import RosQos, WireProfile
+from rbxcompose.clock import Clock
+from rbxcompose.msgs.types import Interface
+from rbxcompose.scheduler import Scheduler
+
+T = TypeVar("T")
+Route = tuple[str, str]  # full name and ROS type: only ends where both agree are connected
+
+
+class Registry(Generic[T]):
+    """The ends of one kind in this process, by route, in the order in which they were declared."""
+
+    def __init__(self) -> None:
+        self._ends: dict[Route, list[T]] = {}
+
+    def __len__(self) -> int:
+        return sum(map(len, self._ends.values()))
+
+    def at(self, route: Route) -> list[T]:
+        """Return the ends of `route`."""
+        return self._ends.get(route, [])
+
+    def add(self, route: Route, end: T) -> None:
+        """Enter an end."""
+        # A new list, since a loop over the old one may be what brought the end about.
+        self._ends[route] = [*self.at(route), end]
+
+    def remove(self, route: Route, end: T) -> None:
+        """Take an end out."""
+        self._ends[route] = [other for other in self._ends[route] if other is not end]
+        if not self._ends[route]:
+            del self._ends[route]
+
+
+@dataclass(frozen=True, slots=True)
+class Process:
+    """What all ends of a process have in common."""
+
+    scheduler: Scheduler
+    clock: Clock
+    transport: Transport
+    wire: WireProfile
+    domain: int
+    namespace: str  # empty, or with a leading slash
+    log: Callable[[str, str], None]  # owner, text
+    ids: count[int] = field(default_factory=count)
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """The identity of one end: where it is in the process, on the wire, and its name there."""
+
+    route: Route
+    key: str
+    token: str
+    gid: bytes
+
+
+class Node:
+    """A component as a participant: it announces itself, and what it declared is closed with it."""
+
+    def __init__(self, process: Process, owner: str) -> None:
+        self.process = process
+        self.owner = owner
+        self._token = NodeToken(process.domain, process.transport.session, next(process.ids), owner, process.namespace)
+        self._declared: list[Closable] = [process.transport.announce(self._token.key)]
+
+    def endpoint(self, kind: EntityKind, name: str, interface: type[Interface], qos: RosQos) -> Endpoint:
+        """Return the identity of a new end of this node."""
+        process, full_name = self.process, resolve(name, self.process.namespace)
+        type_hash = process.wire.hash_of(interface)
+        token = self._token.endpoint_key(
+            kind, next(process.ids), full_name, dds_type(interface.TYPE), type_hash, process.wire.qos_text(qos)
+        )
+        key = data_key(process.domain, full_name, interface.TYPE, type_hash)
+        return Endpoint((full_name, interface.TYPE), key, token, gid(token))
+
+    def peers(self, kind: EntityKind, name: str, interface: type[Interface]) -> str:
+        """Return the key expression of the tokens of all ends of one kind that have this name and type."""
+        full_name = resolve(name, self.process.namespace)
+        type_hash = self.process.wire.hash_of(interface)
+        return endpoint_pattern(self.process.domain, kind, full_name, dds_type(interface.TYPE), type_hash)
+
+    def announce(self, endpoint: Endpoint) -> Closable:
+        """Let the others know of an end, which must be ready."""
+        return self.process.transport.announce(endpoint.token)
+
+    def keep(self, end: Closable) -> None:
+        """Have `end` closed with the node."""
+        self._declared.append(end)
+
+    def close(self) -> None:
+        """Withdraw all that was declared, the last first."""
+        while self._declared:
+            self._declared.pop().close()

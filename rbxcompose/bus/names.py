@@ -1,0 +1,63 @@
+"""Names on the wire: ROS names, the type names of DDS, Zenoh keys, the parts of an action."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+LONGEST_NAME = 247  # rmw's limit: 255 bytes less the prefixes that some middleware adds
+
+_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+
+
+def name_problem(name: str) -> str:
+    """Return what is wrong with `name` as a ROS name, or nothing if it is fine."""
+    if not name:
+        return "a name cannot be empty"
+    if len(name) > LONGEST_NAME:
+        return f"a name has at most {LONGEST_NAME} characters, this one {len(name)}"
+    if not _NAME.fullmatch(name):
+        return (
+            f"'{name}' is not a ROS name: words of letters, digits and '_', not beginning with a digit, joined by '/'"
+        )
+    return ""
+
+
+def resolve(name: str, namespace: str = "") -> str:
+    """Return the full name: `odom` is `/odom`, in namespace `robot1` it is `/robot1/odom`; `/tf` stays `/tf`.
+
+    Raises:
+        ValueError: if it is not a ROS name.
+    """
+    inner = namespace.strip("/")
+    full = name if name.startswith("/") or not inner else f"{inner}/{name}"
+    if problem := name_problem(full):
+        raise ValueError(problem)
+    return full if full.startswith("/") else f"/{full}"
+
+
+def dds_type(ros_type: str) -> str:
+    """Return the name that DDS has for a ROS type: `std_msgs/msg/String` is `std_msgs::msg::dds_::String_`."""
+    package, kind, name = ros_type.split("/")
+    return f"{package}::{kind}::dds_::{name}_"
+
+
+def data_key(domain: int, full_name: str, ros_type: str, type_hash: str) -> str:
+    """Return the Zenoh key of a topic or a service."""
+    return f"{domain}/{full_name.strip('/')}/{dds_type(ros_type)}/{type_hash}"
+
+
+@dataclass(frozen=True, slots=True)
+class ActionNames:
+    """The names of the three services and two topics that make up an action."""
+
+    send_goal: str
+    get_result: str
+    cancel_goal: str
+    feedback: str
+    status: str
+
+    @classmethod
+    def of(cls, action: str) -> ActionNames:
+        """Return the names for the action named `action`."""
+        return cls(*(f"{action}/_action/{part}" for part in cls.__slots__))

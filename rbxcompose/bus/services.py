@@ -1,0 +1,280 @@
+"""Services: requests by reference within the process, over the transport to others, answered now or later."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import count
+from typing import Any, Generic, TypeVar
+
+from rbxcompose.bus.attachment import Attachment, decode_attachment
+from rbxcompose.bus.classes import SERVICE_QOS
+from rbxcompose.bus.inbox import Inbox
+from rbxcompose.bus.local import Node, Registry
+from rbxcompose.bus.tokens import EntityKind, gid, session_of
+from rbxcompose.bus.transport import Answer, Closable, Question
+from rbxcompose.msgs.cdr import decode, encode
+from rbxcompose.msgs.types import Message, Service
+from rbxcompose.scheduler import Event
+from rbxcompose.sdk.bound import Refused, Reply
+
+Q = TypeVar("Q", bound=Message)
+R = TypeVar("R", bound=Message)
+
+LONGEST_QUEUE = 100  # requests that wait for a server
+LOST = "the server went away"
+
+
+Answered = Callable[[Reply[R]], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Services:
+    """The servers and clients of one process."""
+
+    servers: Registry[Server[Any, Any]] = field(default_factory=Registry)
+    clients: Registry[Client[Any, Any]] = field(default_factory=Registry)
+
+
+class Request(Generic[Q, R]):
+    """A request as its server sees it; it is answered once, now or later."""
+
+    def __init__(self, message: Q, client: bytes, answer: Answered[R]) -> None:
+        self.message = message
+        self.client = client  # GID
+        self._answer: Answered[R] | None = answer
+
+    @property
+    def is_open(self) -> bool:
+        """Tell whether it was not answered yet."""
+        return self._answer is not None
+
+    def reply(self, response: R) -> None:
+        """Answer it."""
+        self._end(Reply(response))
+
+    def fail(self, error: str) -> None:
+        """Tell that there will be no answer, and why."""
+        self._end(Reply(None, error))
+
+    def _end(self, reply: Reply[R]) -> None:
+        if self._answer is not None:
+            answer, self._answer = self._answer, None
+            answer(reply)
+
+
+class Server(Generic[Q, R]):
+    """Has requests answered by `handle`, and tells `client_left` the GID of each client that went away."""
+
+    def __init__(
+        self,
+        services: Services,
+        node: Node,
+        name: str,
+        service: type[Service[Q, R]],
+        handle: Callable[[Request[Q, R]], None],
+        client_left: Callable[[bytes], None] | None = None,
+    ) -> None:
+        endpoint = node.endpoint(EntityKind.SERVER, name, service, SERVICE_QOS)
+        self.route = endpoint.route
+        self.malformed = 0  # requests that could not be read
+        self._services, self._process, self._owner, self._request = services, node.process, node.owner, service.Request
+        self._handle, self._client_left = handle, client_left
+        self._open: list[Request[Q, R]] = []
+        post, transport = self._process.scheduler.post, self._process.transport
+        self._inbox: Inbox[Request[Q, R] | Question] = Inbox(node.owner, LONGEST_QUEUE, self._take, post)
+        self._left: Inbox[bytes] = Inbox(node.owner, None, self._leave, post)
+        self._declared: list[Closable] = [
+            transport.serve(endpoint.key, lambda asked: self._inbox.put(asked, transport.wake))
+        ]
+        if client_left is not None:
+            clients = node.peers(EntityKind.CLIENT, name, service)
+            self._declared.append(transport.watch(clients, self._client_changed))
+        self._declared.append(node.announce(endpoint))  # last: who sees it may ask
+        services.servers.add(self.route, self)
+        self._tell_clients()
+
+    def ask(self, request: Request[Q, R]) -> None:
+        """Queue a request of this process; it is handled at the same instant."""
+        self._inbox.put(request, self._process.scheduler.post)
+
+    def leave(self, client: bytes) -> None:
+        """Hear that a client of this process went away."""
+        self._left.put(client, self._process.scheduler.post)
+
+    def close(self) -> None:
+        """Withdraw the server; whoever waits for an answer hears that it went away."""
+        self._services.servers.remove(self.route, self)
+        while self._declared:
+            self._declared.pop().close()
+        self._left.close()
+        for waiting in (*self._open, *self._inbox.close()):
+            waiting.fail(LOST)
+        self._tell_clients()
+
+    def _tell_clients(self) -> None:
+        for client in self._services.clients.at(self.route):
+            client.look_again()
+
+    def _client_changed(self, token: str, is_there: bool) -> None:
+        transport = self._process.transport
+        if not is_there and session_of(token) != transport.session:
+            self._left.put(gid(token), transport.wake)
+
+    def _leave(self, client: bytes) -> None:
+        if self._client_left is not None:
+            self._client_left(client)
+
+    def _take(self, item: Request[Q, R] | Question) -> None:
+        request = item if isinstance(item, Request) else self._read(item)
+        if request is not None:
+            self._open = [earlier for earlier in self._open if earlier.is_open]
+            self._open.append(request)
+            try:
+                self._handle(request)
+            except Refused as refusal:
+                request.fail(str(refusal))
+            except Exception as error:
+                request.fail(f"{type(error).__name__}: {error}")
+                raise
+
+    def _read(self, question: Question) -> Request[Q, R] | None:
+        try:
+            asker = decode_attachment(question.attachment)
+            return Request(decode(self._request, question.payload), asker.gid, partial(self._answer, question, asker))
+        except ValueError as error:
+            question.fail(f"malformed request: {error}")
+            self.malformed += 1
+            if self.malformed == 1:
+                self._process.log(self._owner, f"dropped a request to {self.route[0]}: {error}")
+            return None
+
+    def _answer(self, question: Question, asker: Attachment, reply: Reply[R]) -> None:
+        if reply.response is None:
+            question.fail(reply.error)
+        else:
+            # The asker's sequence number and GID are how ROS finds what the reply belongs to.
+            question.reply(encode(reply.response), asker._replace(stamp=self._process.clock.stamp()).encode())
+
+
+@dataclass(slots=True)
+class _Waiting(Generic[R]):
+    """A request that was sent and not answered yet."""
+
+    then: Answered[R]
+    servers: frozenset[str] = frozenset()  # tokens of the servers in other processes that were asked
+    timer: Event | None = None
+    remote: Closable | None = None
+
+    def forget(self) -> None:
+        if self.timer is not None:
+            self.timer.cancel()
+        if self.remote is not None:
+            self.remote.close()
+
+
+class Client(Generic[Q, R]):
+    """Asks a service. A server of the same process is preferred; replies come by the scheduler."""
+
+    def __init__(self, services: Services, node: Node, name: str, service: type[Service[Q, R]]) -> None:
+        endpoint = node.endpoint(EntityKind.CLIENT, name, service, SERVICE_QOS)
+        self.route, self.gid = endpoint.route, endpoint.gid
+        self._services, self._process, self._owner = services, node.process, node.owner
+        self._key, self._response = endpoint.key, service.Response
+        self._sequence = count(1)
+        self._waiting: dict[int, _Waiting[R]] = {}
+        self._servers: set[str] = set()  # tokens of servers in other processes
+        self._watchers: list[Callable[[bool], None]] = []
+        self._inbox: Inbox[Callable[[], None]] = Inbox(
+            node.owner, None, lambda callback: callback(), self._process.scheduler.post
+        )
+        self._tokens = self._process.transport.watch(node.peers(EntityKind.SERVER, name, service), self._server_changed)
+        self._token = node.announce(endpoint)
+        services.clients.add(self.route, self)
+        self._was_available = self.is_available
+
+    @property
+    def is_available(self) -> bool:
+        """Tell whether a server is known."""
+        return bool(self._services.servers.at(self.route) or self._servers)
+
+    def watch(self, changed: Callable[[bool], None]) -> None:
+        """Have `changed` called whenever a server comes to be known, and when none is known any more."""
+        self._watchers.append(changed)
+
+    def __call__(self, request: Q, then: Answered[R], /, *, timeout: float = 5.0) -> None:
+        """Send `request`; `then` gets the reply, or an error after `timeout` [s] or if there is no server."""
+        sequence = next(self._sequence)
+        waiting = self._waiting[sequence] = _Waiting(then, frozenset(self._servers))
+        if math.isfinite(timeout):
+            late = partial(self._end, sequence, Reply(None, f"no reply within {timeout:g} s"))
+            waiting.timer = self._process.scheduler.at(self._process.scheduler.now + timeout, self._owner, late)
+        if local := self._services.servers.at(self.route):
+            waiting.servers = frozenset()
+            local[0].ask(Request(request, self.gid, partial(self._answered, sequence)))
+        elif self._servers:
+            source = Attachment(sequence, self._process.clock.stamp(), self.gid)
+            waiting.remote = self._process.transport.ask(
+                self._key, encode(request), source.encode(), partial(self._answered_from_afar, sequence)
+            )
+        else:
+            self._answered(sequence, Reply(None, f"no server of {self.route[0]} is known"))
+
+    def look_again(self) -> None:
+        """Hear that servers of this process have changed."""
+        self._inbox.put(self._look, self._process.scheduler.post)
+
+    def close(self) -> None:
+        """Withdraw the client and forget its requests; servers hear that it went away."""
+        self._services.clients.remove(self.route, self)
+        self._token.close()
+        self._tokens.close()
+        self._inbox.close()
+        while self._waiting:
+            self._waiting.popitem()[1].forget()
+        for server in self._services.servers.at(self.route):
+            server.leave(self.gid)
+
+    def _answered(self, sequence: int, reply: Reply[R]) -> None:
+        self._inbox.put(partial(self._end, sequence, reply), self._process.scheduler.post)
+
+    def _answered_from_afar(self, sequence: int, answer: Answer) -> None:
+        self._inbox.put(partial(self._read, sequence, answer), self._process.transport.wake)
+
+    def _server_changed(self, token: str, is_there: bool) -> None:
+        transport = self._process.transport
+        if session_of(token) != transport.session:
+            self._inbox.put(partial(self._note, token, is_there), transport.wake)
+
+    def _note(self, token: str, is_there: bool) -> None:
+        if is_there:
+            self._servers.add(token)
+        else:
+            self._servers.discard(token)
+            for sequence, waiting in list(self._waiting.items()):
+                if token in waiting.servers:
+                    self._end(sequence, Reply(None, LOST))
+        self._look()
+
+    def _look(self) -> None:
+        if self._was_available != self.is_available:
+            self._was_available = self.is_available
+            for watcher in self._watchers:
+                watcher(self._was_available)
+
+    def _read(self, sequence: int, answer: Answer) -> None:
+        if answer.error:
+            self._end(sequence, Reply(None, answer.error))
+            return
+        try:
+            self._end(sequence, Reply(decode(self._response, answer.payload)))
+        except ValueError as error:
+            self._end(sequence, Reply(None, f"malformed reply: {error}"))
+
+    def _end(self, sequence: int, reply: Reply[R]) -> None:
+        waiting = self._waiting.pop(sequence, None)
+        if waiting is not None:
+            waiting.forget()
+            waiting.then(reply)

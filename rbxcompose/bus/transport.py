@@ -1,0 +1,146 @@
+"""What the bus needs from a transport between processes, and the transport that reaches nobody.
+
+Callbacks given to a transport are called in its own threads: they may only put things into an inbox.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from rbxcompose.qos import Qos
+
+
+class Closable(Protocol):
+    """Something that was declared and can be withdrawn."""
+
+    def close(self) -> None:
+        """Withdraw it; a second time does nothing."""
+        ...
+
+
+class Arrival(Protocol):
+    """Bytes that came from another process."""
+
+    @property
+    def payload(self) -> bytes:
+        """Return the encoded message."""
+        ...
+
+    @property
+    def attachment(self) -> bytes:
+        """Return the encoded attachment, empty if there was none."""
+        ...
+
+
+class Question(Arrival, Protocol):
+    """A request that came from another process; it is answered once, now or later."""
+
+    def reply(self, payload: bytes, attachment: bytes) -> None:
+        """Answer it."""
+        ...
+
+    def fail(self, error: str) -> None:
+        """Tell that there will be no answer, and why."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What became of a request: a payload, or an error."""
+
+    payload: bytes = b""
+    error: str = ""
+
+
+class RemotePublisher(Closable, Protocol):
+    """Sends to the subscribers in other processes."""
+
+    @property
+    def has_match(self) -> bool:
+        """Tell whether anybody would receive it, now or (if latched) later."""
+        ...
+
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        """Send one message."""
+        ...
+
+
+class Transport(Protocol):
+    """Carries messages between processes. Everything but `wake` is called from the scheduler's thread only."""
+
+    session: str  # names this process among all
+
+    def wake(self, owner: str, callback: Callable[[], None]) -> None:
+        """Have `callback` run for `owner` by the scheduler; any thread may call it."""
+        ...
+
+    def publisher(self, key: str, qos: Qos) -> RemotePublisher:
+        """Declare a publisher; a latched one keeps its last message for late subscribers."""
+        ...
+
+    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Closable:
+        """Receive what other processes publish; a latched one also what they published last."""
+        ...
+
+    def serve(self, key: str, asked: Callable[[Question], None]) -> Closable:
+        """Receive the requests of other processes."""
+        ...
+
+    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Closable:
+        """Send a request. An answer or an error comes once the server has one or is gone; closing forgets it."""
+        ...
+
+    def announce(self, token: str) -> Closable:
+        """Show a token for as long as it is not closed and this process lives."""
+        ...
+
+    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Closable:
+        """Hear which tokens match: those that exist now, those that come (True), those that go (False)."""
+        ...
+
+    def close(self) -> None:
+        """Withdraw everything and leave."""
+        ...
+
+
+class Nowhere:
+    """The transport of a process that is alone: it reaches nobody and nobody reaches it."""
+
+    session = "0"
+    has_match = False
+
+    def wake(self, owner: str, callback: Callable[[], None]) -> None:
+        """Refuse: without other processes nothing arrives."""
+        raise RuntimeError(f"something arrived for '{owner}' from nowhere")
+
+    def publisher(self, key: str, qos: Qos) -> Nowhere:
+        """Declare a publisher without subscribers."""
+        return self
+
+    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Nowhere:
+        """Receive nothing."""
+        return self
+
+    def serve(self, key: str, asked: Callable[[Question], None]) -> Nowhere:
+        """Receive no requests."""
+        return self
+
+    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Nowhere:
+        """Refuse: no token of a server was ever seen."""
+        raise RuntimeError(f"no server of {key} can be reached")
+
+    def announce(self, token: str) -> Nowhere:
+        """Show a token to nobody."""
+        return self
+
+    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Nowhere:
+        """See no tokens."""
+        return self
+
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        """Send to nobody."""
+
+    def close(self) -> None:
+        """Withdraw nothing."""

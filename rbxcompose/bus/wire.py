@@ -1,0 +1,63 @@
+"""Wire profiles: in what the distributions of ROS 2 differ on Zenoh, and how quality of service is written there.
+
+Keys, payloads and the 33-byte attachment are the same for all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from rbxcompose.msgs.types import Interface
+
+DEFAULT_DEPTH = 42  # of rmw_zenoh, since its version 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class RosQos:
+    """Quality of service in the words of ROS; the defaults are those of rmw_zenoh."""
+
+    is_reliable: bool = True
+    is_transient_local: bool = False
+    keeps_all: bool = False
+    depth: int = DEFAULT_DEPTH
+
+
+@dataclass(frozen=True, slots=True)
+class WireProfile:
+    """What a distribution puts on the wire in its own way."""
+
+    name: str
+    has_type_hashes: bool = True
+    default_qos: RosQos = field(default_factory=RosQos)
+
+    def hash_of(self, interface: type[Interface]) -> str:
+        """Return the last chunk of the data key; parties with another one never meet."""
+        return interface.HASH if self.has_type_hashes else "TypeHashNotSupported"
+
+    def qos_text(self, qos: RosQos) -> str:
+        """Return `qos` as tokens write it: what equals the default is left out.
+
+        Writing a default would be read in the same way, but GIDs are made from the text of the token.
+        """
+        default = self.default_qos
+        reliability = _unless(qos.is_reliable == default.is_reliable, 1 if qos.is_reliable else 2)
+        durability = _unless(qos.is_transient_local == default.is_transient_local, 1 if qos.is_transient_local else 2)
+        history = _unless(qos.keeps_all == default.keeps_all, 2 if qos.keeps_all else 1)
+        depth = _unless(qos.depth == default.depth, qos.depth)
+        # Deadline, lifespan and liveliness are never set.
+        return f"{reliability}:{durability}:{history},{depth}:,:,:,,"
+
+
+def _unless(is_default: bool, value: int) -> str:
+    return "" if is_default else str(value)
+
+
+WIRE_PROFILES = {
+    profile.name: profile
+    for profile in (
+        WireProfile("humble", has_type_hashes=False),
+        WireProfile("jazzy"),
+        WireProfile("kilted"),
+        WireProfile("lyrical"),
+    )
+}

@@ -1,0 +1,73 @@
+"""Zenoh sessions: one peer for each process of a robot, and the router through which they find each other.
+
+Nothing is left to Zenoh's defaults, which look for strangers on every network.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+from collections.abc import Mapping
+
+import zenoh
+
+LEASE = 2000  # [ms] until a link that went silent counts as lost
+
+_COMMON: Mapping[str, object] = {
+    "scouting/multicast/enabled": False,
+    "scouting/gossip/enabled": True,  # without it, two peers of one router never exchange anything
+    "scouting/delay": 0,  # a router would wait for as long before it opens
+    "timestamping/enabled": True,  # the caches of latched topics need it
+    "transport/link/tx/lease": LEASE,
+}
+
+
+def peer_settings(router: str) -> dict[str, object]:
+    """Return the configuration of a peer that finds others through `router` (`tcp/127.0.0.1:7447`)."""
+    return {
+        **_COMMON,
+        "mode": "peer",
+        "listen/endpoints": ["tcp/127.0.0.1:0"],  # other peers connect to it once they know of each other
+        "connect/endpoints": [router],
+        "connect/retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2},
+        "connect/timeout_ms": -1,  # goes on trying for ever, in the background; 0 would mean once
+        "connect/exit_on_failure": False,
+    }
+
+
+def router_settings(port: int) -> dict[str, object]:
+    """Return the configuration of a router on the loopback interface."""
+    return {
+        **_COMMON,
+        "mode": "router",
+        "listen/endpoints": [f"tcp/127.0.0.1:{port}"],
+        "listen/timeout_ms": 0,
+        "listen/exit_on_failure": True,
+        "connect/endpoints": [],
+    }
+
+
+def open_peer(router: str) -> zenoh.Session:
+    """Open the session of a process; the router need not be there yet."""
+    return zenoh.open(_config(peer_settings(router)))
+
+
+def open_router(port: int) -> zenoh.Session:
+    """Open a router.
+
+    Raises:
+        OSError: if `port` is taken.
+    """
+    try:
+        return zenoh.open(_config(router_settings(port)))
+    except zenoh.ZError as error:
+        if "os error 98" not in str(error):
+            raise
+        raise OSError(errno.EADDRINUSE, f"port {port} is taken") from error
+
+
+def _config(settings: Mapping[str, object]) -> zenoh.Config:
+    config = zenoh.Config()
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config

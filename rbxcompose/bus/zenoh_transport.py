@@ -1,0 +1,217 @@
+"""The transport over Zenoh. Its callbacks run in Zenoh's own threads, where a slow one would stall the session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import zenoh
+from zenoh import ext
+from zenoh.handlers import Callback
+
+from rbxcompose.bus.classes import SERVICE_SENDING, Sending, sending
+from rbxcompose.bus.inbox import Post
+from rbxcompose.bus.transport import Answer, Arrival, Closable, Question, RemotePublisher
+from rbxcompose.qos import Qos
+
+HEARTBEAT = 0.5  # [s] after a latched message, its sequence number is told again
+FOREVER = 1e9  # [s]; requests have deadlines in robot time, of which Zenoh knows nothing
+GONE = "the server went away"
+
+
+class ZenohTransport:
+    """Everything that one process declares on its session."""
+
+    def __init__(self, session: zenoh.Session, wake: Post) -> None:
+        self.session = str(session.zid())
+        self._session, self._wake = session, wake
+        self._declared: dict[_Declared, None] = {}  # an ordered set
+
+    def wake(self, owner: str, callback: Callable[[], None]) -> None:
+        """Have `callback` run for `owner` by the scheduler."""
+        self._wake(owner, callback)
+
+    def publisher(self, key: str, qos: Qos) -> RemotePublisher:
+        """Declare a publisher; a latched one keeps its last message for late subscribers."""
+        options = _options(sending(qos))
+        if qos is not Qos.LATCHED:
+            return _Publisher(self._declared, self._session.declare_publisher(key, **options))
+        latched = ext.declare_advanced_publisher(
+            self._session,
+            key,
+            cache=ext.CacheConfig(1),
+            publisher_detection=True,
+            sample_miss_detection=ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=HEARTBEAT),
+            **options,
+        )
+        return _LatchedPublisher(self._declared, latched)
+
+    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Closable:
+        """Receive what other processes publish; a latched one also what they published last."""
+        handler = _direct(lambda sample: arrived(_Arrival(sample)))
+        if qos is not Qos.LATCHED:
+            return self._keep(self._session.declare_subscriber(key, handler, allowed_origin=zenoh.Locality.REMOTE))
+        return self._keep(
+            ext.declare_advanced_subscriber(
+                self._session,
+                key,
+                handler,
+                allowed_origin=zenoh.Locality.REMOTE,
+                history=ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
+                recovery=ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+            )
+        )
+
+    def serve(self, key: str, asked: Callable[[Question], None]) -> Closable:
+        """Receive the requests of other processes."""
+        handler = _direct(lambda query: asked(_Question(key, query)))
+        return self._keep(
+            self._session.declare_queryable(key, handler, complete=True, allowed_origin=zenoh.Locality.REMOTE)
+        )
+
+    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Closable:
+        """Send a request. An answer or an error comes once the server has one or is gone; closing forgets it."""
+        token = zenoh.CancellationToken()
+        # The query ends with `drop`: after an answer that is nothing new, without one the server is gone.
+        handler = _direct(lambda reply: answered(_answer(reply)), lambda: answered(Answer(error=GONE)))
+        self._session.get(
+            key,
+            handler,
+            payload=payload,
+            attachment=attachment,
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=FOREVER,
+            cancellation_token=token,
+            **_options(SERVICE_SENDING, "reliability"),
+        )
+        return _Asked(token)
+
+    def announce(self, token: str) -> Closable:
+        """Show a token for as long as it is not closed and this process lives."""
+        return self._keep(self._session.liveliness().declare_token(token))
+
+    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Closable:
+        """Hear which tokens match: those that exist now, those that come (True), those that go (False)."""
+        handler = _direct(lambda sample: changed(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
+        return self._keep(self._session.liveliness().declare_subscriber(pattern, handler, history=True))
+
+    def close(self) -> None:
+        """Withdraw everything and close the session, which would hang with a latched subscription left."""
+        for declared in reversed(list(self._declared)):
+            declared.close()
+        self._session.close()  # type: ignore[no-untyped-call]
+
+    def _keep(self, entity: _Entity) -> Closable:
+        return _Declared(self._declared, entity)
+
+
+class _Entity(Protocol):
+    def undeclare(self) -> Any: ...
+
+
+class _Declared:
+    """Something that lives on the session until it is closed."""
+
+    def __init__(self, declared: dict[_Declared, None], entity: _Entity) -> None:
+        self._declared, self._entity = declared, entity
+        declared[self] = None
+
+    def close(self) -> None:
+        if self in self._declared:
+            del self._declared[self]
+            self._entity.undeclare()
+
+
+class _Publisher(_Declared):
+    def __init__(self, declared: dict[_Declared, None], publisher: zenoh.Publisher) -> None:
+        super().__init__(declared, publisher)
+        self.has_match = False
+        self._publisher = publisher
+        # A listener, since asking for the status costs as much as sending. It tells of changes only; and unlike its
+        # type stub says, the status is an object, which is always true.
+        publisher.declare_matching_listener(_direct(self._match))
+        status: Any = publisher.matching_status
+        if status.matching:
+            self.has_match = True
+
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        self._publisher.put(payload, attachment=attachment)
+
+    def _match(self, status: zenoh.MatchingStatus) -> None:
+        self.has_match = status.matching
+
+
+class _LatchedPublisher(_Declared):
+    has_match = True  # if nobody now, then somebody later
+
+    def __init__(self, declared: dict[_Declared, None], publisher: ext.AdvancedPublisher) -> None:
+        super().__init__(declared, publisher)
+        self._publisher = publisher
+
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        self._publisher.put(payload, attachment=attachment)
+
+
+class _Arrival:
+    """A sample; its bytes are copied only if somebody takes them."""
+
+    __slots__ = ("_sample",)
+
+    def __init__(self, sample: zenoh.Sample | zenoh.Query) -> None:
+        self._sample = sample
+
+    @property
+    def payload(self) -> bytes:
+        payload = self._sample.payload
+        return payload.to_bytes() if payload is not None else b""
+
+    @property
+    def attachment(self) -> bytes:
+        attachment = self._sample.attachment
+        return attachment.to_bytes() if attachment is not None else b""
+
+
+class _Question(_Arrival):
+    __slots__ = ("_key", "_query")
+
+    def __init__(self, key: str, query: zenoh.Query) -> None:
+        super().__init__(query)
+        self._key, self._query = key, query
+
+    def reply(self, payload: bytes, attachment: bytes) -> None:
+        with self._query:  # it is over for the asker once it is left
+            self._query.reply(self._key, payload, attachment=attachment)
+
+    def fail(self, error: str) -> None:
+        with self._query:
+            self._query.reply_err(error)
+
+
+class _Asked:
+    def __init__(self, token: zenoh.CancellationToken) -> None:
+        self._token = token
+
+    def close(self) -> None:
+        self._token.cancel()  # type: ignore[no-untyped-call]
+
+
+def _answer(reply: zenoh.Reply) -> Answer:
+    if reply.ok is not None:
+        return Answer(reply.ok.payload.to_bytes())
+    return Answer(error=reply.err.payload.to_string() if reply.err is not None else GONE)
+
+
+def _direct(callback: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Callback[Any]:
+    return Callback(callback, drop, indirect=False)  # no thread and no bounded channel in between
+
+
+def _options(how: Sending, *without: str) -> dict[str, Any]:
+    options = {
+        "priority": getattr(zenoh.Priority, how.priority),
+        "express": how.is_express,
+        "congestion_control": zenoh.CongestionControl.BLOCK if how.blocks else zenoh.CongestionControl.DROP,
+        "reliability": zenoh.Reliability.RELIABLE if how.is_reliable else zenoh.Reliability.BEST_EFFORT,
+        "allowed_destination": zenoh.Locality.REMOTE,
+    }
+    return {name: value for name, value in options.items() if name not in without}

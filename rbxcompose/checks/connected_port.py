@@ -1,0 +1,44 @@
+"""A port that is connected, but not there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, suggest
+from rbxcompose.model.robot import Robot
+from rbxcompose.sdk.ports import Looks
+
+
+@check("RBX3007")
+def connected_port(robot: Robot) -> Iterator[Finding]:
+    """`connect:` names a port that the component does not have
+
+    Bad:
+    ```yaml
+    components:
+      base:
+        type: diff_drive_sim
+        connect:
+          odometry: wheels/odometry
+    ```
+    Good:
+    ```yaml
+    components:
+      base:
+        type: diff_drive_sim
+        connect:
+          odom: wheels/odometry
+    ```
+    """
+    for name, entry in robot.manifest.components.items():
+        if name not in robot.parts:
+            continue
+        ports = [end.name for end in robot.parts[name].ends if not isinstance(end.port, Looks)]
+        for port in entry.options.connect:
+            if port not in ports:
+                yield connected_port.at(
+                    robot.key("components", name, "connect", port),
+                    f"'{name}' has no port '{port}'",
+                    help=suggest(port, ports, "its ports"),
+                )

@@ -1,0 +1,56 @@
+"""Equal priorities in a mux."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX3104")
+def mux_priority(robot: Robot) -> Iterator[Finding]:
+    """Two inputs of a mux have the same priority
+
+    When both talk, nothing says which one should win.
+
+    Bad:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          teleop:
+            priority: 10
+            timeout: 0.5 s
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+    ```
+    Good:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          teleop:
+            priority: 100
+            timeout: 0.5 s
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+    ```
+    """
+    for mux, entry in robot.manifest.muxes.items():
+        first: dict[int, str] = {}
+        for name, source in entry.inputs.items():
+            other = first.setdefault(source.priority, name)
+            if other != name:
+                yield mux_priority.at(
+                    robot.value("muxes", mux, "inputs", name, "priority"),
+                    f"two inputs of mux '{mux}' have the same priority {source.priority}",
+                    label=f"input '{name}'",
+                    help="the larger priority wins: give each input its own",
+                    related=[Related(robot.value("muxes", mux, "inputs", other, "priority"), f"input '{other}'")],
+                )

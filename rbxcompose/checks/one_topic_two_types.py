@@ -1,0 +1,49 @@
+"""One topic with two types."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.robot import Robot
+from rbxcompose.sdk.ports import Looks
+
+
+@check("RBX3002")
+def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
+    """Two ports of one topic have different types
+
+    The type is part of the address on the wire: the two would never hear of each other, and nothing would say so.
+
+    Bad:
+    ```yaml
+    components:
+      base:
+        type: diff_drive_sim
+        connect:
+          odom: cmd_vel
+    ```
+    Good:
+    ```yaml
+    components:
+      base:
+        type: diff_drive_sim
+        connect:
+          odom: wheel_odometry
+    ```
+    """
+    ends = [end for end in robot.ends if not isinstance(end.port, Looks)]
+    for topic, group in groupby(sorted(ends, key=lambda end: end.topic), key=lambda end: end.topic):
+        first, *others = sorted(group, key=robot.end_span)
+        for other in others:
+            if other.type_name != first.type_name:
+                yield one_topic_two_types.at(
+                    robot.end_span(other),
+                    f"'{topic}' is {first.type_name} for '{first.instance}', "
+                    f"but {other.type_name} for '{other.instance}'",
+                    label=f"its port '{other.name}'",
+                    help="give one of them another topic with 'connect:'",
+                    related=[Related(robot.end_span(first), f"its port '{first.name}'")],
+                )

@@ -1,0 +1,35 @@
+"""A type that exists only in simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX8001")
+def only_simulated(robot: Robot) -> Iterator[Finding]:
+    """A component that exists only in simulation cannot run on the real robot
+
+    `--real` runs drivers. A type such as `battery_sim` has none.
+
+    Bad: `rbxcompose up robot.yaml --real`, with
+    ```yaml
+    components:
+      battery:
+        type: battery_sim
+        runtime: 45 s
+    ```
+    Good: leave out `--real`, or take a type that has a driver.
+    """
+    if robot.manifest.is_simulated:
+        return
+    for part in robot.parts.values():
+        if part.cls.simulated:
+            yield only_simulated.at(
+                robot.value(*part.path, "type"),
+                f"'{part.name}' exists only in simulation: '{part.type_name}'",
+                help="run it without '--real', or take a type that drives the real thing",
+            )

@@ -1,0 +1,48 @@
+"""A start order that cannot be kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, suggest
+from rbxcompose.model.robot import Robot
+from rbxcompose.plan.order import cycle_of
+
+
+@check("RBX3006")
+def start_order(robot: Robot) -> Iterator[Finding]:
+    """`starts_after:` names no component, or goes round in a circle
+
+    Each name must be a component of the robot, and following the names must come to an end.
+
+    Bad:
+    ```yaml
+    components:
+      base:
+        type: diff_drive_sim
+        starts_after: [base]
+    ```
+    Good:
+    ```yaml
+    components:
+      base:
+        type: diff_drive_sim
+        starts_after: [battery]
+    ```
+    """
+    after = {name: part.starts_after for name, part in robot.parts.items()}
+    for name, part in robot.parts.items():
+        for index, other in enumerate(part.starts_after):
+            if other not in robot.parts and other not in robot.manifest.components:
+                yield start_order.at(
+                    robot.value(*part.path, "starts_after", index),
+                    f"'{name}' starts after a component that the robot does not have: '{other}'",
+                    help=suggest(other, robot.parts, "components of this robot"),
+                )
+    if cycle := cycle_of(after):
+        yield start_order.at(
+            robot.value(*robot.parts[cycle[0]].path, "starts_after"),
+            f"the start order goes round in a circle: {' after '.join([*cycle, cycle[0]])}",
+            help="leave one of them out",
+        )

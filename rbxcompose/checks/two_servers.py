@@ -1,0 +1,55 @@
+"""Two servers of one service or action."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.robot import Robot
+from rbxcompose.sdk.ports import Serves, ServesAction
+
+
+@check("RBX3008")
+def two_servers(robot: Robot) -> Iterator[Finding]:
+    """Two components serve the same service or action
+
+    Who asks would be answered by one of them, nobody knows which.
+
+    Bad:
+    ```yaml
+    components:
+      battery:
+        type: battery_sim
+        runtime: 45 s
+      spare:
+        type: battery_sim
+        runtime: 45 s
+    ```
+    Good:
+    ```yaml
+    components:
+      battery:
+        type: battery_sim
+        runtime: 45 s
+      spare:
+        type: battery_sim
+        runtime: 45 s
+        connect:
+          battery_level: spare/battery_level
+          set_battery_level: spare/set_battery_level
+    ```
+    """
+    first: dict[str, str] = {}
+    for end in robot.ends:
+        if not isinstance(end.port, Serves | ServesAction):
+            continue
+        other = first.setdefault(end.topic, end.instance)
+        if other != end.instance:
+            yield two_servers.at(
+                robot.part_span(end.instance),
+                f"'{end.instance}' and '{other}' both serve '{end.topic}'",
+                label="this one",
+                help=f"give one of them another name: 'connect: {{{end.name}: ...}}'",
+                related=[Related(robot.part_span(other), "and this one")],
+            )

@@ -1,0 +1,74 @@
+"""Two writers on one command topic."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+
+from rbxcompose.checking import check
+from rbxcompose.checks.mux_source import missing
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.robot import Robot
+from rbxcompose.model.wiring import End
+from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Out
+
+
+def is_command(end: End) -> bool:
+    """Tell whether commands leave at this end."""
+    return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND
+
+
+@check("RBX3001")
+def two_writers(robot: Robot) -> Iterator[Finding]:
+    """Two components write commands on one topic without a mux
+
+    What listens would follow the one that spoke last, so the robot jerks between the two. A mux decides by priority
+    who is let through.
+
+    Bad:
+    ```yaml
+    components:
+      go_to:
+        type: go_to
+      follow:
+        type: go_to
+        connect:
+          go_to: follow
+    ```
+    Good:
+    ```yaml
+    components:
+      go_to:
+        type: go_to
+      follow:
+        type: go_to
+        connect:
+          go_to: follow
+    muxes:
+      cmd_vel:
+        inputs:
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+          follow:
+            from: follow
+            priority: 20
+            timeout: 0.5 s
+    ```
+    """
+    commands = sorted(filter(is_command, robot.ends), key=lambda end: end.topic)
+    for topic, ends in groupby(commands, key=lambda end: end.topic):
+        mux = robot.manifest.muxes.get(topic.strip("/"))
+        if mux and any(one.source and missing(robot, one.source) for one in mux.inputs.values()):
+            continue  # the mux was to take one of them, and its mistake is said at its own place
+        first, *others = sorted(ends, key=lambda end: robot.part_span(end.instance))
+        for other in others:
+            yield two_writers.at(
+                robot.part_span(other.instance),
+                f"'{other.instance}' and '{first.instance}' both write commands on '{topic}'",
+                label="this one",
+                help=f"put both into a mux: 'muxes: {{{topic.strip('/')}: ...}}' with an input 'from:' each",
+                related=[Related(robot.part_span(first.instance), "and this one")],
+            )

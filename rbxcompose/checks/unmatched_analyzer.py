@@ -1,0 +1,42 @@
+"""An analyzer that matches nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.diagnostics.core import Analyzer
+from rbxcompose.findings import Finding, suggest
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX5001")
+def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
+    """A pattern of an analyzer matches no component
+
+    The group would stay empty, or miss what it was meant to show.
+
+    Bad:
+    ```yaml
+    diagnostics:
+      analyzers:
+        power:
+          match: [batery]
+    ```
+    Good:
+    ```yaml
+    diagnostics:
+      analyzers:
+        power:
+          match: [battery]
+    ```
+    """
+    for name, analyzer in robot.manifest.diagnostics.analyzers.items():
+        for index, pattern in enumerate(analyzer.match):
+            known = {*robot.parts, *robot.manifest.components}
+            if not any(Analyzer((pattern,)).matches(part) for part in known):
+                yield unmatched_analyzer.at(
+                    robot.value("diagnostics", "analyzers", name, "match", index),
+                    f"analyzer '{name}' matches no component with '{pattern}'",
+                    help=suggest(pattern, known, "components of this robot"),
+                )

@@ -1,0 +1,75 @@
+"""The simulated battery."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.msgs.rbxcompose_msgs import SetBatteryLevel
+from rbxcompose.msgs.std_msgs import Float32
+from rbxcompose.sdk import Component, Config, Out, Ratio, Refused, Serves, Time, component
+from rbxcompose.sim.battery import BatteryCore, BatterySettings
+
+PERCENT = 100.0  # a `battery_level` message counts from 0 to 100
+
+
+class BatterySimConfig(Config):
+    """How fast the battery drains and when it complains."""
+
+    runtime: Time = Field(gt=0)
+    """Time from full to empty."""
+    initial: Ratio = Field(1.0, ge=0, le=1)
+    """Charge at the start."""
+    warn: Ratio = Field(0.5, ge=0, le=1)
+    """Below this charge its status is WARN."""
+    error: Ratio = Field(0.2, ge=0, le=1)
+    """Below this charge its status is ERROR."""
+
+
+@component("battery_sim")
+class BatterySim(Component[BatterySimConfig]):
+    """A battery that drains evenly from full to empty over `runtime`; its level can be set, as a charger does.
+
+    Example:
+        battery: {type: battery_sim, runtime: 45 s, warn: 50 %, error: 20 %}
+    """
+
+    rate = 1.0
+    process = "world"
+    simulated = True
+    battery_level = Out(Float32, "battery_level", unit="%")
+    set_battery_level = Serves(SetBatteryLevel, "set_battery_level")
+
+    def configure(self) -> None:
+        """Fill the battery."""
+        config = self.config
+        settings = BatterySettings(runtime=config.runtime, warn=config.warn, error=config.error)
+        self.core = BatteryCore(settings, config.initial)
+        self.told = Level.OK
+
+    def activate(self) -> None:
+        """Tell the first level at once, since others wait for it."""
+        self.publish()
+
+    def step(self, dt: float) -> None:
+        """Drain for `dt` [s]."""
+        self.core.step(dt)
+        self.publish()
+
+    def on_set_battery_level(self, request: SetBatteryLevel.Request) -> SetBatteryLevel.Response:
+        """Set the charge, given from 0 to 100; one out of range is refused."""
+        if refusal := self.core.set(request.value / PERCENT):
+            raise Refused(refusal)
+        self.info(f"set to {request.value:.0f} %")
+        self.publish()
+        return SetBatteryLevel.Response()
+
+    def publish(self) -> None:
+        """Send level and status; a new status is an event of the story."""
+        percent = self.core.level * PERCENT
+        level, message = self.core.status
+        self.battery_level(Float32(data=percent))
+        self.status(level, message, level=f"{percent:.1f} %")
+        if level is not self.told:
+            self.context.log(level, f"{message}: {percent:.0f} %")
+            self.told = level

@@ -1,0 +1,112 @@
+"""The aggregator of the robot's diagnostics."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from rbxcompose.diagnostics.core import DEFAULT_TIMEOUT, Aggregator, Analyzer
+from rbxcompose.diagnostics.levels import Level, level_of
+from rbxcompose.diagnostics.status import Status
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
+from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.sdk import Component, Config, In, Out, Time, component
+
+PERIOD = 1.0  # [s] between two reports when nothing changes
+
+
+class AnalyzerConfig(Config):
+    """One group."""
+
+    match: tuple[str, ...] = Field(min_length=1)
+    """Names of components, or patterns with `*`."""
+    timeout: Time = Field(DEFAULT_TIMEOUT, gt=0)
+    """Silent for longer than this, a part is STALE."""
+    expected: tuple[str, ...] = ()
+    """Names that must report, whatever matches."""
+
+
+class DiagnosticsConfig(Config):
+    """Groups of the aggregated tree."""
+
+    analyzers: dict[str, AnalyzerConfig] = {}
+    """Groups by name; what none of them matches is in `Other`."""
+    expected: tuple[str, ...] = ()
+    """Components that must report."""
+
+
+@component("diagnostics")
+class Diagnostics(Component[DiagnosticsConfig]):
+    """Sorts the statuses of all components into groups and tells the level of each: OK, WARN, ERROR or STALE.
+
+    Example:
+        health: {type: diagnostics, analyzers: {power: {match: [battery, charger]}}}
+    """
+
+    rate = 5.0
+    diagnostics = In(DiagnosticArray, "/diagnostics", is_open=True)
+    diagnostics_agg = Out(DiagnosticArray, "/diagnostics_agg")
+
+    def configure(self) -> None:
+        """Build the core."""
+        self.core = Aggregator(self.analyzers(), started=self.now)
+        self.told: dict[str, Level] = {}
+        self.reported = self.now - PERIOD
+
+    def analyzers(self) -> dict[str, Analyzer]:
+        """Return the configured groups; each expects those of the robot's components that it names."""
+        return {
+            name: Analyzer(
+                match=one.match,
+                expected=(
+                    *one.expected,
+                    *(part for part in self.config.expected if Analyzer(one.match).matches(part)),
+                ),
+                timeout=one.timeout,
+            )
+            for name, one in self.config.analyzers.items()
+        }
+
+    def on_diagnostics(self, message: DiagnosticArray) -> None:
+        """Take statuses, and report at once if a group's level has changed."""
+        self.core.feed(self.now, map(status_of, message.status))
+        self.step(0.0)
+
+    def lost(self, names: tuple[str, ...], cause: str) -> None:
+        """Mark components that have gone as STALE at once."""
+        self.core.lost(self.now, names, cause)
+        self.step(0.0)
+
+    def step(self, dt: float) -> None:
+        """Report once a second, and at once when a group's level has changed."""
+        if self.core.changed(self.now) or self.now - self.reported >= PERIOD:
+            self.report()
+
+    def report(self) -> None:
+        """Publish the tree; a group's new level is an event of the story."""
+        self.reported = self.now
+        tree = self.core.report(self.now)
+        header = Header(stamp=to_time(self.stamp))
+        self.diagnostics_agg(DiagnosticArray(header=header, status=tuple(map(message_of, tree))))
+        for group in (one for one in tree if one.name.count("/") == 1):
+            if self.told.get(group.name, Level.OK) is not group.level:
+                self.context.log(group.level, f"{group.name} is {group.level.name}: {group.message}")
+            self.told[group.name] = group.level
+
+
+def status_of(message: DiagnosticStatus) -> Status:
+    """Return a status as it came over the bus."""
+    values = tuple((pair.key, pair.value) for pair in message.values)
+    return Status(message.name, level_of(message.level), message.message, message.hardware_id, values)
+
+
+def message_of(status: Status) -> DiagnosticStatus:
+    """Return a status as it goes over the bus."""
+    values = tuple(KeyValue(key=key, value=value) for key, value in status.values)
+    return DiagnosticStatus(
+        level=int(status.level),
+        name=status.name,
+        message=status.message,
+        hardware_id=status.hardware_id,
+        values=values,
+    )

@@ -1,0 +1,131 @@
+"""The simulated differential base."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import Field
+
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.geometry import Transform3, Velocity2
+from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.sdk import (
+    Acceleration,
+    AngularAcceleration,
+    AngularSpeed,
+    Component,
+    Config,
+    In,
+    Out,
+    Speed,
+    Time,
+    component,
+)
+from rbxcompose.sim.diff_drive import DiffDriveCore, DiffDriveSettings
+
+ODOM = "odom"
+BASE = "base_footprint"
+
+
+class DiffDriveSimConfig(Config):
+    """Limits of the base."""
+
+    max_speed: Speed = Field(0.5, gt=0)
+    """Largest speed, forwards and backwards."""
+    max_turn_rate: AngularSpeed = Field(math.pi / 2, gt=0)
+    """Largest turn rate."""
+    acceleration: Acceleration = Field(1.0, gt=0)
+    """Of speeding up and of braking."""
+    turn_acceleration: AngularAcceleration = Field(3.0, gt=0)
+    """Of turning faster and slower."""
+    command_timeout: Time = Field(0.5, gt=0)
+    """The base brakes when no command came for this long."""
+
+
+@component("diff_drive_sim")
+class DiffDriveSim(Component[DiffDriveSimConfig]):
+    """A base with two driven wheels that follows `cmd_vel` within its limits and tells its odometry.
+
+    Example:
+        base: {type: diff_drive_sim, max_speed: 0.5 m/s, max_turn_rate: 90 deg/s}
+    """
+
+    rate = 50.0
+    process = "world"
+    simulated = True
+    cmd_vel = In(geometry.Twist, "cmd_vel", qos="command")
+    odom = Out(Odometry, "odom")
+    tf = Out(TFMessage, "/tf")
+
+    def configure(self) -> None:
+        """Put the base to the origin of `odom`."""
+        config = self.config
+        self.core = DiffDriveCore(
+            DiffDriveSettings(
+                max_speed=config.max_speed,
+                max_turn_rate=config.max_turn_rate,
+                acceleration=config.acceleration,
+                turn_acceleration=config.turn_acceleration,
+                command_timeout=config.command_timeout,
+            )
+        )
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Tell whether the wheels stand still."""
+        return self.core.at_rest
+
+    def on_cmd_vel(self, message: geometry.Twist) -> None:
+        """Take a command; one that is absurd or too fast is said in the status."""
+        self.core.command(Velocity2(message.linear.x, message.angular.z), self.now)
+
+    def step(self, dt: float) -> None:
+        """Move for `dt` [s] and tell where the base is."""
+        self.core.step(self.now, dt)
+        header = Header(stamp=to_time(self.stamp), frame_id=ODOM)
+        at = Transform3.from_pose2(self.core.pose)
+        x, y, z = at.translation
+        turn = geometry.Quaternion(*at.rotation)
+        self.odom(self.odometry(header, geometry.Pose(position=geometry.Point(x, y, z), orientation=turn)))
+        placed = geometry.Transform(translation=geometry.Vector3(x, y, z), rotation=turn)
+        link = geometry.TransformStamped(header=header, child_frame_id=BASE, transform=placed)
+        self.tf(TFMessage(transforms=(link,)))
+        self.tell_commands()
+
+    def odometry(self, header: Header, pose: geometry.Pose) -> Odometry:
+        """Return pose and velocity of the base as a message."""
+        velocity = self.core.velocity
+        twist = geometry.Twist(linear=geometry.Vector3(x=velocity.linear), angular=geometry.Vector3(z=velocity.angular))
+        return Odometry(
+            header=header,
+            child_frame_id=BASE,
+            pose=geometry.PoseWithCovariance(pose=pose),
+            twist=geometry.TwistWithCovariance(twist=twist),
+        )
+
+    def tell_commands(self) -> None:
+        """Say in the status what was not followed as commanded."""
+        dropped, clamped = self.core.dropped, self.core.clamped
+        if dropped or clamped:
+            message = f"{dropped} commands dropped as absurd, {clamped} cut to the limits"
+            self.status(Level.WARN, message, dropped=dropped, clamped=clamped)
+
+    def stop(self) -> None:
+        """Brake and take no command until `release`."""
+        self.core.brake()
+
+    def release(self) -> None:
+        """Take commands again."""
+        self.core.release()
+
+    def brake(self) -> None:
+        """Come to rest for good."""
+        self.core.brake()
+
+    def summary(self) -> dict[str, str]:
+        """Tell how far it went."""
+        return {"distance driven": f"{self.core.distance:.2f} m"}

@@ -1,0 +1,120 @@
+"""Driving to a pose without a map of obstacles."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import Field
+
+from rbxcompose.geometry import AT_REST, Pose2, Velocity2, yaw_of
+from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist, Vector3
+from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.navigation.go_to import GoToCore, GoToSettings
+from rbxcompose.sdk import (
+    Angle,
+    AngularSpeed,
+    Component,
+    Config,
+    Length,
+    Looks,
+    Out,
+    ServedGoal,
+    ServesAction,
+    Speed,
+    component,
+)
+
+MAP = "map"
+
+
+class GoToConfig(Config):
+    """How to drive."""
+
+    speed: Speed = Field(0.3, gt=0)
+    """Largest speed forwards."""
+    turn_rate: AngularSpeed = Field(math.radians(60), gt=0)
+    """Largest turn rate."""
+    tolerance: Length = Field(0.05, gt=0)
+    """How far from the goal the base may end."""
+    heading_tolerance: Angle = Field(math.radians(3), gt=0)
+    """How far from the goal's heading it may end."""
+
+
+@component("go_to")
+class GoTo(Component[GoToConfig]):
+    """Drive to a pose in `map`: turn to it, drive straight, turn to its heading.
+
+    Example:
+        go_to: {type: go_to, speed: 0.3 m/s}
+    """
+
+    rate = 20.0
+    cmd_vel = Out(Twist, "cmd_vel", qos="command")
+    pose = Looks(source="base_footprint", target=MAP)
+    go_to = ServesAction(NavigateToPose, "go_to", claims="base")
+
+    def configure(self) -> None:
+        """Build the core."""
+        config = self.config
+        self.core = GoToCore(
+            GoToSettings(
+                speed=config.speed,
+                turn_rate=config.turn_rate,
+                distance_tolerance=config.tolerance,
+                heading_tolerance=config.heading_tolerance,
+            )
+        )
+        self.driving: object = None  # the goal that the core drives to
+
+    def accept_go_to(self, goal: NavigateToPose.Goal) -> str:
+        """Refuse a goal in another frame, or one that is no pose."""
+        frame, at = goal.pose.header.frame_id, goal.pose.pose.position
+        if frame not in ("", MAP):
+            return f"a goal must be given in '{MAP}', not in '{frame}'"
+        return "" if math.isfinite(at.x) and math.isfinite(at.y) else "the goal is not a finite pose"
+
+    def step(self, dt: float) -> None:
+        """Drive on towards the goal."""
+        goal = self.go_to.current
+        if goal is None:
+            self.driving = None
+            return
+        pose = self.pose.now()
+        if goal.cancel_requested:
+            self.drive(AT_REST)
+            goal.canceled()
+        elif pose is None:
+            self.drive(AT_REST)
+            goal.aborted(f"nobody tells where the base is in '{MAP}'")
+        else:
+            self.follow(goal, pose, dt)
+
+    def follow(
+        self,
+        goal: ServedGoal[NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback],
+        pose: Pose2,
+        dt: float,
+    ) -> None:
+        """Command the base for one cycle and tell how far it is."""
+        if goal is not self.driving:
+            self.driving = goal
+            self.core.start(pose_of(goal.request.pose))
+        velocity, done = self.core.update(pose, dt)
+        self.drive(velocity)
+        if done:
+            goal.succeeded()
+        elif self.core.stuck:
+            self.drive(AT_REST)
+            goal.aborted("the base does not come nearer")
+        else:
+            goal.feedback(NavigateToPose.Feedback(distance_remaining=self.core.distance))
+
+    def drive(self, velocity: Velocity2) -> None:
+        """Publish a velocity."""
+        self.cmd_vel(Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular)))
+
+
+def pose_of(message: PoseStamped) -> Pose2:
+    """Return a pose message as seen from above."""
+    at, turn = message.pose.position, message.pose.orientation
+    return Pose2(at.x, at.y, yaw_of((turn.x, turn.y, turn.z, turn.w)))

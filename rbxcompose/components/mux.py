@@ -1,0 +1,113 @@
+"""The command mux."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.std_msgs import Empty
+from rbxcompose.msgs.types import Message
+from rbxcompose.mux.core import MuxCore, Source
+from rbxcompose.sdk import Component, Config, In, Level, Out, Port, Time, component
+
+LOCK = "lock_"  # begins the port of a lock, which no input may be named like
+
+
+class MuxSourceConfig(Config):
+    """An input or a lock."""
+
+    priority: int
+    """The larger one wins."""
+    timeout: Time = Field(gt=0)
+    """Silent for longer than this, it counts as gone; counted from the last message's arrival."""
+
+
+class MuxConfig(Config):
+    """What goes through, from where, in which order."""
+
+    output: str
+    """Topic that the winner's messages go to."""
+    message: str = "geometry_msgs/msg/Twist"
+    """ROS name of the message type."""
+    inputs: dict[str, MuxSourceConfig]
+    """Sources by name; each has the topic `<output>/<name>`."""
+    locks: dict[str, MuxSourceConfig] = {}
+    """Heartbeat topics `<output>/<name>`: a silent one locks all inputs of a lower priority."""
+
+
+@component("mux")
+class Mux(Component[MuxConfig]):
+    """Lets the commands of one source through: the live one of the highest priority. It forwards and never repeats.
+
+    Above all inputs stands the lock `stop`, latched by `rbxcompose stop` and opened by `release`.
+
+    Example:
+        cmd_vel: {type: mux, output: cmd_vel, inputs: {teleop: {priority: 100, timeout: 0.5 s}}}
+    """
+
+    @classmethod
+    def ports(cls, config: MuxConfig) -> dict[str, Port[Any]]:
+        """Return the output, an input per source and one per lock."""
+        message = registry.message(config.message)
+        ports: dict[str, Port[Any]] = {"output": Out(message, config.output, qos="command").named("output")}
+        for name in config.inputs:
+            ports[name] = In(message, f"{config.output}/{name}", qos="command", is_open=True).named(name)
+        for name in config.locks:
+            ports[LOCK + name] = In(Empty, f"{config.output}/{name}", qos="command", is_open=True).named(LOCK + name)
+        return ports
+
+    def configure(self) -> None:
+        """Build the core; a mux that comes back while the robot is stopped comes back closed."""
+        zero = registry.message(self.config.message)()
+        self.core: MuxCore[Message] = MuxCore(
+            {name: Source(one.priority, one.timeout) for name, one in self.config.inputs.items()},
+            zero=zero,
+            is_zero=lambda message: message == zero,
+            locks={name: Source(one.priority, one.timeout) for name, one in self.config.locks.items()},
+            stopped=self.context.is_stopped,
+        )
+        self.told: str | None = None
+
+    def received(self, port: str, message: Any) -> None:
+        """Forward a message of the winner, or take a heartbeat."""
+        if port.startswith(LOCK):
+            self.core.heartbeat(port.removeprefix(LOCK), self.now)
+        elif (forwarded := self.core.receive(port, message, self.now)) is not None:
+            self.send(forwarded)
+        self.settle()
+
+    def wake(self) -> None:
+        """Send the one zero that follows the end of the last source."""
+        if (zero := self.core.tick(self.now)) is not None:
+            self.send(zero)
+        self.settle()
+
+    def stop(self) -> None:
+        """Latch the lock `stop` and send a zero at once."""
+        self.send(self.core.stop(self.now))
+        self.settle()
+
+    def release(self) -> None:
+        """Open the lock; a source that is still talking must come to rest once."""
+        self.core.release(self.now)
+        self.settle()
+
+    def brake(self) -> None:
+        """Send a last zero and let nothing through any more."""
+        self.send(self.core.close(self.now))
+        self.settle()
+
+    def send(self, message: Message) -> None:
+        """Publish on the output."""
+        self.bound["output"](message)
+
+    def settle(self) -> None:
+        """Ask for the next deadline and say who is let through, if that has changed."""
+        if (deadline := self.core.next_deadline()) is not None:
+            self.context.wake_at(deadline)
+        active = "stop" if self.core.stopped else self.core.active
+        if active != self.told:
+            self.told = active
+            self.status(Level.OK, self.core.why(self.now), active=active or "none")

@@ -1,0 +1,38 @@
+"""Fixed frames."""
+
+from __future__ import annotations
+
+from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped
+from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.sdk import Component, Config, Out, component
+
+
+class TransformsConfig(Config):
+    """Which frames coincide."""
+
+    map: str = "map"
+    """Frame of places."""
+    odom: str = "odom"
+    """Frame in which the base counts its way."""
+
+
+@component("transforms")
+class Transforms(Component[TransformsConfig]):
+    """Tells the frames that never move. While nothing localises the robot, `odom` stands where `map` does.
+
+    Example:
+        frames: {type: transforms, map: map, odom: odom}
+    """
+
+    tf_static = Out(TFMessage, "/tf_static", qos="latched")
+
+    def activate(self) -> None:
+        """Publish once; who subscribes later is given it, too."""
+        link = TransformStamped(
+            header=Header(stamp=to_time(self.stamp), frame_id=self.config.map),
+            child_frame_id=self.config.odom,
+            transform=Transform(rotation=Quaternion(w=1.0)),
+        )
+        self.tf_static(TFMessage(transforms=(link,)))

@@ -1,0 +1,64 @@
+"""Giving values to the inputs of a mission, by `with:` or `--set`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rbxcompose.config import Place
+from rbxcompose.expressions.types import TypeKind
+from rbxcompose.expressions.values import Value
+from rbxcompose.findings import Finding, Span, suggest
+from rbxcompose.manifest.tree import Entry
+from rbxcompose.missions import codes
+from rbxcompose.missions.header import range_trouble
+from rbxcompose.missions.literals import WrongValue, typed
+from rbxcompose.missions.program import Datum, Input, Program
+
+
+def bind_inputs(
+    program: Program, given: Mapping[str, Entry], places: Mapping[str, Place], span: Span
+) -> tuple[dict[str, Value], list[Finding]]:
+    """Return the values of all inputs by name, and what is wrong with those that were given.
+
+    `given` are the entries below `with:`, `span` is the place of the robot's entry for the mission.
+    """
+    findings: list[Finding] = []
+    for name, entry in given.items():
+        if name not in program.inputs:
+            message = f"the mission '{program.name}' has no input '{name}'"
+            help_text = suggest(name, program.inputs, "its inputs")
+            findings.append(codes.WRONG_INPUT.at(entry.key.span, message, help=help_text))
+    values = {}
+    for name, declared in program.inputs.items():
+        datum = _given(declared, given[name], findings) if name in given else declared.default
+        if datum is None and name not in given:
+            message = f"the input '{name}' of the mission '{program.name}' needs a value"
+            findings.append(codes.WRONG_INPUT.at(span, message, help=f"write it under 'with': '{name}: ...'"))
+        elif datum is not None:
+            values[name] = _placed(datum, places, findings)
+    return values, findings
+
+
+def _given(declared: Input, entry: Entry, findings: list[Finding]) -> Datum | None:
+    span = entry.value.span
+    try:
+        datum = typed(entry.value, declared.type)
+    except WrongValue as error:
+        message = f"the input '{declared.name}' {error.message}"
+        findings.append(codes.WRONG_INPUT.at(span, message, label=error.label, help=error.help))
+        return None
+    if trouble := range_trouble(declared, datum):
+        findings.append(codes.WRONG_INPUT.at(span, f"the input '{declared.name}' {trouble}"))
+    return datum
+
+
+def _placed(datum: Datum, places: Mapping[str, Place], findings: list[Finding]) -> Value:
+    """Return the value, with the place itself for the name of one."""
+    if datum.type.kind not in (TypeKind.PLACE, TypeKind.POSE):
+        return datum.value
+    name = str(datum.value)
+    if name not in places:
+        help_text = suggest(name, places, "places of this robot")
+        findings.append(codes.UNKNOWN_PLACE.at(datum.span, f"there is no place '{name}'", help=help_text))
+        return name
+    return places[name]

@@ -1,0 +1,15 @@
+"""`fallback`: one node after the other, until one succeeds."""
+
+from __future__ import annotations
+
+from rbxcompose.missions.in_turn import InTurn
+from rbxcompose.missions.registry import kind
+from rbxcompose.missions.statuses import SUCCESS
+
+
+@kind("fallback")
+class Fallback(InTurn):
+    """Try the nodes of a list in order; the first success is the fallback's own, a skipped one is passed over."""
+
+    __slots__ = ()
+    decides = SUCCESS

@@ -1,0 +1,48 @@
+"""`if`: one node or another, by a condition."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rbxcompose.expressions.evaluate import holds
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.missions.registry import kind
+from rbxcompose.missions.statuses import SKIPPED
+from rbxcompose.missions.task import Site, Task
+
+if TYPE_CHECKING:
+    from rbxcompose.missions.node_reader import NodeReader
+
+
+@kind("if", "then", "else")
+class If(Task):
+    """Ask the condition once, then do `then` or `else`; without a match it is skipped."""
+
+    __slots__ = ("chosen", "condition", "otherwise", "then")
+
+    def __init__(self, site: Site, options: Expression) -> None:
+        super().__init__(site)
+        self.condition = options
+        self.then = self.chosen = site.children[0]
+        self.otherwise = site.children[1] if len(site.children) > 1 else None
+
+    @staticmethod
+    def read(reader: NodeReader) -> Expression:
+        """Read the condition, `then` and `else`."""
+        condition = reader.condition(reader.key)
+        reader.child("then")
+        if reader.has("else"):
+            reader.child("else")
+        return condition
+
+    def begin(self) -> int:
+        """Choose, and start what was chosen."""
+        chosen = self.then if holds(self.condition, self.scope) else self.otherwise
+        if chosen is None:
+            return SKIPPED
+        self.chosen = chosen
+        return self.advance(chosen)
+
+    def proceed(self) -> int:
+        """Go on with what was chosen."""
+        return self.advance(self.chosen)

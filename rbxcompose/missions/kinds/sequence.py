@@ -1,0 +1,15 @@
+"""`sequence`: one node after the other, until one fails."""
+
+from __future__ import annotations
+
+from rbxcompose.missions.in_turn import InTurn
+from rbxcompose.missions.registry import kind
+from rbxcompose.missions.statuses import FAILURE
+
+
+@kind("sequence")
+class Sequence(InTurn):
+    """Do the nodes of a list in order; the first failure is the sequence's own."""
+
+    __slots__ = ()
+    decides = FAILURE

@@ -1,0 +1,75 @@
+"""Finding the kinds of mission nodes: each is one file in `missions/kinds`, entered by one decorator."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from rbxcompose.missions import kinds as package
+from rbxcompose.missions.task import Site, Task
+
+if TYPE_CHECKING:
+    from rbxcompose.expressions.types import Type
+    from rbxcompose.findings import Finding
+    from rbxcompose.missions.node_reader import NodeReader
+    from rbxcompose.missions.program import Node
+    from rbxcompose.missions.views import View
+
+
+class KindTask(Protocol):
+    """A task class that knows how its kind is read."""
+
+    def __call__(self, site: Site, options: Any, /) -> Task:
+        """Make the task of a node with these options."""
+        ...
+
+    def read(self, reader: NodeReader, /) -> object:
+        """Read the kind's value and options."""
+        ...
+
+    def waits(self, node: Node, /) -> bool:
+        """Tell whether a node of this kind takes time by itself."""
+        ...
+
+    def item_type(self, view: View, /) -> Type:
+        """Return the type of the items of a loop."""
+        ...
+
+    def check(self, view: View, /) -> Iterable[Finding]:
+        """Return what is wrong with a node beyond its single expressions."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of mission node: its word, the keys that belong to it, and its task class."""
+
+    name: str
+    options: frozenset[str]
+    task: KindTask
+
+
+K = TypeVar("K", bound=KindTask)
+_KINDS: dict[str, Kind] = {}
+
+
+def kind(name: str, *options: str) -> Callable[[K], K]:
+    """Register a task class under the word of its kind."""
+
+    def register(task: K) -> K:
+        _KINDS[name] = Kind(name, frozenset(options), task)
+        return task
+
+    return register
+
+
+@cache
+def kinds() -> dict[str, Kind]:
+    """Return all kinds by their word."""
+    for module in pkgutil.iter_modules(package.__path__):
+        importlib.import_module(f"{package.__name__}.{module.name}")
+    return _KINDS

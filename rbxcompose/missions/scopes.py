@@ -1,0 +1,151 @@
+"""What the expressions of a running mission see: its data, its inputs, the robot's values, the items of loops."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from rbxcompose.config import Place
+from rbxcompose.expressions.tree import Call, Expression, Variable, walk
+from rbxcompose.expressions.values import NotArrived, Value
+
+
+class Values(Protocol):
+    """The robot's values, as the world knows them."""
+
+    def value(self, name: str, /) -> Value | NotArrived:
+        """Return the newest value in SI; raise KeyError if there is no such name."""
+        ...
+
+    def age(self, name: str, /) -> float | NotArrived:
+        """Return the time since the last message [s]; raise KeyError if there is no such name."""
+        ...
+
+    def count(self, name: str, /) -> int:
+        """Return how many messages have come so far; raise KeyError if there is no such name."""
+        ...
+
+
+class MissionScope(Protocol):
+    """A scope of expressions that also tells how many messages have come."""
+
+    def variable(self, name: str, /) -> Value | NotArrived:
+        """Return the value of `$name`."""
+        ...
+
+    def word(self, name: str, /) -> Value:
+        """Return what a bare word names."""
+        ...
+
+    def age(self, name: str, /) -> float | NotArrived:
+        """Return the time since the last message of `$name` [s]."""
+        ...
+
+    def is_new(self, name: str, /) -> bool:
+        """Tell whether a message of `$name` came since this node started."""
+        ...
+
+    def count(self, name: str, /) -> int:
+        """Return how many messages of `$name` have come."""
+        ...
+
+
+class RunScope:
+    """What all of a mission sees; `data` is its own, and written by `set`."""
+
+    def __init__(
+        self, data: dict[str, Value], inputs: Mapping[str, Value], places: Mapping[str, Place], values: Values
+    ) -> None:
+        self.data = data
+        self._inputs = inputs
+        self._places = places
+        self._values = values
+
+    def variable(self, name: str, /) -> Value | NotArrived:
+        """Return a datum, an input or a value of the robot."""
+        if name in self.data:
+            return self.data[name]
+        if name in self._inputs:
+            return self._inputs[name]
+        return self._values.value(name)
+
+    def word(self, name: str, /) -> Value:
+        """Return the place of this name, else the word itself, which is then a choice."""
+        return self._places.get(name, name)
+
+    def age(self, name: str, /) -> float | NotArrived:
+        """Ask the world."""
+        return self._values.age(name)
+
+    def is_new(self, name: str, /) -> bool:
+        """Tell whether any message has come since the mission started."""
+        return self.count(name) > 0
+
+    def count(self, name: str, /) -> int:
+        """Ask the world; what the mission has of its own never comes as a message."""
+        return 0 if name in self.data or name in self._inputs else self._values.count(name)
+
+
+class _Inner:
+    """A scope within another one, which it asks for all that it does not know."""
+
+    def __init__(self, outer: MissionScope) -> None:
+        self.outer = outer
+
+    def variable(self, name: str, /) -> Value | NotArrived:
+        """Ask the scope around."""
+        return self.outer.variable(name)
+
+    def word(self, name: str, /) -> Value:
+        """Ask the scope around."""
+        return self.outer.word(name)
+
+    def age(self, name: str, /) -> float | NotArrived:
+        """Ask the scope around."""
+        return self.outer.age(name)
+
+    def is_new(self, name: str, /) -> bool:
+        """Ask the scope around."""
+        return self.outer.is_new(name)
+
+    def count(self, name: str, /) -> int:
+        """Ask the scope around."""
+        return self.outer.count(name)
+
+
+class ItemScope(_Inner):
+    """What the body of a loop sees: also the item."""
+
+    def __init__(self, outer: MissionScope, name: str) -> None:
+        super().__init__(outer)
+        self.name = name
+        self.item: Value = None
+
+    def variable(self, name: str, /) -> Value | NotArrived:
+        """Return the item, or what the scope around knows."""
+        return self.item if name == self.name else self.outer.variable(name)
+
+
+class SinceScope(_Inner):
+    """What a node sees that asks `new($x)`: messages count from its start."""
+
+    def __init__(self, outer: MissionScope, names: frozenset[str]) -> None:
+        super().__init__(outer)
+        self._names = names
+        self._seen: dict[str, int] = {}
+
+    def mark(self) -> None:
+        """Count from now on."""
+        self._seen = {name: self.outer.count(name) for name in self._names}
+
+    def is_new(self, name: str, /) -> bool:
+        """Tell whether a message came since `mark`."""
+        return self.outer.count(name) > self._seen.get(name, 0)
+
+
+def new_names(expression: Expression) -> frozenset[str]:
+    """Return the names about which an expression asks `new($x)`."""
+    if not any(call.name == "new" for call in expression.calls):
+        return frozenset()
+    calls = (node for node, _ in walk(expression.tree) if isinstance(node, Call) and node.function == "new")
+    return frozenset(argument.name for call in calls for argument in call.arguments if isinstance(argument, Variable))

@@ -1,0 +1,128 @@
+"""What can be known of a mission on a robot before it runs: names, types, arguments, loops that never wait."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+
+from rbxcompose.expressions.text import Slot, parse_template
+from rbxcompose.expressions.tree import ExpressionError
+from rbxcompose.expressions.types import UNKNOWN, Type, TypeKind
+from rbxcompose.findings import SIMILAR, Finding, Related, suggest
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions import codes
+from rbxcompose.missions.modifiers import MODIFIERS
+from rbxcompose.missions.program import ROOT, Argument, Program, RobotNames, Skill
+from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.spans import expression_of, inner_span
+from rbxcompose.missions.views import NodeScope, View, base_names, findings_of, views
+from rbxcompose.missions.watching import POSE
+
+STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
+
+
+def check_program(program: Program, robot: RobotNames) -> Iterator[Finding]:
+    """Yield all that is wrong with a mission on this robot, each with its place."""
+    yield from _clashes(program, robot)
+    for view in views(program, robot):
+        node = view.node
+        for asked in node.asked:
+            yield from view.typed(asked.expression, asked.wanted, asked.scalar, codes.WRONG_TYPE)
+        if node.kind:
+            yield from kinds()[node.kind].task.check(view)
+        elif node.skill:
+            yield from _skill(view)
+        for key in node.modifiers:
+            yield from MODIFIERS[key].check(view)
+        if node.item:
+            yield from _item_clash(view)
+    scope = NodeScope(base_names(program, robot), robot.places)
+    for interrupt in program.interrupts:
+        when = interrupt.when
+        yield from findings_of(when.expression, when.wanted, when.scalar, scope, codes.WRONG_TYPE)
+    yield from _not_restartable(program, robot)
+
+
+def _clashes(program: Program, robot: RobotNames) -> Iterator[Finding]:
+    """Yield the names of inputs and data that mean something else as well."""
+    for section, entries in (("input", program.inputs), ("datum", program.data)):
+        for name, entry in entries.items():
+            if name in robot.skills:
+                yield codes.NAME_CLASH.at(entry.span, f"the {section} '{name}' is named like a skill")
+            elif name in robot.values or name == POSE:
+                yield codes.NAME_CLASH.at(entry.span, f"the {section} '{name}' is named like a value of the robot")
+    for name in program.inputs.keys() & program.data.keys():
+        related = [Related(program.inputs[name].span, "the input")]
+        yield codes.NAME_CLASH.at(program.data[name].span, f"'{name}' is an input and a datum", related=related)
+    for view_node in program.nodes:
+        if view_node.name in robot.skills:
+            yield codes.NAME_CLASH.at(view_node.span, f"a node cannot be named like the skill '{view_node.name}'")
+
+
+def _item_clash(view: View) -> Iterator[Finding]:
+    item, node = view.node.item, view.node
+    if item in view.scope.names:
+        yield codes.NAME_CLASH.at(node.span, f"the item '{item}' has the name of something that the loop sees already")
+    elif item in kinds() or item in view.robot.skills:
+        yield codes.NAME_CLASH.at(node.span, f"the item '{item}' is named like a kind or a skill")
+
+
+def _skill(view: View) -> Iterator[Finding]:
+    node, skills = view.node, view.robot.skills
+    if node.skill not in skills:
+        message = f"mission '{view.program.name}' uses a skill that nobody provides: '{node.skill}'"
+        close = difflib.get_close_matches(node.skill, (*skills, *kinds()), n=1, cutoff=SIMILAR)
+        yield codes.UNKNOWN_SKILL.at(node.span, message, help=suggest(node.skill, close or skills, "skills"))
+        return
+    skill = skills[node.skill]
+    given = {argument.name or skill.main for argument in node.arguments}
+    for argument in node.arguments:
+        yield from _argument(view, skill, argument)
+    if given - skill.arguments.keys():
+        return  # what seems to be missing may be what is misspelt
+    for name in sorted(skill.required - given):
+        message = f"the skill '{skill.name}' needs its argument '{name}'"
+        help_text = f"write '{skill.name}: ...'" if name == skill.main else f"write '{name}: ...' below it"
+        yield codes.WRONG_ARGUMENT.at(node.span, message, help=help_text)
+
+
+def _argument(view: View, skill: Skill, argument: Argument) -> Iterator[Finding]:
+    name = argument.name or skill.main
+    if not name:
+        yield codes.WRONG_ARGUMENT.at(argument.span, f"the skill '{skill.name}' takes no single value")
+    elif name not in skill.arguments:
+        message = f"the skill '{skill.name}' has no argument '{name}'"
+        yield codes.WRONG_ARGUMENT.at(argument.span, message, help=suggest(name, skill.arguments, "its arguments"))
+    elif isinstance(argument.value, Scalar):
+        if argument.value.plain and not argument.value.text:
+            yield codes.WRONG_ARGUMENT.at(argument.span, f"the argument '{name}' of '{skill.name}' has no value")
+        else:
+            yield from _value(view, argument.value, skill.arguments[name])
+    elif skill.arguments[name].kind not in STRUCTURED:
+        message = f"the argument '{name}' of '{skill.name}' must be {skill.arguments[name].phrase}"
+        yield codes.WRONG_ARGUMENT.at(argument.span, message)
+
+
+def _value(view: View, scalar: Scalar, wanted: Type) -> Iterator[Finding]:
+    try:
+        if wanted.kind is not TypeKind.TEXT:
+            yield from view.typed(expression_of(scalar), wanted, scalar, codes.WRONG_ARGUMENT)
+            return
+        for slot in parse_template(scalar.text).parts:
+            if isinstance(slot, Slot):
+                part = Scalar(slot.value.text, inner_span(scalar, slot.start, slot.end))
+                yield from view.typed(slot.value, UNKNOWN, part, codes.WRONG_ARGUMENT)
+    except ExpressionError as error:
+        yield codes.NO_EXPRESSION.at(inner_span(scalar, error.start, error.end), error.message, help=error.help)
+
+
+def _not_restartable(program: Program, robot: RobotNames) -> Iterator[Finding]:
+    """Yield the skills of the mission proper that an interrupt may start again although that does them no good."""
+    if not program.interrupts:
+        return
+    for node in program.below(ROOT):
+        skill = robot.skills.get(node.skill)
+        if skill and not skill.restartable:
+            related = [Related(program.interrupts[0].span, "this may cut it short")]
+            message = f"the skill '{skill.name}' cannot be restarted, but 'afterwards: continue' would do so"
+            yield codes.NOT_RESTARTABLE.at(node.span, message, related=related)

@@ -1,0 +1,155 @@
+"""A task is the running side of a mission node: started, ticked while it runs, halted or suspended from above."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rbxcompose.expressions.evaluate import evaluate
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.types import UNKNOWN, Type
+from rbxcompose.findings import Finding
+from rbxcompose.missions.statuses import FAILURE, IDLE, RUNNING
+
+if TYPE_CHECKING:
+    from rbxcompose.missions.engine import Engine
+    from rbxcompose.missions.program import Node
+    from rbxcompose.missions.scopes import ItemScope, MissionScope
+    from rbxcompose.missions.views import View
+
+
+class NodeFailed(Exception):  # noqa: N818 - it ends a node, as a failure would; it is no error of ours
+    """Raised by a task whose node cannot go on; the text is the reason that is reported."""
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """What a task is made from: the engine, its node, what its expressions see, the tasks below it.
+
+    `item` is what the tasks below see of a loop, for a node that has one.
+    """
+
+    engine: Engine
+    node: Node
+    scope: MissionScope
+    children: tuple[Task, ...] = ()
+    item: ItemScope | None = None
+
+
+class Task(ABC):
+    """The running side of a node; kinds fill in `begin` and, if they take time, `proceed`.
+
+    `current` is the task below that runs now. A task without one goes on by starting the child that it was at, so
+    that a child which was suspended to begin anew needs no further bookkeeping.
+    """
+
+    __slots__ = ("current", "end", "engine", "number", "scope", "statuses")
+
+    def __init__(self, site: Site) -> None:
+        self.engine = site.engine
+        self.number = site.node.number
+        self.end = site.node.end
+        self.scope = site.scope
+        self.statuses = site.engine.statuses
+        self.current: Task | None = None
+
+    def start(self) -> int:
+        """Begin, and return the status after the first tick."""
+        try:
+            status = self.begin()
+        except Exception as error:  # whatever a leaf does wrong ends its node, not the engine
+            status = self._broken(error)
+        self.statuses[self.number] = status
+        return status
+
+    def tick(self) -> int:
+        """Go on, and return the status; only for a task that runs."""
+        try:
+            status = self.proceed()
+        except Exception as error:
+            status = self._broken(error)
+        self.statuses[self.number] = status
+        return status
+
+    def halt(self) -> None:
+        """Stop what runs here and below; only for a task that runs."""
+        self.statuses[self.number] = IDLE
+        child = self.current
+        if child is not None:
+            self.current = None
+            child.halt()
+
+    def suspend(self, anew: bool) -> bool:
+        """Stop the leaves that run, keep the place, and tell whether this task is to be started again for that.
+
+        With `anew`, a leaf and its modifiers begin again from the start, as after an interrupt; without it, as after
+        a pause, a leaf repeats only what it asked of the robot.
+        """
+        child = self.current
+        if child is not None and child.suspend(anew):
+            self.current = None
+        return False
+
+    @staticmethod
+    def waits(node: Node) -> bool:
+        """Tell whether a node of this kind takes time by itself."""
+        return False
+
+    @staticmethod
+    def item_type(view: View) -> Type:
+        """Return the type of the items of a loop."""
+        return UNKNOWN
+
+    @staticmethod
+    def check(view: View) -> Iterable[Finding]:
+        """Return what is wrong with a node beyond its single expressions."""
+        return ()
+
+    @abstractmethod
+    def begin(self) -> int:
+        """Do the first tick."""
+
+    def proceed(self) -> int:
+        """Do one more tick."""
+        raise NotImplementedError(f"{type(self).__name__} ends with its first tick")
+
+    def advance(self, child: Task) -> int:
+        """Start the child or go on with it, and return its status."""
+        status = child.start() if self.current is None else child.tick()
+        self.current = child if status == RUNNING else None
+        return status
+
+    def forget(self) -> None:
+        """Set the nodes below to idle, before they run once more."""
+        first = self.number + 1
+        self.statuses[first : self.end] = [IDLE] * (self.end - first)
+
+    def number_of(self, expression: Expression, what: str) -> float:
+        """Return the value of an expression that must be a number from 0 on.
+
+        Raises:
+            NodeFailed: if it is none.
+        """
+        value = evaluate(expression, self.scope)
+        if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
+            raise NodeFailed(f"{what} must be a number from 0 on, not {self.engine.show('', value)}")
+        return value
+
+    def count_of(self, expression: Expression, what: str) -> int:
+        """Return the value of an expression that must be a whole number from 0 on.
+
+        Raises:
+            NodeFailed: if it is none.
+        """
+        value = self.number_of(expression, what)
+        if value != int(value):
+            raise NodeFailed(f"{what} must be a whole number, not {self.engine.show('', value)}")
+        return int(value)
+
+    def _broken(self, error: Exception) -> int:
+        if self.current is not None:
+            self.halt()
+        self.engine.failed(self, error)
+        return FAILURE

@@ -1,0 +1,112 @@
+"""What a node sees before the mission runs: the types of all names in its scope."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from rbxcompose.expressions.check import Problem, check_value
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.types import PLACE, POSE, Type
+from rbxcompose.findings import Finding, Kind
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions import codes
+from rbxcompose.missions.program import Node, Program, RobotNames
+from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.spans import inner_span
+from rbxcompose.missions.watching import POSE as POSE_NAME
+
+
+@dataclass(frozen=True, slots=True)
+class NodeScope:
+    """The names that expressions of a node may use, with their types (a scope for static checks)."""
+
+    names: Mapping[str, Type]
+    places: Iterable[str]
+
+    def variable(self, name: str) -> Type | None:
+        """Return the type of `$name`, if there is one."""
+        return self.names.get(name)
+
+    def word(self, name: str) -> Type | None:
+        """Return that a bare word is a place, if it is one."""
+        return PLACE if name in self.places else None
+
+    def variables(self) -> Iterable[str]:
+        """Return all names."""
+        return self.names
+
+    def words(self) -> Iterable[str]:
+        """Return the names of all places."""
+        return self.places
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A node as its checks see it."""
+
+    program: Program
+    robot: RobotNames
+    node: Node
+    scope: NodeScope
+
+    @property
+    def waits(self) -> bool:
+        """Tell whether the node, or any below it, takes time by itself."""
+        return any(below.skill or _waits(below) for below in self.program.below(self.node.number))
+
+    def typed(self, expression: Expression, wanted: Type, scalar: Scalar, kind: Kind) -> Iterator[Finding]:
+        """Yield what is wrong with an expression that must have the type `wanted`."""
+        return findings_of(expression, wanted, scalar, self.scope, kind)
+
+
+def _waits(node: Node) -> bool:
+    kind = kinds().get(node.kind)
+    return kind is not None and kind.task.waits(node)
+
+
+def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
+    """Return the names that all of a mission sees."""
+    return {
+        **robot.values,
+        POSE_NAME: POSE,
+        **{name: one.type for name, one in program.inputs.items()},
+        **{name: datum.type for name, datum in program.data.items()},
+    }
+
+
+def views(program: Program, robot: RobotNames) -> Iterator[View]:
+    """Yield each node with what it sees, in the order of the text."""
+    base = NodeScope(base_names(program, robot), robot.places)
+    below: dict[int, NodeScope] = {}  # what the children of a node see
+    for node in program.nodes:
+        scope = base if node.parent is None else below[node.parent]
+        view = View(program, robot, node, scope)
+        below[node.number] = scope
+        if node.item:
+            item = kinds()[node.kind].task.item_type(view)
+            below[node.number] = NodeScope({**scope.names, node.item: item}, robot.places)
+        yield view
+
+
+def findings_of(
+    expression: Expression, wanted: Type, scalar: Scalar, scope: NodeScope, kind: Kind
+) -> Iterator[Finding]:
+    """Yield what is wrong with an expression; what is neither a name nor a place is of the given kind."""
+    for problem in check_value(expression, scope, wanted):
+        span = inner_span(scalar, problem.start, problem.end)
+        unknown_word = _at(problem, ((word.name, word.start) for word in expression.words))
+        if unknown_word and scope.word(unknown_word) is None:
+            unquoted = f"there is no place '{unknown_word}'"
+            yield codes.UNKNOWN_PLACE.at(span, unquoted, help=problem.help)
+        elif (name := _at(problem, ((name.name, name.start) for name in expression.names))) and not scope.variable(
+            name
+        ):
+            yield codes.UNKNOWN_NAME.at(span, problem.message, help=problem.help)
+        else:
+            yield kind.at(span, problem.message, help=problem.help)
+
+
+def _at(problem: Problem, names: Iterable[tuple[str, int]]) -> str:
+    """Return the name that stands exactly where a problem begins."""
+    return next((name for name, start in names if start == problem.start), "")

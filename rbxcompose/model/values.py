@@ -1,0 +1,59 @@
+"""Values: which field of which message a `$name` of the missions is, and what it measures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, quantity_of
+from rbxcompose.manifest.models import Value as ValueEntry
+from rbxcompose.missions.sources import ValueSource
+from rbxcompose.model.wiring import End, resolve
+from rbxcompose.msgs import registry
+from rbxcompose.sdk.ports import In, Out
+from rbxcompose.units import UNITS
+
+# The message that carries data from outside, where nobody in the robot says which it is.
+STANDARD = {"text": "std_msgs/msg/String", "flag": "std_msgs/msg/Bool", "count": "std_msgs/msg/Int32"}
+NUMBER = "std_msgs/msg/Float32"
+DATA = "data"  # the field of the standard messages
+
+
+def value_of(entry: ValueEntry, ends: Iterable[End], namespace: str) -> ValueSource | None:
+    """Return what a value is, or None if its source is not there (a check says so)."""
+    ends = list(ends)
+    if entry.port is not None:
+        component, _, port = entry.port.partition(".")
+        end = next((end for end in ends if (end.instance, end.name) == (component, port)), None)
+        return _of_port(end, entry.unit) if end else None
+    if entry.topic is None:
+        return None
+    topic = resolve(entry.topic, namespace)
+    known = next((end.type_name for end in ends if end.topic == topic and end.type_name), None)
+    message = known or STANDARD.get(entry.type or "", NUMBER)
+    return _value(topic, message, entry.field or DATA, entry.unit or "", TYPES.get(entry.type or ""))
+
+
+def _of_port(end: End, unit: str | None) -> ValueSource | None:
+    port = end.port
+    if not isinstance(port, Out | In):
+        return None
+    fields = tuple(registry.message(end.type_name).FIELDS)
+    if len(fields) != 1:
+        return None  # a whole message is no value
+    return _value(end.topic, end.type_name, fields[0], unit or port.unit, None)
+
+
+def _value(topic: str, message: str, field: str, unit: str, declared: Type | None) -> ValueSource:
+    known = UNITS.get(unit)
+    scale = known.to_si(1.0) if known else 1.0
+    measured = quantity_of(known.dimension) if known else _plain_type(message, field)
+    return ValueSource(topic, message, field, scale, declared or measured)
+
+
+def _plain_type(message: str, field: str) -> Type:
+    ros = registry.message(message).FIELDS.get(field, "")
+    if ros.startswith("string"):
+        return TYPES["text"]
+    if ros == "bool":
+        return TYPES["flag"]
+    return TYPES["number"] if ros.startswith(("float", "int", "uint")) else UNKNOWN

@@ -1,0 +1,53 @@
+"""Ends of wires: which topic, service or action each port of a component is connected to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rbxcompose.config import Config
+from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.ports import In, Out, Port
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """A port of an instance and the absolute ROS name that it stands at; empty for a look-up."""
+
+    instance: str
+    name: str
+    port: Port[Any]
+    topic: str
+
+    @property
+    def type_name(self) -> str:
+        """Return the ROS name of the port's type; empty for a look-up."""
+        return self.port.interface.TYPE if self.port.interface else ""
+
+
+def resolve(topic: str, namespace: str) -> str:
+    """Return a topic's absolute name: relative ones are in the robot's namespace."""
+    if topic.startswith("/") or not topic:
+        return topic
+    return f"/{namespace.strip('/')}/{topic}" if namespace.strip("/") else f"/{topic}"
+
+
+def ends_of(
+    instance: str, cls: type[Component[Any]], config: Config, namespace: str, connect: Mapping[str, str]
+) -> tuple[End, ...]:
+    """Return the ends of an instance; `connect` gives ports another topic than their type does."""
+    return tuple(
+        End(instance, name, port, resolve(connect.get(name, port.topic), namespace))
+        for name, port in sorted(cls.ports(config).items())
+    )
+
+
+def writers(ends: Iterable[End], topic: str) -> list[End]:
+    """Return who publishes on a topic."""
+    return [end for end in ends if isinstance(end.port, Out) and end.topic == topic]
+
+
+def readers(ends: Iterable[End], topic: str) -> list[End]:
+    """Return who subscribes to a topic."""
+    return [end for end in ends if isinstance(end.port, In) and end.topic == topic]

@@ -1,0 +1,31 @@
+"""From a checked robot to its plan."""
+
+from __future__ import annotations
+
+from rbxcompose.model.robot import Part, Robot
+from rbxcompose.plan.model import BusPlan, Instance, Plan, Wire
+from rbxcompose.plan.order import start_order
+
+LAST = "mission"  # starts when everything else is active
+
+
+def build_plan(robot: Robot) -> Plan:
+    """Return what `up` has to do; the robot must be without errors."""
+    manifest = robot.manifest
+    order = start_order({name: part.starts_after for name, part in robot.parts.items() if name != LAST})
+    if LAST in robot.parts:
+        order.append(LAST)
+    bus = manifest.bus
+    return Plan(
+        robot=manifest.name,
+        file=str(manifest.path),
+        instances=tuple(_instance(robot.parts[name]) for name in order),
+        bus=BusPlan(bus.domain, bus.namespace or "", bus.port, bus.wire, bus.router),
+        start=manifest.start,
+        is_simulated=manifest.is_simulated,
+    )
+
+
+def _instance(part: Part) -> Instance:
+    wires = tuple(Wire(end.name, end.port.kind, end.topic, end.type_name) for end in part.ends)
+    return Instance(part.name, part.type_name, part.config, part.process, part.starts_after, wires)

@@ -1,0 +1,78 @@
+"""The plan: which instances run in which process group, wired how, started in which order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from rbxcompose.config import Config
+
+STEPPED_GROUP = "robot"  # the one process group of a robot on a stepped clock
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """One port of an instance and the topic, service or action (absolute ROS name) at its other end."""
+
+    port: str
+    kind: str
+    topic: str
+    type: str
+
+
+@dataclass(frozen=True, slots=True)
+class Instance:
+    """One running thing: its type's name, validated configuration, process group and wires."""
+
+    name: str
+    type: str
+    config: Config
+    process: str
+    starts_after: tuple[str, ...] = ()
+    wires: tuple[Wire, ...] = ()
+
+    def topic(self, port: str) -> str:
+        """Return the absolute name at a port.
+
+        Raises:
+            KeyError: if there is no such port.
+        """
+        for wire in self.wires:
+            if wire.port == port:
+                return wire.topic
+        raise KeyError(port)
+
+
+@dataclass(frozen=True, slots=True)
+class BusPlan:
+    """Where and how the robot is on the bus."""
+
+    domain: int = 0
+    namespace: str = ""
+    port: int = 7447
+    wire: str = "jazzy"
+    router: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Everything that `up` needs; `instances` stand in start order."""
+
+    robot: str
+    file: str
+    instances: tuple[Instance, ...]
+    bus: BusPlan = BusPlan()
+    start: str | None = None  # the mission that runs by itself
+    is_simulated: bool = True
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Return the process groups, in the order in which their first instance starts."""
+        return tuple(dict.fromkeys(instance.process for instance in self.instances))
+
+    def of_group(self, group: str) -> tuple[Instance, ...]:
+        """Return the instances of a process group in start order."""
+        return tuple(instance for instance in self.instances if instance.process == group)
+
+    def in_one_process(self) -> Plan:
+        """Return the same robot with all instances in one process group, as a stepped clock needs it."""
+        return replace(self, instances=tuple(replace(one, process=STEPPED_GROUP) for one in self.instances))

@@ -1,0 +1,37 @@
+"""Start order: what starts after what, and whether that can be kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
+
+After = Mapping[str, Sequence[str]]  # name -> the names that start before it
+
+
+def cycle_of(after: After) -> list[str]:
+    """Return names each of which waits for the next one, the last for the first; empty if there is no such circle."""
+    try:
+        TopologicalSorter(after).prepare()
+    except CycleError as error:
+        circle: list[str] = error.args[1][:0:-1]  # the sorter tells who comes first, and the first one twice
+        first = circle.index(min(circle))
+        return circle[first:] + circle[:first]
+    return []
+
+
+def start_order(after: After) -> list[str]:
+    """Return all names so that each comes after those that it waits for, else in the order given.
+
+    There must be no circle.
+    """
+    ordered: dict[str, None] = {}
+
+    def place(name: str) -> None:
+        for other in after.get(name, ()):
+            if other in after:
+                place(other)
+        ordered.setdefault(name)
+
+    for name in after:
+        place(name)
+    return list(ordered)

@@ -1,0 +1,59 @@
+"""All that the author of a plug-in imports."""
+
+from rbxcompose.config import (
+    Acceleration,
+    Angle,
+    AngularAcceleration,
+    AngularSpeed,
+    Config,
+    Frequency,
+    Length,
+    Name,
+    Place,
+    PlaceName,
+    Ratio,
+    Speed,
+    Time,
+)
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.geometry import Pose2
+from rbxcompose.qos import Qos
+from rbxcompose.sdk.bound import Ended, Outcome, Refused, Reply, SentGoal, ServedGoal
+from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction
+from rbxcompose.sdk.registry import component
+
+__all__ = [
+    "Acceleration",
+    "Angle",
+    "AngularAcceleration",
+    "AngularSpeed",
+    "Calls",
+    "CallsAction",
+    "Component",
+    "Config",
+    "Ended",
+    "Frequency",
+    "In",
+    "Length",
+    "Level",
+    "Looks",
+    "Name",
+    "Out",
+    "Outcome",
+    "Place",
+    "PlaceName",
+    "Port",
+    "Pose2",
+    "Qos",
+    "Ratio",
+    "Refused",
+    "Reply",
+    "SentGoal",
+    "ServedGoal",
+    "Serves",
+    "ServesAction",
+    "Speed",
+    "Time",
+    "component",
+]

@@ -1,0 +1,157 @@
+"""What ports are on a running component: the runtime binds them to the bus, tests to whatever they like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Generic, Protocol, TypeVar
+
+from rbxcompose.geometry import Pose2
+
+M = TypeVar("M")
+M_contra = TypeVar("M_contra", contravariant=True)
+M_co = TypeVar("M_co", covariant=True)
+Q_contra = TypeVar("Q_contra", contravariant=True)
+R = TypeVar("R")
+R_contra = TypeVar("R_contra", contravariant=True)
+G_co = TypeVar("G_co", covariant=True)
+G_contra = TypeVar("G_contra", contravariant=True)
+F_co = TypeVar("F_co", covariant=True)
+F_contra = TypeVar("F_contra", contravariant=True)
+
+
+class Refused(Exception):  # noqa: N818 - it is an answer, not an error of ours
+    """Raised by a component to refuse a request or a command; its text is the reason."""
+
+
+class Sender(Protocol[M_contra]):
+    """Publishes one message per call."""
+
+    def __call__(self, message: M_contra, /) -> None:
+        """Publish `message`."""
+        ...
+
+
+class Latest(Protocol[M_co]):
+    """The newest message of a subscription."""
+
+    @property
+    def value(self) -> M_co | None:
+        """Return the newest message, or None before the first."""
+        ...
+
+    @property
+    def age(self) -> float:
+        """Return the time since the newest message arrived [s], infinite before the first."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Reply(Generic[R]):
+    """How a call ended: with a response, or without one and why."""
+
+    response: R | None
+    error: str = ""
+
+
+class Caller(Protocol[Q_contra, R]):
+    """Asks a service; the reply comes later, on the same thread."""
+
+    @property
+    def is_available(self) -> bool:
+        """Tell whether a server is known."""
+        ...
+
+    def __call__(self, request: Q_contra, then: Callable[[Reply[R]], None], /, *, timeout: float = 5.0) -> None:
+        """Send `request`; `then` gets the reply, or an error after `timeout` [s]."""
+        ...
+
+
+class Outcome(StrEnum):
+    """How a goal ended."""
+
+    SUCCEEDED = "succeeded"
+    ABORTED = "aborted"
+    CANCELED = "canceled"
+    REJECTED = "rejected"  # the server refused it
+    LOST = "lost"  # the server went away
+
+
+@dataclass(frozen=True, slots=True)
+class Ended(Generic[R]):
+    """The end of a goal as its client sees it; `result` is None if none came."""
+
+    outcome: Outcome
+    result: R | None = None
+    message: str = ""
+
+
+class ServedGoal(Protocol[G_co, R_contra, F_contra]):
+    """A goal as its server sees it; exactly one of the last three methods ends it."""
+
+    @property
+    def request(self) -> G_co:
+        """Return the goal as it was sent."""
+        ...
+
+    @property
+    def cancel_requested(self) -> bool:
+        """Tell whether the goal should end soon, by `canceled`."""
+        ...
+
+    def feedback(self, message: F_contra, /) -> None:
+        """Tell the client how far it got."""
+        ...
+
+    def succeeded(self, result: R_contra | None = None, /) -> None:
+        """End the goal well; without a result its zero value is sent."""
+        ...
+
+    def aborted(self, reason: str = "", result: R_contra | None = None, /) -> None:
+        """End the goal badly; the reason goes to the log."""
+        ...
+
+    def canceled(self, result: R_contra | None = None, /) -> None:
+        """End the goal because its client or a stop asked for it."""
+        ...
+
+
+class ActionServer(Protocol[G_co, R_contra, F_contra]):
+    """The goal that a server carries out."""
+
+    @property
+    def current(self) -> ServedGoal[G_co, R_contra, F_contra] | None:
+        """Return the accepted goal, or None; a newer goal replaces it."""
+        ...
+
+
+class SentGoal(Protocol):
+    """A goal as its client sees it."""
+
+    def cancel(self) -> None:
+        """Ask the server to end it; `Ended` still comes."""
+        ...
+
+
+class ActionCaller(Protocol[G_contra, R, F_co]):
+    """Sends goals to a server."""
+
+    @property
+    def is_available(self) -> bool:
+        """Tell whether a server is known."""
+        ...
+
+    def __call__(
+        self, goal: G_contra, then: Callable[[Ended[R]], None], feedback: Callable[[F_co], None] | None = None, /
+    ) -> SentGoal:
+        """Send `goal`; `then` gets its end exactly once."""
+        ...
+
+
+class Look(Protocol):
+    """A pose of one frame in another."""
+
+    def now(self) -> Pose2 | None:
+        """Return the newest pose [m, m, rad], or None while the frames are not connected."""
+        ...

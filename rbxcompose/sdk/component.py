@@ -1,0 +1,150 @@
+"""The contract of a component: configuration, ports, lifecycle, one step at a time."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any, ClassVar, Generic, Protocol, TypeVar, get_args
+
+from rbxcompose.clock import Clock
+from rbxcompose.config import Config
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.sdk.bound import Refused
+from rbxcompose.sdk.ports import Port
+
+C = TypeVar("C", bound=Config)
+
+
+class Context(Protocol):
+    """What the runtime gives to a component besides its ports."""
+
+    clock: Clock
+
+    @property
+    def is_stopped(self) -> bool:
+        """Tell whether the robot is held by a stop."""
+        ...
+
+    def log(self, level: Level, text: str) -> None:
+        """Write one event of the robot's story."""
+        ...
+
+    def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
+        """Tell diagnostics how the component is."""
+        ...
+
+    def wake_at(self, time: float) -> None:
+        """Call the component's `wake` at robot time `time` [s]; an earlier wish is kept as well."""
+        ...
+
+    def notify(self, event: str, **data: object) -> None:
+        """Tell the supervisor of something that concerns the whole robot."""
+        ...
+
+
+class Component(Generic[C]):
+    """A running part of the robot: subclass it, declare ports, fill in what is needed.
+
+    The runtime calls every method from one thread. Time comes from `now`, never from Python's clocks.
+    """
+
+    rate: ClassVar[float] = 0.0  # [Hz] of `step`; 0: no steps
+    process: ClassVar[str] = "robot"  # default process group
+    simulated: ClassVar[bool] = False  # exists only in simulation
+    type_name: ClassVar[str] = ""  # set by the decorator
+
+    def __init__(self, name: str, config: C, context: Context) -> None:
+        self.name = name
+        self.config = config
+        self.context = context
+        self.bound: dict[str, Any] = {}  # by port name, filled before `configure`
+
+    @classmethod
+    def config_type(cls) -> type[Config]:
+        """Return the configuration model, as named by `Component[...]`."""
+        for base in inspect.getmro(cls):
+            for generic in getattr(base, "__orig_bases__", ()):
+                for argument in get_args(generic):
+                    if isinstance(argument, type) and issubclass(argument, Config):
+                        return argument
+        return Config
+
+    @classmethod
+    def ports(cls, config: C) -> dict[str, Port[Any]]:
+        """Return all ports by name; override and add those that depend on the configuration."""
+        return {name: port for name, port in inspect.getmembers(cls) if isinstance(port, Port)}
+
+    @property
+    def now(self) -> float:
+        """Return robot time [s]."""
+        return self.context.clock.now()
+
+    @property
+    def stamp(self) -> int:
+        """Return the time for message headers [ns]."""
+        return self.context.clock.stamp()
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Tell whether nothing that this component moves is moving."""
+        return True
+
+    def info(self, text: str) -> None:
+        """Log an event of the robot's story."""
+        self.context.log(Level.OK, text)
+
+    def warn(self, text: str) -> None:
+        """Log something that a person should look at."""
+        self.context.log(Level.WARN, text)
+
+    def status(self, level: Level, message: str, /, **values: object) -> None:
+        """Tell diagnostics how this component is."""
+        self.context.status(level, message, values)
+
+    def configure(self) -> None:
+        """Get ready: import what is heavy, build the core, open devices. Nothing moves yet."""
+
+    def activate(self) -> None:
+        """Start to work; steps and messages come from now on."""
+
+    def deactivate(self) -> None:
+        """Stop to work; steps and messages end."""
+
+    def cleanup(self) -> None:
+        """Give back what `configure` took."""
+
+    def step(self, dt: float) -> None:
+        """Advance by `dt` [s], `rate` times per second."""
+
+    def received(self, port: str, message: Any) -> None:
+        """Take a message of an input that has no method `on_<port>` of its own."""
+
+    def wake(self) -> None:
+        """Do what was asked for by `context.wake_at`."""
+
+    def start(self) -> None:
+        """Begin what waits for the whole robot to be active."""
+
+    def stop(self) -> None:
+        """Hold everything that moves until `release`: someone pressed stop."""
+
+    def release(self) -> None:
+        """Allow motion again; start none."""
+
+    def brake(self) -> None:
+        """Come to rest for good: the robot is going down."""
+
+    def lost(self, names: tuple[str, ...], cause: str) -> None:
+        """Hear that these components have gone."""
+
+    def command(self, verb: str) -> str:
+        """Carry out a command of a person and return the answer.
+
+        Raises:
+            Refused: if it cannot be done, with the reason.
+        """
+        raise Refused(f"'{self.name}' does not know the command '{verb}'")
+
+    def summary(self) -> dict[str, str]:
+        """Return facts for the summary at the end, by their label."""
+        return {}

@@ -1,0 +1,132 @@
+"""Ports: what a component says and hears, declared in its class so that `check` can prove the wiring.
+
+On a class, a port is its declaration; on a component, it is the live thing that the runtime has bound to it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, overload
+
+from rbxcompose.msgs.types import Action, Message, Service
+from rbxcompose.qos import Qos
+from rbxcompose.sdk.bound import ActionCaller, ActionServer, Caller, Latest, Look, Sender
+
+if TYPE_CHECKING:
+    from rbxcompose.sdk.component import Component
+
+M = TypeVar("M", bound=Message)
+Q = TypeVar("Q", bound=Message)
+R = TypeVar("R", bound=Message)
+G = TypeVar("G", bound=Message)
+F = TypeVar("F", bound=Message)
+B = TypeVar("B")  # what the port is on a component
+
+
+class Port(Generic[B]):
+    """A named end of a wire. `topic` is its ROS name, relative to the robot's namespace unless it starts with `/`."""
+
+    kind: ClassVar[str]
+    interface: type[Any] | None = None  # message, service or action
+
+    def __init__(self, topic: str) -> None:
+        self.topic = topic
+        self.name = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @overload
+    def __get__(self, component: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, component: Component[Any], owner: type) -> B: ...
+    def __get__(self, component: Component[Any] | None, owner: type) -> Self | B:
+        return self if component is None else self.of(component)
+
+    def of(self, component: Component[Any]) -> B:
+        """Return what this port is on `component` (for ports that depend on its configuration)."""
+        bound: B = component.bound[self.name]
+        return bound
+
+    def named(self, name: str) -> Self:
+        """Give a name to a port that is not an attribute of a class."""
+        self.name = name
+        return self
+
+
+class Out(Port[Sender[M]]):
+    """Publishes messages: call it with one. `unit` says what a bare number in the message means (`%`)."""
+
+    kind = "out"
+
+    def __init__(self, message: type[M], topic: str, *, qos: Qos | str = Qos.STATE, unit: str = "") -> None:
+        super().__init__(topic)
+        self.interface, self.qos, self.unit = message, Qos(qos), unit
+
+
+class In(Port[Latest[M]]):
+    """Subscribes to messages: each one goes to the method `on_<port>`, the newest can be asked for."""
+
+    kind = "in"
+
+    def __init__(
+        self, message: type[M], topic: str, *, qos: Qos | str = Qos.STATE, unit: str = "", is_open: bool = False
+    ) -> None:
+        """Take `is_open` for an input that may well be fed from outside the robot."""
+        super().__init__(topic)
+        self.interface, self.qos, self.unit, self.is_open = message, Qos(qos), unit, is_open
+
+
+class Serves(Port[None]):
+    """Answers requests: the method `on_<port>` takes a request and returns the response."""
+
+    kind = "serves"
+
+    def __init__(self, service: type[Service[Q, R]], topic: str) -> None:
+        super().__init__(topic)
+        self.interface = service
+
+
+class Calls(Port[Caller[Q, R]]):
+    """Asks a service of another component."""
+
+    kind = "calls"
+
+    def __init__(self, service: type[Service[Q, R]], topic: str) -> None:
+        super().__init__(topic)
+        self.interface = service
+
+
+class ServesAction(Port[ActionServer[G, R, F]]):
+    """Carries out goals, one at a time; a newer one replaces it. It is a skill of every mission under its topic's name.
+
+    `claims` names what of the robot a goal needs for itself (`base`, `arm`, `head`, `voice`). The optional method
+    `accept_<port>` may refuse a goal by returning the reason.
+    """
+
+    kind = "serves_action"
+
+    def __init__(
+        self, action: type[Action[G, R, F]], topic: str, *, claims: str = "", restartable: bool = True
+    ) -> None:
+        super().__init__(topic)
+        self.interface, self.claims, self.restartable = action, claims, restartable
+
+
+class CallsAction(Port[ActionCaller[G, R, F]]):
+    """Sends goals to another component."""
+
+    kind = "calls_action"
+
+    def __init__(self, action: type[Action[G, R, F]], topic: str) -> None:
+        super().__init__(topic)
+        self.interface = action
+
+
+class Looks(Port[Look]):
+    """Looks up the pose of frame `source` in frame `target`."""
+
+    kind = "looks"
+
+    def __init__(self, *, source: str, target: str) -> None:
+        super().__init__("")
+        self.source, self.target = source, target

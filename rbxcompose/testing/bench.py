@@ -1,0 +1,122 @@
+"""A bench for components: virtual time, a bus within the process, nothing that waits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+from rbxcompose.bus.bus import Bus
+from rbxcompose.clock import SteppedClock
+from rbxcompose.config import Place
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.model.wiring import ends_of
+from rbxcompose.msgs.types import Message
+from rbxcompose.plan.model import Instance, Plan, Wire
+from rbxcompose.qos import Qos
+from rbxcompose.runtime.host import Host
+from rbxcompose.runtime.records import Record
+from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.registry import component_type
+
+M = TypeVar("M", bound=Message)
+OWNER = "bench"
+
+
+def instance(
+    name: str, type_name: str, config: Mapping[str, object] | None = None, places: Sequence[Place] = ()
+) -> Instance:
+    """Return an instance with its type's own topics; `config` is written as in a manifest (`{"runtime": "45 s"}`)."""
+    cls = component_type(type_name)
+    context = {"places": {place.name: place for place in places}}
+    made = cls.config_type().model_validate(dict(config or {}), context=context)
+    ends = ends_of(name, cls, made, "", {})
+    wires = tuple(Wire(end.name, end.port.kind, end.topic, end.type_name) for end in ends)
+    return Instance(name, type_name, made, cls.process, (), wires)
+
+
+class Bench:
+    """Instances, or a whole `plan`, in one process on a stepped clock, configured and active from the start.
+
+    `records` holds what they logged, `events` what they told the supervisor.
+    """
+
+    def __init__(self, *instances: Instance, plan: Plan | None = None, start: bool = True) -> None:
+        self.clock = SteppedClock()
+        self.scheduler = Scheduler()
+        self.records: list[Record] = []
+        self.events: list[tuple[str, dict[str, object]]] = []
+        self.plan = plan.in_one_process() if plan else Plan("bench", "bench.yaml", tuple(instances))
+        bus = self.plan.bus
+        self.bus = Bus(
+            self.scheduler,
+            self.clock,
+            domain=bus.domain,
+            namespace=bus.namespace,
+            wire=bus.wire,
+            log=self._note,
+        )
+        self.host = Host(
+            self.plan,
+            self.plan.instances,
+            self.scheduler,
+            self.clock,
+            self.bus,
+            self.records.append,
+            self._event,
+        )
+        self.host.configure()
+        self.host.activate([one.name for one in self.plan.instances])
+        if start:
+            self.host.start()
+        self.advance(0.0)
+
+    def advance(self, seconds: float) -> None:
+        """Let `seconds` of robot time pass, event by event."""
+        self.run_until(lambda: False, seconds)
+
+    def run_until(self, reached: Callable[[], bool], most: float = 600.0) -> bool:
+        """Let time pass until `reached()` holds, at most `most` [s] of robot time; return whether it does."""
+        end = self.clock.now() + most
+        self.scheduler.advance(self.clock.now())
+        while not reached():
+            due = self.scheduler.next_due()
+            if due is None or due > end:
+                self.clock.advance_to(end)
+                self.scheduler.advance(end)
+                return reached()
+            self.clock.advance_to(max(due, self.clock.now()))
+            self.scheduler.advance(self.clock.now())
+        return True
+
+    def component(self, name: str) -> Component[Any]:
+        """Return the running component of an instance.
+
+        Raises:
+            LookupError: if it is not there, for instance since it failed.
+        """
+        found = self.host.hosted[name].component
+        if found is None:
+            raise LookupError(f"'{name}' does not run: {self.texts()}")
+        return found
+
+    def publish(self, topic: str, message: Message, qos: Qos = Qos.COMMAND) -> None:
+        """Publish a message from outside the components and let it be taken."""
+        self.bus.publisher(OWNER, topic, type(message), qos)(message)
+        self.advance(0.0)
+
+    def collect(self, topic: str, message: type[M], qos: Qos = Qos.EVENT) -> list[M]:
+        """Return a list that grows by each message on a topic."""
+        found: list[M] = []
+        self.bus.subscribe(OWNER, topic, message, qos, found.append)
+        return found
+
+    def texts(self) -> list[str]:
+        """Return what was logged, as `source: text`."""
+        return [f"{record.source}: {record.text}" for record in self.records]
+
+    def _note(self, owner: str, text: str) -> None:
+        self.records.append(Record(self.clock.now(), Level.WARN, owner, text))
+
+    def _event(self, event: str, data: dict[str, object]) -> None:
+        self.events.append((event, data))

@@ -1,0 +1,58 @@
+"""Checking a manifest that a test writes down."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.plan.model import Plan
+from rbxcompose.rendering import render_text
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What the compiler made of a text."""
+
+    compilation: Compilation
+
+    @property
+    def text(self) -> str:
+        """Return the findings as a person reads them."""
+        return render_text(self.compilation.report, self.compilation.sources)
+
+    @property
+    def codes(self) -> list[str]:
+        """Return the codes of the findings, in the order of their places."""
+        return [finding.code for finding in self.compilation.report]
+
+    @property
+    def plan(self) -> Plan:
+        """Return the plan.
+
+        Raises:
+            AssertionError: with the findings, if there is none.
+        """
+        if self.compilation.plan is None:
+            raise AssertionError(self.text)
+        return self.compilation.plan
+
+
+def check_text(
+    text: str,
+    folder: Path,
+    *,
+    others: Mapping[str, str] | None = None,
+    profiles: Sequence[str] = (),
+    sets: Sequence[str] = (),
+    real: bool = False,
+    environment: Mapping[str, str] | None = None,
+) -> Checked:
+    """Write `text` to `robot.yaml` in `folder`, `others` beside it by their paths, and compile the robot."""
+    for name, other in {**(others or {}), "robot.yaml": text}.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(other, encoding="utf-8")
+    robot = str(folder / "robot.yaml")
+    return Checked(compile_robot(robot, profiles=profiles, sets=sets, real=real, environment=environment or {}))

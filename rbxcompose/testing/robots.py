@@ -1,0 +1,35 @@
+"""Running a whole robot in virtual time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rbxcompose.plan.model import Plan
+from rbxcompose.testing.bench import Bench
+
+LONGEST = 3600.0  # [s] of robot time
+
+
+@dataclass(frozen=True, slots=True)
+class Ran:
+    """A robot whose mission has ended, or that has had its time."""
+
+    bench: Bench
+
+    @property
+    def outcome(self) -> str:
+        """Return how the mission ended: `success`, `failure`, or `running` if it has not."""
+        ends = [data["outcome"] for event, data in self.bench.events if event == "mission_ended"]
+        return str(ends[0]) if ends else "running"
+
+    @property
+    def log(self) -> str:
+        """Return the log, one record a line."""
+        return "\n".join(record.to_json() for record in self.bench.records)
+
+
+def run_robot(plan: Plan, *, most: float = LONGEST) -> Ran:
+    """Run a robot until its mission has ended, at most `most` [s] of robot time."""
+    bench = Bench(plan=plan)
+    bench.run_until(lambda: any(event == "mission_ended" for event, _ in bench.events), most)
+    return Ran(bench)

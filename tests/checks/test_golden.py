@@ -1,0 +1,28 @@
+"""Each check has a golden pair: a robot with its mistake, and what `check` says of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.checking import Check, all_checks
+from rbxcompose.compiler import compile_robot
+from rbxcompose.rendering import render_text
+from rbxcompose.testing.golden import Golden
+
+FOLDER = Path(__file__).parent / "golden"
+
+
+@pytest.mark.parametrize("check", all_checks(), ids=lambda check: check.code)
+def test_what_a_check_says_is_its_golden_text(check: Check, golden: Golden, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(FOLDER)
+    robot = Path(f"{check.code}.yaml")
+    real = "# check: --real" in robot.read_text(encoding="utf-8")
+    out = compile_robot(str(robot), real=real, environment={})
+    assert {finding.code for finding in out.report} == {check.code}
+    golden.check(f"{check.code}.txt", render_text(out.report, out.sources))
+
+
+def test_every_golden_robot_belongs_to_a_check() -> None:
+    assert {path.stem for path in FOLDER.iterdir()} == {check.code for check in all_checks()}

@@ -1,0 +1,118 @@
+"""What every registered component type keeps, ours and those of others."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rbxcompose.compiler import compile_robot
+from rbxcompose.manifest.robot_file import load_robot
+from rbxcompose.plan.model import Instance
+from rbxcompose.rendering import render_text
+from rbxcompose.sdk.ports import In, Serves
+from rbxcompose.sdk.registry import component_names, component_type
+from rbxcompose.testing.bench import Bench
+
+assert load_robot  # the front end is what the examples go through
+
+ROBOT = """
+rbx: 1
+kind: Robot
+name: example
+places:
+  dock: {{x: 0 m, y: 0 m, heading: 0 deg}}
+components:
+{example}
+"""
+HEAVY = {"pin", "ompl", "yourdfpy", "mujoco", "cv2", "scipy"}
+TYPES = [name for name in component_names() if not name.startswith("toy_")]
+all_types = pytest.mark.parametrize("name", TYPES)
+
+
+def example_of(name: str) -> str:
+    """Return the example in a type's docstring, indented as below `components:`."""
+    text = inspect.cleandoc(component_type(name).__doc__ or "").partition("Example:\n")[2]
+    return inspect.cleandoc(text)
+
+
+def instance_of(name: str, folder: Path) -> Instance:
+    """Compile the example of a type and return its instance."""
+    file = folder / "robot.yaml"
+    file.write_text(ROBOT.format(example="  " + example_of(name).replace("\n", "\n  ")), encoding="utf-8")
+    out = compile_robot(str(file), environment={})
+    assert out.plan, render_text(out.report, out.sources)
+    return next(one for one in out.plan.instances if one.type == name)
+
+
+@all_types
+def test_it_says_what_it_is_and_shows_how_it_is_written(name: str) -> None:
+    assert (component_type(name).__doc__ or "").strip()
+    assert example_of(name).startswith(f"{example_of(name).partition(':')[0]}: {{type: {name}")
+
+
+@all_types
+def test_its_example_is_a_valid_robot(name: str, tmp_path: Path) -> None:
+    assert instance_of(name, tmp_path).type == name
+
+
+@all_types
+def test_every_field_of_its_configuration_is_described(name: str) -> None:
+    fields = component_type(name).config_type().model_fields
+    assert [field for field, info in fields.items() if not info.description] == []
+
+
+@all_types
+def test_it_has_a_handler_for_each_input_and_service(name: str, tmp_path: Path) -> None:
+    cls, config = component_type(name), instance_of(name, tmp_path).config
+    for port, end in cls.ports(config).items():
+        if isinstance(end, Serves):
+            assert hasattr(cls, f"on_{port}")
+        if isinstance(end, In) and not hasattr(cls, f"on_{port}"):
+            assert overrides_received(cls) or port in inspect.getsource(cls)
+
+
+def overrides_received(cls: type[Any]) -> bool:
+    return "received" in vars(cls)
+
+
+@all_types
+def test_its_lifecycle_runs_twice_and_leaves_nothing_on_the_bus(name: str, tmp_path: Path) -> None:
+    robot = Bench(instance_of(name, tmp_path))
+    one = next(iter(robot.host.hosted))
+    robot.advance(2.0)
+    robot.host.shutdown()
+    left = len(robot.bus)
+    robot.host.is_braking = False
+    robot.host.configure()
+    robot.host.activate([one])
+    robot.advance(2.0)
+    assert robot.host.states()[one] == ("active", 0), robot.texts()
+    robot.host.shutdown()
+    assert len(robot.bus) == left
+
+
+@all_types
+def test_it_does_the_same_for_the_same_input(name: str, tmp_path: Path) -> None:
+    def run() -> list[str]:
+        robot = Bench(instance_of(name, tmp_path))
+        robot.advance(3.0)
+        return [record.to_json() for record in robot.records]
+
+    assert run() == run()
+
+
+@all_types
+def test_importing_it_imports_nothing_heavy(name: str) -> None:
+    code = (
+        "import sys\n"
+        "from rbxcompose.sdk.registry import component_type\n"
+        f"component_type({name!r})\n"
+        f"print(*sorted(sys.modules.keys() & {HEAVY!r}))\n"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == ""

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+import pytest
+
+from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.testing.bench import Bench, instance
+
+FORWARDS = Twist(linear=Vector3(x=0.4))
+
+
+def bench() -> Bench:
+    return Bench(instance("base", "diff_drive_sim", {"command_timeout": "0.5 s"}))
+
+
+def drive(robot: Bench, seconds: float) -> None:
+    for _ in range(round(seconds / 0.1)):
+        robot.publish("/cmd_vel", FORWARDS)
+        robot.advance(0.1)
+
+
+def test_it_follows_commands_and_tells_where_it_is() -> None:
+    robot = bench()
+    odometry = robot.collect("/odom", Odometry)
+    transforms = robot.collect("/tf", TFMessage)
+    drive(robot, 2.0)
+    assert odometry[-1].twist.twist.linear.x == pytest.approx(0.4)
+    assert odometry[-1].pose.pose.position.x == pytest.approx(0.72, abs=0.01)
+    link = transforms[-1].transforms[0]
+    assert (link.header.frame_id, link.child_frame_id) == ("odom", "base_footprint")
+    assert link.transform.translation.x == odometry[-1].pose.pose.position.x
+
+
+def test_it_brakes_when_no_command_comes() -> None:
+    robot = bench()
+    drive(robot, 2.0)
+    odometry = robot.collect("/odom", Odometry)
+    robot.advance(0.3)  # the last command is 0.4 s old now and still holds
+    assert odometry[-1].twist.twist.linear.x == pytest.approx(0.4)
+    robot.advance(0.7)
+    assert odometry[-1].twist.twist.linear.x == 0.0
+
+
+@pytest.mark.parametrize("action", ["stop", "brake"])
+def test_it_comes_to_rest_whatever_is_commanded_when_it_must(action: str) -> None:
+    robot = bench()
+    drive(robot, 1.0)
+    getattr(robot.host, action)()
+    drive(robot, 0.5)
+    assert robot.host.is_at_rest
+
+
+def test_it_moves_again_after_a_release_only_when_commanded() -> None:
+    robot = bench()
+    drive(robot, 1.0)
+    robot.host.stop()
+    drive(robot, 0.5)
+    robot.host.release()
+    robot.advance(1.0)
+    assert robot.host.is_at_rest
+    drive(robot, 0.5)
+    assert not robot.host.is_at_rest
+
+
+def test_the_summary_tells_the_way_driven() -> None:
+    robot = bench()
+    drive(robot, 2.0)
+    robot.advance(2.0)
+    assert robot.host.summary()["base"]["distance driven"] == "0.96 m"

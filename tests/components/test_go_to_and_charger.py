@@ -1,0 +1,125 @@
+"""Driving and charging together, as the patrol robot does it."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from rbxcompose.config import Place
+from rbxcompose.geometry import Pose2, quaternion_from_yaw
+from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
+from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.msgs.rbxcompose_msgs import Recharge
+from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.sdk import Ended, Outcome, SentGoal
+from rbxcompose.testing.bench import Bench, instance
+
+DOCK = Place("dock", 0.5, 0.5, 0.0)
+
+
+def bench() -> Bench:
+    return Bench(
+        instance("base", "diff_drive_sim"),
+        instance("transforms", "transforms"),
+        instance("battery", "battery_sim", {"runtime": "60 s"}),
+        instance("go_to", "go_to"),
+        instance("charger", "charger", {"dock": "dock"}, [DOCK]),
+    )
+
+
+def goal(x: float, y: float, heading: float = 0.0, frame: str = "map") -> NavigateToPose.Goal:
+    pose = Pose(position=Point(x=x, y=y), orientation=Quaternion(*quaternion_from_yaw(heading)))
+    return NavigateToPose.Goal(pose=PoseStamped(header=Header(frame_id=frame), pose=pose))
+
+
+class Driver:
+    """A client that keeps what it is told."""
+
+    def __init__(self, robot: Bench) -> None:
+        self.robot = robot
+        self.ended: list[Ended[NavigateToPose.Result]] = []
+        self.left: list[float] = []
+        self.client = robot.bus.action_client("bench", "/go_to", NavigateToPose)
+
+    def send(self, request: NavigateToPose.Goal) -> SentGoal:
+        return self.client(request, self.ended.append, lambda feedback: self.left.append(feedback.distance_remaining))
+
+    def pose(self) -> Pose2:
+        pose: Pose2 = self.robot.component("base").core.pose  # type: ignore[attr-defined]
+        return pose
+
+
+def test_it_drives_to_a_pose_and_turns_to_its_heading() -> None:
+    robot = bench()
+    driver = Driver(robot)
+    robot.advance(0.1)
+    driver.send(goal(1.0, 0.0, math.pi / 2))
+    assert robot.run_until(lambda: bool(driver.ended), 10.0)
+    assert driver.ended[0].outcome is Outcome.SUCCEEDED
+    assert driver.pose().distance(Pose2(1.0, 0.0)) < 0.05
+    assert driver.pose().heading == pytest.approx(math.pi / 2, abs=math.radians(3))
+    assert driver.left[0] > driver.left[-1]
+
+
+def test_a_cancelled_goal_ends_canceled_and_the_base_rests() -> None:
+    robot = bench()
+    driver = Driver(robot)
+    robot.advance(0.1)
+    sent = driver.send(goal(1.0, 0.0))
+    robot.advance(2.0)
+    sent.cancel()
+    robot.advance(1.0)
+    assert [end.outcome for end in driver.ended] == [Outcome.CANCELED]
+    assert robot.host.is_at_rest
+
+
+def test_a_newer_goal_replaces_the_current_one() -> None:
+    robot = bench()
+    driver = Driver(robot)
+    robot.advance(0.1)
+    driver.send(goal(1.0, 0.0))
+    robot.advance(1.0)
+    driver.send(goal(0.0, 0.5))
+    assert robot.run_until(lambda: len(driver.ended) == 2, 20.0)
+    assert [end.outcome for end in driver.ended] == [Outcome.ABORTED, Outcome.SUCCEEDED]
+    assert driver.pose().distance(Pose2(0.0, 0.5)) < 0.05
+
+
+def test_a_goal_in_another_frame_is_refused() -> None:
+    robot = bench()
+    driver = Driver(robot)
+    robot.advance(0.1)
+    driver.send(goal(1.0, 0.0, frame="moon"))
+    robot.advance(0.1)
+    assert [end.outcome for end in driver.ended] == [Outcome.REJECTED]
+
+
+def test_a_stop_cancels_the_goal_and_refuses_new_ones() -> None:
+    robot = bench()
+    driver = Driver(robot)
+    robot.advance(0.1)
+    driver.send(goal(1.0, 0.0))
+    robot.advance(1.0)
+    robot.host.stop()
+    robot.advance(1.0)
+    driver.send(goal(1.0, 0.0))
+    robot.advance(0.1)
+    assert [end.outcome for end in driver.ended] == [Outcome.CANCELED, Outcome.REJECTED]
+
+
+def test_charging_is_refused_away_from_the_dock_and_done_at_it() -> None:
+    robot = bench()
+    driver = Driver(robot)
+    charged: list[Ended[Recharge.Result]] = []
+    charger = robot.bus.action_client("bench", "/recharge", Recharge)
+    robot.advance(5.0)
+    charger(Recharge.Goal(), charged.append)
+    robot.advance(0.5)
+    assert [end.outcome for end in charged] == [Outcome.REJECTED]
+    driver.send(goal(0.5, 0.5))
+    robot.run_until(lambda: bool(driver.ended), 10.0)
+    charger(Recharge.Goal(), charged.append)
+    robot.advance(1.0)
+    assert charged[1].outcome is Outcome.SUCCEEDED
+    assert charged[1].result == Recharge.Result(level=100.0)

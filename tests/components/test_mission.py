@@ -1,0 +1,353 @@
+"""The executive on a fake robot: goals go out, results come in, the story is told."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pytest
+
+from rbxcompose.clock import Clock, SteppedClock
+from rbxcompose.components.mission import Mission, MissionConfig
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.expressions.types import TYPES
+from rbxcompose.findings import Report
+from rbxcompose.geometry import Pose2
+from rbxcompose.manifest.reader import read_text
+from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.missions.goals import skill_of
+from rbxcompose.missions.program import Program
+from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.sources import SkillSource, ValueSource
+from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.msgs.rbxcompose_msgs import Recharge
+from rbxcompose.msgs.std_msgs import Float32
+from rbxcompose.sdk import Ended, Outcome, Place, Refused
+
+PLACES = {"dock": Place("dock", 0.5, 0.5, 0.0), "corner": Place("corner", 1.0, 0.0, 0.0)}
+
+
+def program_of(text: str) -> Program:
+    root, findings = read_text(textwrap.dedent(text), "mission.yaml")
+    assert isinstance(root, Tree)
+    assert not findings
+    report = Report()
+    program = read_program(root, report)
+    assert program is not None
+    assert not report.has_errors, list(report)
+    return program
+
+
+class Goal:
+    """A goal at the fake server."""
+
+    def __init__(self, request: Any, then: Callable[[Ended[Any]], None]) -> None:
+        self.request = request
+        self.then = then
+        self.is_cancelled = False
+
+    def cancel(self) -> None:
+        self.is_cancelled = True
+
+
+class Server:
+    """An action server that tests drive by hand."""
+
+    def __init__(self) -> None:
+        self.is_available = True
+        self.goals: list[Goal] = []
+
+    def __call__(self, request: Any, then: Callable[[Ended[Any]], None], feedback: object = None, /) -> Goal:
+        self.goals.append(Goal(request, then))
+        return self.goals[-1]
+
+    def end(self, outcome: Outcome, message: str = "") -> None:
+        self.goals[-1].then(Ended(outcome, None, message))
+
+
+class Look:
+    def __init__(self) -> None:
+        self.pose: Pose2 | None = None
+
+    def now(self) -> Pose2 | None:
+        return self.pose
+
+
+class Robot:
+    """A mission component with a fake context and fake ports, on a stepped clock."""
+
+    def __init__(self, text: str, start: str | None = "test") -> None:
+        self.stepped = SteppedClock()
+        self.clock: Clock = self.stepped
+        self.is_stopped = False
+        self.lines: list[str] = []
+        self.levels: list[Level] = []
+        self.events: list[dict[str, object]] = []
+        self.statuses: list[str] = []
+        self.wakes: list[float] = []
+        config = MissionConfig(
+            programs={"test": program_of(text)},
+            start=start,
+            values={"battery": ValueSource("battery_level", "std_msgs/msg/Float32", "data", 0.01, TYPES["ratio"])},
+            places=PLACES,
+            skills={
+                "go_to": SkillSource(skill_of(NavigateToPose, "go_to"), "nav2_msgs/action/NavigateToPose", "go_to"),
+                "recharge": SkillSource(
+                    skill_of(Recharge, "recharge", restartable=False), "rbxcompose_msgs/action/Recharge", "recharge"
+                ),
+            },
+        )
+        self.go_to, self.recharge, self.look = Server(), Server(), Look()
+        self.mission = Mission("mission", config, self)
+        self.mission.bound = {"skill_go_to": self.go_to, "skill_recharge": self.recharge, "pose": self.look}
+        self.mission.configure()
+        self.mission.activate()
+
+    def log(self, level: Level, text: str) -> None:
+        self.lines.append(f"{self.clock.now():g} {text}")
+        self.levels.append(level)
+
+    def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
+        self.statuses.append(message)
+
+    def wake_at(self, time: float) -> None:
+        self.wakes.append(time)
+
+    def notify(self, event: str, **data: object) -> None:
+        self.events.append({"event": event, **data})
+
+    def level(self, percent: float) -> None:
+        self.mission.received("value_battery", Float32(data=percent))
+
+    def start(self) -> None:
+        self.mission.start()
+        self.advance(0.0)
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass, and wake the component whenever it asked for it."""
+        end = self.clock.now() + seconds
+        while due := sorted(time for time in self.wakes if time <= end):
+            self.wakes.remove(due[0])
+            self.stepped.advance_to(max(due[0], self.clock.now()))
+            self.mission.wake()
+        self.stepped.advance_to(end)
+
+
+PATROL = """
+interrupts:
+  low:
+    when: $battery < 50 %
+    do: recharge
+do:
+  - go_to: corner
+  - go_to: dock
+"""
+
+
+def test_it_declares_only_what_its_missions_use() -> None:
+    assert sorted(Mission.ports(Robot(PATROL).mission.config)) == ["skill_go_to", "skill_recharge", "value_battery"]
+    assert sorted(Mission.ports(Robot("do:\n  check: distance($pose, dock) < 1 m").mission.config)) == ["pose"]
+    assert Mission.ports(MissionConfig()) == {}
+
+
+def test_it_waits_for_every_value_that_is_read_then_tells_its_story() -> None:
+    robot = Robot(PATROL)
+    robot.start()
+    robot.advance(1.0)
+    assert robot.go_to.goals == []
+    robot.level(100.0)
+    robot.advance(5.2)
+    assert robot.go_to.goals[0].request.pose.pose.position.x == 1.0
+    robot.go_to.end(Outcome.SUCCEEDED)
+    robot.advance(1.3)
+    robot.level(49.0)
+    robot.advance(2.0)
+    assert robot.go_to.goals[1].is_cancelled
+    robot.level(100.0)
+    robot.recharge.end(Outcome.SUCCEEDED)
+    robot.advance(1.0)
+    robot.go_to.end(Outcome.ABORTED, "stuck")
+    robot.advance(0.0)
+    assert robot.lines == [
+        "0 mission test waits for battery",
+        "1 go_to corner",
+        "6.2 go_to corner: success (5.2 s)",
+        "6.2 go_to dock",
+        "7.5 interrupt low: $battery < 50 % (battery 49 %)",
+        "7.5 go_to dock: halted (1.3 s)",
+        "7.5 recharge",
+        "9.5 recharge: success (2 s)",
+        "9.5 interrupt low done, back to go_to dock",
+        "9.5 go_to dock",
+        "10.5 go_to dock: failure (1 s): stuck",
+        "10.5 mission test: failure: do.sequence.go_to.1: stuck",
+    ]
+    assert robot.events == [
+        {
+            "event": "mission_ended",
+            "mission": "test",
+            "outcome": "failure",
+            "message": "do.sequence.go_to.1: stuck",
+        }
+    ]
+    assert robot.mission.summary() == {
+        "mission": "test: failure",
+        "skills": "go_to 3 (1 success, 1 halted, 1 failure), recharge 1 (1 success)",
+    }
+    assert robot.statuses == ["waiting for battery", "running test", "test: failure"]
+
+
+def test_without_a_start_mission_it_does_nothing() -> None:
+    robot = Robot("do:\n  go_to: dock", start=None)
+    robot.start()
+    robot.advance(5.0)
+    assert (robot.go_to.goals, robot.lines, robot.mission.summary()) == ([], [], {})
+    with pytest.raises(Refused, match="no mission is running"):
+        robot.mission.command("pause")
+
+
+def test_it_waits_for_a_pose_that_is_read() -> None:
+    robot = Robot("do:\n  check: distance($pose, dock) < 1 m")
+    robot.start()
+    robot.advance(1.0)
+    assert robot.events == []
+    robot.look.pose = Pose2(0.5, 0.5)
+    robot.advance(0.2)
+    assert robot.events[0]["outcome"] == "success"
+
+
+GO = "do:\n  go_to: dock"
+
+
+def test_a_goal_whose_server_is_lost_is_sent_again_when_it_is_back_in_time() -> None:
+    robot = Robot(GO)
+    robot.start()
+    robot.go_to.is_available = False
+    robot.go_to.end(Outcome.LOST)
+    robot.advance(4.0)
+    robot.go_to.is_available = True
+    robot.advance(0.2)
+    assert len(robot.go_to.goals) == 2
+    robot.go_to.end(Outcome.SUCCEEDED)
+    robot.advance(0.0)
+    assert robot.events[0]["outcome"] == "success"
+    assert robot.lines[1:3] == ["0 the server of go_to is gone; waiting for up to 5 s", "4 go_to: sent again"]
+
+
+def test_it_fails_when_the_server_stays_away() -> None:
+    robot = Robot(GO)
+    robot.start()
+    robot.go_to.is_available = False
+    robot.go_to.end(Outcome.LOST)
+    robot.advance(5.2)
+    assert robot.events[0]["message"] == "do.go_to: its server is gone"
+    assert 5.0 <= robot.clock.now() < 5.3
+
+
+def test_a_skill_that_cannot_be_restarted_fails_at_once_when_its_server_is_lost() -> None:
+    robot = Robot("do: recharge")
+    robot.start()
+    robot.recharge.end(Outcome.LOST)
+    robot.advance(0.0)
+    assert robot.events[0]["outcome"] == "failure"
+
+
+def test_a_goal_waits_for_a_server_that_is_not_there_yet() -> None:
+    robot = Robot(GO)
+    robot.go_to.is_available = False
+    robot.start()
+    robot.advance(2.0)
+    robot.go_to.is_available = True
+    robot.advance(0.2)
+    assert len(robot.go_to.goals) == 1
+
+
+@pytest.mark.parametrize("cancelled_first", [True, False])
+def test_a_goal_that_a_stop_cancelled_is_no_failure_and_is_sent_again_at_the_resume(cancelled_first: bool) -> None:
+    robot = Robot(GO)
+    robot.start()
+    robot.advance(1.0)
+    robot.is_stopped = True
+    if cancelled_first:
+        robot.go_to.end(Outcome.CANCELED)
+        robot.advance(0.2)
+    robot.mission.stop()
+    if not cancelled_first:
+        robot.go_to.end(Outcome.CANCELED)
+    robot.advance(3.0)
+    with pytest.raises(Refused, match="release it first"):
+        robot.mission.command("resume")
+    robot.is_stopped = False
+    robot.mission.release()
+    robot.advance(3.0)
+    assert len(robot.go_to.goals) == 1
+    assert robot.mission.command("resume") == "mission test resumed"
+    robot.advance(1.0)
+    assert len(robot.go_to.goals) == 2
+    robot.go_to.end(Outcome.SUCCEEDED)
+    robot.advance(0.0)
+    assert robot.events[0]["outcome"] == "success"
+
+
+def test_a_goal_that_someone_else_cancelled_is_a_failure() -> None:
+    robot = Robot(GO)
+    robot.start()
+    robot.go_to.end(Outcome.CANCELED)
+    robot.advance(1.0)
+    assert robot.events[0]["message"] == "do.go_to: cancelled by someone else"
+
+
+def test_a_pause_cancels_the_goal_and_a_resume_sends_it_again() -> None:
+    robot = Robot(GO)
+    robot.start()
+    assert robot.mission.command("pause") == "mission test paused"
+    assert robot.go_to.goals[0].is_cancelled
+    robot.go_to.end(Outcome.CANCELED)
+    robot.advance(9.0)
+    assert len(robot.go_to.goals) == 1
+    with pytest.raises(Refused, match="paused already"):
+        robot.mission.command("pause")
+    robot.mission.command("resume")
+    robot.advance(0.0)
+    assert len(robot.go_to.goals) == 2
+    with pytest.raises(Refused, match="is not paused"):
+        robot.mission.command("resume")
+
+
+def test_a_robot_that_is_stopped_before_the_mission_begins_begins_it_at_the_resume() -> None:
+    robot = Robot(GO)
+    robot.mission.stop()
+    robot.start()
+    robot.advance(2.0)
+    assert robot.go_to.goals == []
+    assert robot.lines == ["0 mission test is held until it is resumed"]
+    robot.mission.command("resume")
+    robot.advance(0.0)
+    assert len(robot.go_to.goals) == 1
+
+
+def test_a_late_result_of_a_halted_goal_is_not_heard() -> None:
+    robot = Robot("do:\n  - go_to: corner\n    timeout: 1 s\n    optional: true\n  - go_to: dock")
+    robot.start()
+    robot.advance(1.0)
+    robot.go_to.goals[0].then(Ended(Outcome.SUCCEEDED))
+    robot.advance(0.5)
+    assert len(robot.go_to.goals) == 2
+    assert robot.events == []
+
+
+def test_going_down_halts_the_mission_for_good() -> None:
+    robot = Robot(GO)
+    robot.start()
+    robot.mission.brake()
+    assert robot.go_to.goals[0].is_cancelled
+    robot.advance(5.0)
+    assert robot.lines[-1] == "0 mission test: halted"
+    assert robot.mission.summary()["mission"] == "test: halted"
+    assert robot.events == []
+
+
+def test_an_unknown_command_is_refused() -> None:
+    with pytest.raises(Refused, match="does not know"):
+        Robot(GO).mission.command("dance")

@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.testing.bench import Bench, instance
+
+SLOW, FAST, ZERO = Twist(linear=Vector3(x=0.1)), Twist(linear=Vector3(x=0.4)), Twist()
+
+
+def bench() -> Bench:
+    inputs = {
+        "teleop": {"priority": 100, "timeout": "0.5 s"},
+        "navigation": {"priority": 10, "timeout": "0.5 s"},
+    }
+    return Bench(instance("cmd_vel", "mux", {"output": "cmd_vel", "inputs": inputs}))
+
+
+def test_the_higher_priority_wins_while_it_talks() -> None:
+    robot = bench()
+    out = robot.collect("/cmd_vel", Twist)
+    robot.publish("/cmd_vel/navigation", SLOW)
+    robot.publish("/cmd_vel/teleop", FAST)
+    robot.publish("/cmd_vel/navigation", SLOW)
+    robot.advance(0.6)
+    robot.publish("/cmd_vel/navigation", SLOW)
+    assert out == [SLOW, FAST, ZERO, SLOW]
+
+
+def test_one_zero_follows_the_last_command_and_then_silence() -> None:
+    robot = bench()
+    out = robot.collect("/cmd_vel", Twist)
+    robot.publish("/cmd_vel/navigation", SLOW)
+    robot.advance(5.0)
+    assert out == [SLOW, ZERO]
+
+
+def test_a_stop_sends_zero_at_once_and_lets_nothing_through_until_rest_after_release() -> None:
+    robot = bench()
+    robot.publish("/cmd_vel/navigation", SLOW)
+    out = robot.collect("/cmd_vel", Twist)
+    robot.host.stop()
+    robot.publish("/cmd_vel/navigation", SLOW)
+    robot.host.release()
+    robot.publish("/cmd_vel/navigation", SLOW)
+    assert out == [ZERO]
+    robot.publish("/cmd_vel/navigation", ZERO)
+    robot.publish("/cmd_vel/navigation", SLOW)
+    assert out == [ZERO, ZERO, SLOW]
+
+
+def test_a_mux_that_is_restarted_during_a_stop_comes_back_closed() -> None:
+    robot = bench()
+    robot.host.stop()
+    robot.host.failed("cmd_vel", RuntimeError("planted"))
+    robot.advance(1.0)
+    out = robot.collect("/cmd_vel", Twist)
+    robot.publish("/cmd_vel/teleop", FAST)
+    assert (out or [ZERO])[-1] == ZERO
+    assert FAST not in out
+
+
+def test_nothing_follows_the_last_zero_when_the_robot_goes_down() -> None:
+    robot = bench()
+    out = robot.collect("/cmd_vel", Twist)
+    robot.host.brake()
+    robot.publish("/cmd_vel/teleop", FAST)
+    robot.advance(1.0)
+    assert out == [ZERO]

@@ -1,0 +1,153 @@
+"""A simulated robot for tests of missions: skills take a time, values are set, everything is written down."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from rbxcompose.config import Place
+from rbxcompose.expressions.types import FLAG, POSE, TEXT, TYPES, quantity_of
+from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
+from rbxcompose.findings import Report
+from rbxcompose.manifest.reader import read_text
+from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.missions.engine import Engine
+from rbxcompose.missions.events import MissionEvent
+from rbxcompose.missions.program import Program, RobotNames, Skill
+from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.semantics import check_program
+from rbxcompose.missions.statuses import IDLE, NAMES, RUNNING
+from rbxcompose.missions.story import Story
+from rbxcompose.units import LENGTH
+
+PLACES = {name: Place(name, float(x), 0.0, 0.0) for x, name in enumerate(("dock", "kitchen", "corner_1", "corner_2"))}
+GO_TO = Skill("go_to", {"pose": POSE, "tolerance": quantity_of(LENGTH)}, "pose", frozenset({"pose"}), "base")
+SKILLS = {
+    "go_to": GO_TO,
+    "recharge": Skill("recharge", claims="base"),
+    "say": Skill("say", {"words": TEXT}, "words"),
+    "pour": Skill("pour", restartable=False),
+    **{name: Skill(name) for name in ("a", "b", "c", "d", "react", "first", "second")},
+}
+VALUES = {"battery": TYPES["ratio"], "door": FLAG, "count_of_people": TYPES["count"]}
+ROBOT = RobotNames(VALUES, PLACES, SKILLS)
+
+
+def tree(text: str, file: str = "mission.yaml") -> Tree:
+    """Return the located tree of a mission's text."""
+    root, findings = read_text(textwrap.dedent(text), file)
+    assert not findings
+    assert isinstance(root, Tree)
+    return root
+
+
+def program_of(text: str) -> Program:
+    """Return the program of a mission without mistakes; the head of the file may be left out."""
+    report = Report()
+    program = read_program(tree(text), report)
+    if program:
+        report.extend(check_program(program, ROBOT))
+    assert not report.has_errors, list(report)
+    assert program is not None
+    return program
+
+
+@dataclass
+class Simulated:
+    """A world in virtual time: a skill takes `takes[skill]` [s], else 1 s, and fails at the calls `fails[skill]`."""
+
+    program: Program
+    inputs: Mapping[str, Value] = field(default_factory=dict)
+    takes: Mapping[str, float] = field(default_factory=dict)
+    fails: Mapping[str, frozenset[int]] = field(default_factory=dict)
+    raises: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        """Make the engine; nothing has happened."""
+        self.now = 0.0
+        self.values: dict[str, Value] = {}
+        self.counts: dict[str, int] = {}
+        self.arrived: dict[str, float] = {}
+        self.running: dict[int, tuple[float, str]] = {}
+        self.calls: dict[str, int] = {}
+        self.events: list[tuple[float, MissionEvent]] = []
+        self.told: list[str] = []
+        self.story = Story("test", SKILLS)
+        self.changes: list[tuple[float, Callable[[], None]]] = []
+        defaults = {name: one.default.value for name, one in self.program.inputs.items() if one.default}
+        self.engine = Engine(self.program, ROBOT, {**defaults, **self.inputs}, self)
+
+    def at(self, time: float, change: Callable[[], None]) -> None:
+        """Do something at a time, before the tick of that instant."""
+        self.changes.append((time, change))
+
+    def set(self, name: str, value: Value) -> None:
+        """Let a message arrive."""
+        self.values[name] = value
+        self.counts[name] = self.counts.get(name, 0) + 1
+        self.arrived[name] = self.now
+
+    def value(self, name: str, /) -> Value | NotArrived:
+        """Return a value."""
+        return self.values.get(name, NOT_ARRIVED)
+
+    def age(self, name: str, /) -> float | NotArrived:
+        """Return how old a value is [s]."""
+        return self.now - self.arrived[name] if name in self.arrived else NOT_ARRIVED
+
+    def count(self, name: str, /) -> int:
+        """Return how many messages came."""
+        return self.counts.get(name, 0)
+
+    def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
+        """Begin a skill."""
+        assert leaf not in self.running, "a leaf is started while it runs"
+        if skill in self.raises:
+            raise RuntimeError("out of order")
+        self.calls[skill] = self.calls.get(skill, 0) + 1
+        self.running[leaf] = (self.now + self.takes.get(skill, 1.0), skill)
+
+    def halt(self, leaf: int, /) -> None:
+        """Stop a skill that runs."""
+        assert leaf in self.running, "a leaf is halted that does not run"
+        del self.running[leaf]
+
+    def say(self, event: MissionEvent, /) -> None:
+        """Write an event down."""
+        self.events.append((self.now, event))
+        self.told.append(f"{self.now:g} {self.story.tell(event)[1]}")
+
+    def finish(self, leaf: int) -> None:
+        """Tell the engine how a skill ended."""
+        _, skill = self.running.pop(leaf)
+        failed = self.calls[skill] in self.fails.get(skill, frozenset())
+        if skill == "recharge" and not failed:
+            self.set("battery", 1.0)
+        self.engine.ended(leaf, not failed, "no luck" if failed else "")
+
+    def advance(self, until: float) -> str:
+        """Jump from event to event until a time [s] or the end, and return the status."""
+        while self.engine.status in (IDLE, RUNNING):
+            for leaf in [leaf for leaf, (end, _) in self.running.items() if end <= self.now]:
+                self.finish(leaf)
+            due = [change for change in self.changes if change[0] <= self.now]
+            self.changes = [change for change in self.changes if change not in due]
+            for _, change in due:
+                change()
+            self.engine.tick(self.now)
+            upcoming = [end for end, _ in self.running.values()] + [time for time, _ in self.changes]
+            if (wake := self.engine.next_wake()) is not None:
+                upcoming.append(wake)
+            if not upcoming or min(upcoming) > until or self.engine.status not in (IDLE, RUNNING):
+                break
+            assert min(upcoming) > self.now, "time stands still"
+            self.now = min(upcoming)
+        if self.engine.status == RUNNING:
+            self.now = until
+        return NAMES[self.engine.status]
+
+
+def simulate(text: str, **settings: object) -> Simulated:
+    """Return a simulated robot with the mission of this text."""
+    return Simulated(program_of(text), **settings)  # type: ignore[arg-type]

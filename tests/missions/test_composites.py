@@ -1,0 +1,247 @@
+"""What the kinds do with the nodes below them, in virtual time."""
+
+from __future__ import annotations
+
+import pytest
+
+from rbxcompose.missions.events import SkillStarted
+from tests.missions.simulated import Simulated, simulate
+
+
+def fails(*calls: int) -> frozenset[int]:
+    return frozenset(calls)
+
+
+def skills(simulated: Simulated) -> list[str]:
+    """Return the times and names of the skills that were started."""
+    lines = zip(simulated.events, simulated.told, strict=True)
+    return [line for (_, event), line in lines if isinstance(event, SkillStarted)]
+
+
+def test_a_sequence_does_its_nodes_in_order_without_a_gap() -> None:
+    simulated = simulate("do: [a, b, c]")
+    assert simulated.advance(10) == "success"
+    assert skills(simulated) == ["0 a", "1 b", "2 c"]
+
+
+def test_a_sequence_fails_with_the_first_failure_and_says_which_it_was() -> None:
+    simulated = simulate("do: [a, b, c]", fails={"b": fails(1)})
+    assert simulated.advance(10) == "failure"
+    assert simulated.told[-1] == "2 mission test: failure: do.sequence.b.1: no luck"
+    assert "c" not in simulated.calls
+
+
+def test_a_fallback_goes_on_after_a_failure_and_ends_with_the_first_success() -> None:
+    simulated = simulate("do: {fallback: [a, b, c]}", fails={"a": fails(1)})
+    assert simulated.advance(10) == "success"
+    assert skills(simulated) == ["0 a", "1 b"]
+
+
+def test_a_fallback_fails_when_all_have_failed() -> None:
+    simulated = simulate("do: {fallback: [a, b]}", fails={"a": fails(1), "b": fails(1)})
+    assert simulated.advance(10) == "failure"
+
+
+def test_a_fallback_passes_over_what_was_skipped() -> None:
+    text = """
+    do:
+      fallback:
+        - a:
+          only_if: 1 > 2
+        - b
+    """
+    assert simulate(text).advance(10) == "success"
+    assert simulate(text, fails={"b": fails(1)}).advance(10) == "failure"
+
+
+@pytest.mark.parametrize(
+    "node",
+    [
+        "repeat: 0\n  do: a",
+        "for: x\n  in: []\n  do: a",
+        "if: 1 > 2\n  then: a",
+        "sequence:\n    - a:\n      only_if: 1 > 2",
+        "fallback:\n    - a:\n      only_if: 1 > 2",
+        "repeat: 2\n  do:\n    a:\n    only_if: 1 > 2",
+        "for: x\n  in: [1, 2]\n  do:\n    a:\n    only_if: 1 > 2",
+    ],
+)
+def test_what_has_nothing_to_do_is_skipped_and_a_skipped_mission_succeeds(node: str) -> None:
+    simulated = simulate(f"do:\n  {node}")
+    assert simulated.advance(10) == "success"
+    assert simulated.calls == {}
+    assert simulated.engine.statuses[0] == 4
+
+
+def test_a_condition_chooses_between_then_and_else() -> None:
+    text = "do:\n  if: $door\n  then: a\n  else: b"
+    for is_open, chosen in ((True, "0 a"), (False, "0 b")):
+        simulated = simulate(text)
+        simulated.set("door", is_open)
+        assert simulated.advance(10) == "success"
+        assert skills(simulated) == [chosen]
+
+
+def test_a_condition_whose_value_has_not_arrived_does_not_hold_even_under_not() -> None:
+    simulated = simulate("do:\n  if: not $door\n  then: a\n  else: b")
+    simulated.advance(10)
+    assert skills(simulated) == ["0 b"]
+
+
+def test_repeat_does_its_rounds_and_reads_their_number_at_the_start() -> None:
+    simulated = simulate("data: {n: 3}\ndo:\n  repeat: $n\n  do:\n    - a\n    - set:\n        n: 1")
+    assert simulated.advance(10) == "success"
+    assert skills(simulated) == ["0 a", "1 a", "2 a"]
+
+
+def test_a_failing_round_fails_the_loop() -> None:
+    simulated = simulate("do: {repeat: 3, do: a}", fails={"a": fails(2)})
+    assert simulated.advance(10) == "failure"
+    assert simulated.calls == {"a": 2}
+
+
+def test_until_is_asked_after_each_round_and_never_cuts_one() -> None:
+    simulated = simulate("do:\n  repeat: forever\n  until: $door\n  do: a")
+    simulated.at(1.5, lambda: simulated.set("door", True))
+    assert simulated.advance(10) == "success"
+    assert skills(simulated) == ["0 a", "1 a"]
+    assert simulated.now == 2.0
+
+
+def test_every_counts_from_start_to_start_and_not_after_the_last_round() -> None:
+    simulated = simulate("do:\n  repeat: 3\n  every: 4 s\n  do: a")
+    assert simulated.advance(20) == "success"
+    assert skills(simulated) == ["0 a", "4 a", "8 a"]
+    assert simulated.now == 9.0
+
+
+def test_a_round_that_is_longer_than_every_is_followed_at_once() -> None:
+    simulated = simulate("do:\n  repeat: 2\n  every: 1 s\n  do: a", takes={"a": 3.0})
+    simulated.advance(20)
+    assert skills(simulated) == ["0 a", "3 a"]
+
+
+def test_for_does_each_item_in_the_order_written() -> None:
+    simulated = simulate("do:\n  for: corner\n  in: [corner_1, dock]\n  do:\n    go_to: $corner")
+    assert simulated.advance(10) == "success"
+    assert skills(simulated) == ["0 go_to corner_1", "1 go_to dock"]
+
+
+def test_for_goes_through_the_keys_of_a_map() -> None:
+    simulated = simulate("data:\n  chores: {kitchen: 1, dock: 2}\ndo:\n  for: x\n  in: $chores\n  do:\n    go_to: $x")
+    assert simulated.advance(10) == "success"
+    assert skills(simulated) == ["0 go_to kitchen", "1 go_to dock"]
+
+
+def test_the_list_of_for_is_read_once_at_the_start() -> None:
+    body = "    - go_to: $x\n    - set:\n        rooms: '[]'"
+    simulated = simulate(f"data:\n  rooms: [dock, kitchen]\ndo:\n  for: x\n  in: $rooms\n  do:\n{body}")
+    simulated.advance(10)
+    assert simulated.calls == {"go_to": 2}
+
+
+def test_a_failed_item_stops_the_loop_unless_the_next_is_wanted() -> None:
+    text = "do:\n  for: x\n  in: [1, 2, 3]\n  if_one_fails: {}\n  do: a"
+    for word, calls in (("stop", 1), ("next", 3)):
+        simulated = simulate(text.replace("{}", word), fails={"a": fails(1)})
+        assert simulated.advance(10) == "failure"
+        assert simulated.calls == {"a": calls}
+
+
+def test_loops_of_one_item_name_may_stand_beside_each_other_and_within_an_interrupt() -> None:
+    text = """
+    interrupts:
+      open:
+        when: $door
+        do:
+          for: x
+          in: [kitchen]
+          do:
+            go_to: $x
+    do:
+      - for: x
+        in: [dock]
+        do:
+          go_to: $x
+      - for: x
+        in: [corner_1]
+        do:
+          go_to: $x
+    """
+    simulated = simulate(text)
+    simulated.at(0.5, lambda: simulated.set("door", True))
+    simulated.at(0.7, lambda: simulated.set("door", False))
+    simulated.advance(10)
+    assert skills(simulated) == ["0 go_to dock", "0.5 go_to kitchen", "1.5 go_to dock", "2.5 go_to corner_1"]
+
+
+def test_wait_takes_its_time_and_wait_for_its_condition() -> None:
+    simulated = simulate("do:\n  - wait: 2.5 s\n  - wait_for: $battery > 50 %\n  - a")
+    simulated.at(4.0, lambda: simulated.set("battery", 0.6))
+    assert simulated.advance(10) == "success"
+    assert skills(simulated) == ["4 a"]
+
+
+def test_new_counts_messages_from_the_start_of_its_node() -> None:
+    simulated = simulate("do:\n  - a\n  - wait_for: new($door)\n  - b")
+    simulated.at(0.5, lambda: simulated.set("door", True))
+    simulated.at(3.0, lambda: simulated.set("door", True))
+    simulated.advance(10)
+    assert skills(simulated) == ["0 a", "3 b"]
+
+
+def test_age_is_asked_at_the_rate_of_the_mission() -> None:
+    simulated = simulate("rate: 10 Hz\ndo:\n  - wait_for: age($door) > 0.75 s\n  - a")
+    simulated.set("door", True)
+    simulated.advance(10)
+    assert skills(simulated) == ["0.8 a"]
+
+
+def test_set_computes_all_right_sides_first() -> None:
+    simulated = simulate("data: {x: 1, y: 2}\ndo:\n  set:\n    x: $y\n    y: $x + 10")
+    simulated.advance(1)
+    assert simulated.engine.data == {"x": 2.0, "y": 11.0}
+
+
+def test_log_fills_in_values_with_their_units() -> None:
+    simulated = simulate("data: {pause: 90 s, room: kitchen}\ndo:\n  log: $battery of $pause in $room for $$5")
+    simulated.set("battery", 0.25)
+    simulated.advance(1)
+    assert simulated.told[0] == "0 25 % of 90 s in kitchen for $5"
+
+
+def test_text_arguments_are_templates_and_take_their_scalar_as_written() -> None:
+    simulated = simulate("do:\n  - say: 7\n  - for: room\n    in: [corner_1]\n    do:\n      say: I am at $room now")
+    simulated.advance(10)
+    assert skills(simulated) == ["0 say 7", "1 say I am at corner 1 now"]
+
+
+def test_arguments_of_numbers_are_expressions() -> None:
+    simulated = simulate("do:\n  go_to:\n    pose: dock\n    tolerance: 2 * 5 cm")
+    simulated.advance(10)
+    assert skills(simulated) == ["0 go_to dock tolerance 0.1 m"]
+
+
+@pytest.mark.parametrize(
+    ("node", "report"),
+    [
+        ("wait: 1 s / $battery", "division by zero"),
+        ("repeat: $count_of_people\n  do: a", "'repeat' must be a whole number, not 2.5"),
+        ("set:\n    x: $x / $battery", "division by zero"),
+        ("wait: -1 s", "a duration must be a number from 0 on, not -1"),
+        ("log: $door", "'$door' has not arrived yet"),
+        ("go_to: $nowhere", "there is no place 'nowhere'"),
+    ],
+)
+def test_a_node_without_a_value_is_a_reported_failure(node: str, report: str) -> None:
+    simulated = simulate(f"data: {{x: 1, nowhere: nowhere}}\ndo:\n  {node}")
+    simulated.set("battery", 0.0)
+    simulated.set("count_of_people", 2.5)
+    assert simulated.advance(10) == "failure"
+    assert simulated.told[0].endswith(report)
+
+
+def test_an_exception_of_a_leaf_is_a_reported_failure() -> None:
+    simulated = simulate("do: {fallback: [a, b]}", raises=frozenset({"a"}))
+    assert simulated.advance(10) == "success"
+    assert simulated.told[:3] == ["0 a", "0 do.fallback.a.0: RuntimeError: out of order", "0 b"]

@@ -1,0 +1,36 @@
+"""Actions as skills and arguments as goals."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from rbxcompose.config import Place
+from rbxcompose.expressions.types import POSE, TEXT
+from rbxcompose.geometry import Pose2
+from rbxcompose.missions.goals import goal_of, skill_of
+from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.msgs.rbxcompose_msgs import Recharge
+
+
+def test_the_fields_of_a_goal_are_the_arguments_and_the_first_is_the_main_one() -> None:
+    skill = skill_of(NavigateToPose, "go_to", claims="base")
+    assert skill.arguments == {"pose": POSE, "behavior_tree": TEXT}
+    assert (skill.main, skill.required, skill.claims, skill.restartable) == ("pose", frozenset({"pose"}), "base", True)
+
+
+def test_an_empty_goal_makes_a_skill_without_arguments() -> None:
+    skill = skill_of(Recharge, "recharge")
+    assert (skill.main, skill.arguments, skill.required) == ("", {}, frozenset())
+    assert goal_of(Recharge, {}) == Recharge.Goal()
+
+
+@pytest.mark.parametrize("place", [Place("dock", 1.0, 2.0, math.pi / 2), Pose2(1.0, 2.0, math.pi / 2)])
+def test_a_place_or_a_pose_becomes_a_stamped_pose_in_the_map(place: object) -> None:
+    goal = goal_of(NavigateToPose, {"pose": place, "behavior_tree": "x"})
+    assert isinstance(goal, NavigateToPose.Goal)
+    pose = goal.pose
+    assert (pose.header.frame_id, pose.pose.position.x, pose.pose.position.y) == ("map", 1.0, 2.0)
+    assert (pose.pose.orientation.z, pose.pose.orientation.w) == pytest.approx((math.sqrt(0.5), math.sqrt(0.5)))
+    assert goal.behavior_tree == "x"
