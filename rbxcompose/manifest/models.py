@@ -85,19 +85,6 @@ class Bus(Config):
     """An existing router to use instead of an own one, such as `tcp/192.168.0.2:7447`."""
 
 
-class Restart(Config):
-    """When and how often a component is started again."""
-
-    when: Literal["on_failure", "always", "never"] = "on_failure"
-    """After what it is restarted."""
-    max: int = Field(5, ge=0)
-    """Restarts within `within`, after which it has failed for good."""
-    within: Time = Field(60.0, gt=0)
-    """The time in which restarts are counted."""
-    backoff: Time = Field(0.1, ge=0)
-    """Pause before the first restart; it doubles with each further one."""
-
-
 class ComponentOptions(Config):
     """What every component takes beside its own configuration."""
 
@@ -105,8 +92,6 @@ class ComponentOptions(Config):
     """Its process group; what shares a group shares a process."""
     starts_after: tuple[Name, ...] = ()
     """Components that are active before this one."""
-    restart: Annotated[Restart, _short_for("when")] = Restart()
-    """When it is started again."""
     connect: dict[Name, TopicName] = {}
     """Topics by port, where they differ from the port's name."""
 

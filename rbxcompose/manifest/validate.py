@@ -84,11 +84,13 @@ This key takes one of a few words, or the name of something that exists.
 
 Bad:
 ```yaml
-restart: sometimes
+bus:
+  wire: jazy
 ```
 Good:
 ```yaml
-restart: on_failure
+bus:
+  wire: jazzy
 ```
 """,
 )

@@ -142,7 +142,7 @@ class Engine:
         if self.status == RUNNING:
             self.now = now
             self._take_results()
-            self._stack[-1].halt()
+            self._halt_all()
             self.status = FAILURE
             self.world.say(MissionEnded("halted"))
 
@@ -189,7 +189,7 @@ class Engine:
 
     def show(self, name: str, value: Value) -> str:
         """Write the value of a name for people."""
-        return showing.show(self._types.get(name), value)
+        return showing.show_briefly(self._types.get(name), value)
 
     def filled(self, template: Template, scope: MissionScope) -> str:
         """Return a text with its values."""
@@ -277,10 +277,15 @@ class Engine:
 
     def _finish(self, course: Course, status: int) -> None:
         self.status = status
+        self._halt_all()
         message = self._why(course) if status == FAILURE else ""
         if isinstance(course, Reaction):
             message = f"the reaction of '{course.name}' failed: {message}"
         self.say(MissionEnded(NAMES[status], message))
+
+    def _halt_all(self) -> None:
+        for course in reversed(self._stack):
+            course.halt()
 
     def _why(self, course: Course) -> str:
         """Return the path of the node that made a course fail, and its reason."""

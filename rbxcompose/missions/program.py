@@ -153,12 +153,6 @@ class Program:
         """Return a node and all below it."""
         return self.nodes[number : self.nodes[number].end]
 
-    def enclosing(self, node: Node) -> Iterator[Node]:
-        """Yield the nodes around a node, from the inside out."""
-        while node.parent is not None:
-            node = self.nodes[node.parent]
-            yield node
-
     def reads(self) -> frozenset[str]:
         """Return all `$names` that are read anywhere, arguments of skills included."""
         read = {name.name for _, asked in self.asked() for name in asked.expression.names}

@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+import math
+
 from rbxcompose.expressions.text import show_value
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.expressions.values import Value, is_number
-from rbxcompose.units import format_quantity
+from rbxcompose.units import format_number, format_quantity
+
+DIGITS = 3  # that people want to read of something measured
 
 
 def show(type: Type | None, value: Value) -> str:
-    """Return a value as text: '49 %', 'living room', '2'."""
+    """Return a value as text: '48.8889 %', 'living room', '2'."""
     dimension = (type or UNKNOWN).dimension
     if dimension and isinstance(value, int | float) and is_number(value):
         return format_quantity(value, dimension)
     return show_value("", value)
+
+
+def show_briefly(type: Type | None, value: Value) -> str:
+    """Return a value as text, a number with three digits or all those before the point: '48.9 %'."""
+    text = show(type, value)
+    if not isinstance(value, int | float) or not is_number(value) or not math.isfinite(value):
+        return text
+    number, space, unit = text.partition(" ")
+    written = float(number)
+    decimals = DIGITS - 1 - math.floor(math.log10(abs(written))) if written else 0
+    return f"{format_number(round(written, max(0, decimals)))}{space}{unit}"

@@ -1,0 +1,27 @@
+"""How values are written for people."""
+
+from __future__ import annotations
+
+import pytest
+
+from rbxcompose.config import Place
+from rbxcompose.expressions.types import TYPES
+from rbxcompose.expressions.values import Value
+from rbxcompose.missions.showing import show, show_briefly
+
+
+@pytest.mark.parametrize(
+    ("type_name", "value", "whole", "brief"),
+    [
+        ("ratio", 0.488889, "48.8889 %", "48.9 %"),
+        ("time", 12345.6, "12345.6 s", "12346 s"),
+        ("speed", 0.0, "0 m/s", "0 m/s"),
+        ("count", 2.0, "2", "2"),
+        ("text", "living_room", "living_room", "living_room"),
+        ("place", Place("living_room", 0.0, 0.0, 0.0), "living room", "living room"),
+        ("flag", True, "true", "true"),
+    ],
+)
+def test_values_have_the_unit_of_their_type(type_name: str, value: Value, whole: str, brief: str) -> None:
+    assert show(TYPES[type_name], value) == whole
+    assert show_briefly(TYPES[type_name], value) == brief

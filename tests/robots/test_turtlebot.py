@@ -1,0 +1,153 @@
+"""The patrol robot, whole, in virtual time: what its user is promised."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.geometry import Pose2
+from rbxcompose.rendering import render_text
+from rbxcompose.testing.bench import Bench
+from rbxcompose.testing.robots import Ran, run_robot
+
+ROBOT = "robots/turtlebot/robot.yaml"
+CORNERS = {"corner_1": (1.0, 0.0), "corner_2": (1.0, 1.0), "corner_3": (0.0, 1.0), "corner_4": (0.0, 0.0)}
+
+
+@pytest.fixture(autouse=True)
+def _at_home(repository: Path) -> None:
+    """Findings name files as from the repository's root."""
+
+
+def compiled(*sets: str, profiles: tuple[str, ...] = ()) -> Compilation:
+    return compile_robot(ROBOT, sets=sets, profiles=profiles, environment={})
+
+
+def ran(*sets: str, profiles: tuple[str, ...] = ()) -> Ran:
+    out = compiled(*sets, profiles=profiles)
+    assert out.plan, render_text(out.report, out.sources)
+    return run_robot(out.plan)
+
+
+def story(run: Ran, source: str = "mission") -> list[str]:
+    return [record.text for record in run.bench.records if record.source == source]
+
+
+def done(run: Ran) -> list[str]:
+    """Return what the mission did, in order, without how long it took."""
+    return [text.partition(" (")[0] for text in story(run)]
+
+
+def pose(bench: Bench) -> Pose2:
+    found: Pose2 = bench.component("base").core.pose  # type: ignore[attr-defined]
+    return found
+
+
+def test_it_has_no_findings() -> None:
+    out = compiled()
+    assert list(out.report) == []
+    assert out.plan
+    assert out.plan.groups == ("world", "robot", "mission")
+
+
+def test_it_visits_the_corners_twice_and_ends_in_success() -> None:
+    run = ran()
+    assert run.outcome == "success"
+    visited = [text for text in done(run) if text.endswith(": success") and "corner" in text]
+    assert visited == [f"go_to {corner}: success" for corner in (*CORNERS, *CORNERS)]
+    assert pose(run.bench).distance(Pose2(*CORNERS["corner_4"])) < 0.05
+    assert run.bench.host.is_at_rest
+
+
+def test_it_docks_when_the_battery_is_low_and_resumes_at_the_corner_that_was_cut_short() -> None:
+    told = done(ran())
+    start = told.index("interrupt battery_low: $battery < $low")
+    cut_short = told[start + 1].removesuffix(": halted")
+    assert cut_short in {f"go_to {corner}" for corner in CORNERS}
+    assert told[start + 1 : start + 9] == [
+        f"{cut_short}: halted",
+        "go_to dock",
+        "go_to dock: success",
+        "recharge",
+        "recharge: success",
+        f"interrupt battery_low done, back to {cut_short}",
+        cut_short,
+        f"{cut_short}: success",
+    ]
+
+
+def test_two_runs_write_the_same_log_to_the_byte() -> None:
+    assert ran().log == ran().log
+
+
+def test_a_corner_that_was_moved_is_visited_where_it_is_now() -> None:
+    run = ran("places.corner_4.x=-50 cm", "missions.patrol.with.rounds=1")
+    assert pose(run.bench).distance(Pose2(-0.5, 0.0)) < 0.05
+
+
+def test_the_threshold_decides_how_often_it_docks() -> None:
+    assert sum(text == "recharge" for text in done(ran("missions.patrol.with.low=10 %", "battery.runtime=2 min"))) == 0
+    assert sum(text == "recharge" for text in done(ran("missions.patrol.with.low=70 %"))) >= 2
+
+
+def test_a_profile_changes_the_robot() -> None:
+    docked = [sum(text == "recharge" for text in done(ran(profiles=profiles))) for profiles in ((), ("tired",))]
+    assert docked[1] > docked[0]
+
+
+def test_a_corner_that_cannot_be_reached_in_time_does_not_end_the_patrol() -> None:
+    run = ran("places.corner_2.x=5 m", "missions.patrol.with.rounds=1", "battery.runtime=1 h")
+    assert run.outcome == "success"
+    assert "go_to corner_2: halted" in done(run)
+    assert "go_to corner_4: success" in done(run)
+
+
+def test_a_mission_that_fails_says_why() -> None:
+    run = ran("charger.reach=1 mm")
+    assert run.outcome == "failure"
+    assert any("away from 'dock'" in text for text in story(run, "charger"))
+
+
+def test_a_stop_brakes_at_once_and_only_a_resume_goes_on() -> None:
+    out = compiled()
+    assert out.plan
+    bench = Bench(plan=out.plan)
+    bench.advance(3.0)
+    assert not bench.host.is_at_rest
+    bench.host.stop()
+    bench.advance(0.4)  # 0.3 m/s at 1 m/s^2
+    assert bench.host.is_at_rest
+    stopped_at = pose(bench)
+    bench.advance(20.0)
+    bench.host.release()
+    bench.advance(20.0)
+    assert pose(bench) == stopped_at
+    bench.host.command("mission", "resume")
+    bench.run_until(lambda: any(event == "mission_ended" for event, _ in bench.events))
+    assert Ran(bench).outcome == "success"
+
+
+def test_the_summary_tells_outcome_skills_and_way() -> None:
+    facts = ran().bench.host.summary()
+    assert facts["mission"]["mission"] == "patrol: success"
+    assert facts["mission"]["skills"].startswith("go_to 10 (9 success, 1 halted), recharge 1")
+    assert 8.0 < float(facts["base"]["distance driven"].removesuffix(" m")) < 10.0
+
+
+def test_it_never_exceeds_its_speed_limits() -> None:
+    out = compiled("args.speed=0.5 m/s")
+    assert out.plan
+    bench = Bench(plan=out.plan)
+    speeds = []
+
+    def ended() -> bool:
+        velocity = bench.component("base").core.velocity  # type: ignore[attr-defined]
+        speeds.append((abs(velocity.linear), abs(velocity.angular)))
+        return any(event == "mission_ended" for event, _ in bench.events)
+
+    bench.run_until(ended)
+    assert max(linear for linear, _ in speeds) <= 0.5 + 1e-9
+    assert max(angular for _, angular in speeds) <= math.radians(90) + 1e-9
