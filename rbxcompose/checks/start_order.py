@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, suggest
+from rbxcompose.model.order import cycle_of
 from rbxcompose.model.robot import Robot
-from rbxcompose.plan.order import cycle_of
 
 
 @check("RBX3006")

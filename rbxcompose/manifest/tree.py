@@ -42,12 +42,15 @@ class Entry:
     value: Node
 
 
+NOWHERE = Span("", 1, 1, 1, 1)
+
+
 @dataclass(frozen=True, slots=True)
 class Mapping:
     """Named nodes, in the order of the text. `tag` is `!replace` where an overlay says so."""
 
     entries: dict[str, Entry] = field(default_factory=dict)
-    span: Span = Span("", 1, 1, 1, 1)
+    span: Span = NOWHERE
     tag: str = ""
 
     def get(self, name: str) -> Node | None:

@@ -44,7 +44,10 @@ class Connected:
         self.scheduler = Scheduler(on_error=lambda owner, error: self.errors.append((owner, error)))
         self._woken: deque[tuple[str, Callable[[], None]]] = deque()
         self.transport = ZenohTransport(open_peer(f"tcp/127.0.0.1:{port}"), self._wake)
-        self.bus = Bus(self.scheduler, self.clock, transport=self.transport, log=lambda owner, text: self.log.append((owner, text)))
+        self.bus = Bus(self.scheduler, self.clock, transport=self.transport, log=self._note)
+
+    def _note(self, owner: str, text: str) -> None:
+        self.log.append((owner, text))
 
     def _wake(self, owner: str, callback: Callable[[], None]) -> None:
         self._woken.append((owner, callback))

@@ -11,14 +11,11 @@ from typing import Any
 import pytest
 
 from rbxcompose.compiler import compile_robot
-from rbxcompose.manifest.robot_file import load_robot
 from rbxcompose.plan.model import Instance
 from rbxcompose.rendering import render_text
 from rbxcompose.sdk.ports import In, Serves
 from rbxcompose.sdk.registry import component_names, component_type
 from rbxcompose.testing.bench import Bench
-
-assert load_robot  # the front end is what the examples go through
 
 ROBOT = """
 rbx: 1

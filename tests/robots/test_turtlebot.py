@@ -46,6 +46,10 @@ def pose(bench: Bench) -> Pose2:
     return found
 
 
+def at_rest(bench: Bench) -> bool:
+    return bench.host.is_at_rest
+
+
 def test_it_has_no_findings() -> None:
     out = compiled()
     assert list(out.report) == []
@@ -116,10 +120,10 @@ def test_a_stop_brakes_at_once_and_only_a_resume_goes_on() -> None:
     assert out.plan
     bench = Bench(plan=out.plan)
     bench.advance(3.0)
-    assert not bench.host.is_at_rest
+    assert not at_rest(bench)
     bench.host.stop()
     bench.advance(0.4)  # 0.3 m/s at 1 m/s^2
-    assert bench.host.is_at_rest
+    assert at_rest(bench)
     stopped_at = pose(bench)
     bench.advance(20.0)
     bench.host.release()

@@ -1,0 +1,28 @@
+"""Foreign text cannot move the cursor, hide, or reorder what stands beside it."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rbxcompose.plain import FORBIDDEN, plain
+
+
+def test_control_characters_are_spelt_out() -> None:
+    assert plain("a\x1b[31mb\r\n\tc\x7f\x85\u202e\ufeff") == r"a\x1b[31mb\r\n\tc\x7f\x85\u202e\ufeff"
+
+
+def test_what_can_be_seen_stays() -> None:
+    assert plain("größe 漢字 [link=x] \\") == "größe 漢字 [link=x] \\"
+
+
+def test_long_text_is_cut_with_a_count() -> None:
+    assert plain("x" * 1250) == "x" * 200 + "... (1,050 more characters)"
+
+
+@given(st.text())
+def test_nothing_invisible_is_left_and_it_is_one_line(text: str) -> None:
+    shown = plain(text)
+    assert not FORBIDDEN.search(shown)
+    assert "\n" not in shown
+    assert "\t" not in shown
