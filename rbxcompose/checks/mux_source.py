@@ -52,7 +52,7 @@ def mux_source(robot: Robot) -> Iterator[Finding]:
 def missing(robot: Robot, source: str) -> tuple[str, str] | None:
     """Return what is wrong with the source of a mux input, and what may help; None if it is there."""
     component, _, port = source.partition(".")
-    if component not in robot.manifest.components:
+    if component not in robot.written:
         return f"takes from a component that the robot does not have: '{component}'", suggest(
             component, robot.manifest.components, "components of this robot"
         )

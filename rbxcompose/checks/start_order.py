@@ -34,7 +34,7 @@ def start_order(robot: Robot) -> Iterator[Finding]:
     after = {name: part.starts_after for name, part in robot.parts.items()}
     for name, part in robot.parts.items():
         for index, other in enumerate(part.starts_after):
-            if other not in robot.parts and other not in robot.manifest.components:
+            if other not in robot.parts and other not in robot.written:
                 yield start_order.at(
                     robot.value(*part.path, "starts_after", index),
                     f"'{name}' starts after a component that the robot does not have: '{other}'",

@@ -33,7 +33,7 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
     """
     for name, analyzer in robot.manifest.diagnostics.analyzers.items():
         for index, pattern in enumerate(analyzer.match):
-            known = {*robot.parts, *robot.manifest.components}
+            known = {*robot.parts, *robot.written}
             if not any(Analyzer((pattern,)).matches(part) for part in known):
                 yield unmatched_analyzer.at(
                     robot.value("diagnostics", "analyzers", name, "match", index),

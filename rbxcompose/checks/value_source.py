@@ -37,7 +37,7 @@ def _missing(robot: Robot, name: str, source: str) -> tuple[str, str] | None:
     component, dot, port = source.partition(".")
     part = robot.parts.get(component)
     if part is None:
-        if component in robot.manifest.components:
+        if component in robot.written:
             return None  # it is there, but broken: that is said at its own place
         known = suggest(component, robot.parts, "components of this robot")
         return f"comes from a component that the robot does not have: '{component}'", known

@@ -79,6 +79,7 @@ class Errand:
         self.skill = skill
         self.goal = goal
         self.handle: SentGoal | None = None
+        self.earliest = 0.0  # when to look for a server again [s]
         self.until = 0.0
         self.was_cancelled = False
 
@@ -315,6 +316,8 @@ class MissionWorld:
         for errand in list(self._errands.values()):
             if errand.handle is not None:
                 continue
+            if self.mission.now < errand.earliest:
+                continue  # who has just gone may still be in the books
             if not errand.was_cancelled and self._send(errand):
                 self.mission.info(f"{errand.skill.name}: sent again")
             elif self.mission.now >= errand.until:
@@ -349,6 +352,7 @@ class MissionWorld:
         self.mission.context.wake_at(self.mission.now)
 
     def _wait(self, errand: Errand, why: str, seconds: float) -> None:
+        errand.earliest = self.mission.now + LOOK_AGAIN
         errand.until = self.mission.now + seconds
         self.mission.warn(f"{why}; waiting for up to {seconds:.0f} s")
 

@@ -32,11 +32,15 @@ class Skill:
 
 @dataclass(frozen=True, slots=True)
 class RobotNames:
-    """What the robot gives to every mission: types of its values, its places, its skills, all by name."""
+    """What the robot gives to every mission: types of its values, its places, its skills, all by name.
+
+    It is not complete if a part of the robot has mistakes: then a skill that is missing may be that part's.
+    """
 
     values: Mapping[str, Type] = field(default_factory=dict)
     places: Mapping[str, Place] = field(default_factory=dict)
     skills: Mapping[str, Skill] = field(default_factory=dict)
+    is_complete: bool = True
 
 
 @dataclass(frozen=True, slots=True)

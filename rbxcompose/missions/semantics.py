@@ -72,7 +72,8 @@ def _skill(view: View) -> Iterator[Finding]:
     if node.skill not in skills:
         message = f"mission '{view.program.name}' uses a skill that nobody provides: '{node.skill}'"
         close = difflib.get_close_matches(node.skill, (*skills, *kinds()), n=1, cutoff=SIMILAR)
-        yield codes.UNKNOWN_SKILL.at(node.span, message, help=suggest(node.skill, close or skills, "skills"))
+        if close or view.robot.is_complete:
+            yield codes.UNKNOWN_SKILL.at(node.span, message, help=suggest(node.skill, close or skills, "skills"))
         return
     skill = skills[node.skill]
     given = {argument.name or skill.main for argument in node.arguments}

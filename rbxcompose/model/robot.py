@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from rbxcompose.config import Config
+from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span
 from rbxcompose.manifest.models import RobotManifest
-from rbxcompose.manifest.tree import Path, at, key_span, value_span
+from rbxcompose.manifest.tree import Mapping, Path, at, key_span, value_span
 from rbxcompose.missions.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, ValueSource
 from rbxcompose.model.wiring import End
@@ -40,7 +42,7 @@ class RobotMission:
 
     name: str
     program: Program
-    inputs: Mapping[str, object] = field(default_factory=dict)
+    inputs: AnyMapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,19 +50,26 @@ class Robot:
     """What the checks look at; parts stand in the order of the manifest."""
 
     manifest: RobotManifest
-    parts: Mapping[str, Part]
-    values: Mapping[str, ValueSource]
-    skills: Mapping[str, SkillSource]
-    missions: Mapping[str, RobotMission]
+    parts: AnyMapping[str, Part]
+    values: AnyMapping[str, ValueSource]
+    skills: AnyMapping[str, SkillSource]
+    missions: AnyMapping[str, RobotMission]
 
     @property
     def names(self) -> RobotNames:
         """Return what the robot gives to its missions."""
         return RobotNames(
-            values={name: source.type for name, source in self.values.items()},
+            values={name: self.values[name].type if name in self.values else UNKNOWN for name in self.manifest.values},
             places=self.manifest.places,
             skills={name: source.skill for name, source in self.skills.items()},
+            is_complete=self.written <= self.parts.keys(),
         )
+
+    @property
+    def written(self) -> frozenset[str]:
+        """Return the names of all components and muxes that the manifest has, also of those with mistakes."""
+        sections = (self.manifest.root.get(section) for section in ("components", "muxes"))
+        return frozenset(name for one in sections if isinstance(one, Mapping) for name in one.entries)
 
     @property
     def ends(self) -> Iterator[End]:
