@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from rbxcompose.model.order import start_order
 from rbxcompose.model.robot import Part, Robot
 from rbxcompose.plan.model import BusPlan, Instance, Plan, Wire
-from rbxcompose.plan.order import start_order
 
 LAST = "mission"  # starts when everything else is active
 

@@ -1,0 +1,84 @@
+"""Running a plan and telling it as it goes: the log is followed as `logs -f` does, the rest the supervisor reports."""
+
+from __future__ import annotations
+
+import sys
+
+from rbxcompose.cli.common.robots import ALREADY_UP, UNSAFE
+from rbxcompose.cli.common.story import Story
+from rbxcompose.cli.common.summary import summary
+from rbxcompose.cli.common.telling import has_colour, refuse, tell
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plan.model import Plan
+from rbxcompose.runtime.conductor import ROBOT_FAILED
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.runtime.follow import Follower
+from rbxcompose.runtime.launch import AlreadyUp, Begun, Ended, Report, Started, Unsafe, Up, start_supervisor
+from rbxcompose.runtime.log import NAME
+from rbxcompose.runtime.options import RunOptions
+
+_LOOK = 0.05  # [s] between looks at the log
+
+
+def run_plan(plan: Plan, options: RunOptions) -> int:
+    """Run a robot to its end, or until all is active if detached, and return the exit code."""
+    plan = plan.in_one_process() if options.is_stepped else plan
+    started = start_supervisor(plan, options)
+    return _Watch(plan, options, started).run()
+
+
+class _Watch:
+    """Watches one run from its first report to its last."""
+
+    def __init__(self, plan: Plan, options: RunOptions, started: Started) -> None:
+        self._plan, self._options, self._started = plan, options, started
+        self._story = Story([one.name for one in plan.instances], colour=has_colour(sys.stdout))
+        self._log: Follower | None = None  # none before the log of this run has begun
+
+    def run(self) -> int:
+        """Watch until the robot is down, or up if detached, and return the exit code."""
+        try:
+            while True:
+                report = self._started.wait_for_report(_LOOK)
+                self._tell_story()
+                if report is not None and (exit_code := self._tell(report)) is not None:
+                    return exit_code
+        except EOFError:
+            self._tell_story()
+            sys.stderr.write("rbxcompose up: the supervisor was killed; its processes come to rest by themselves\n")
+            self._started.wait()
+            return ROBOT_FAILED
+        finally:
+            if self._log is not None:
+                self._log.close()
+
+    def _tell_story(self) -> None:
+        for record in self._log.read() if self._log is not None else ():
+            if record.level is not Level.OK or not self._options.is_detached:
+                tell(self._story.line(record))
+
+    def _tell(self, report: Report) -> int | None:
+        """Tell a report and return the exit code if it is the last."""
+        name = self._plan.robot
+        match report:
+            case Begun():
+                self._log = Follower(RobotFolder.of(name).path / NAME)
+                return None
+            case Up(components, processes, seconds):
+                shown = f"{components} components in {processes} process{'es' if processes > 1 else ''}"
+                tell(f"{name} is up: {shown}, {seconds:.2f} s")
+                if self._options.is_detached:
+                    self._started.let_go()
+                    return 0
+                return None
+            case AlreadyUp(pid):
+                self._started.wait()
+                shown = f" (pid {pid})" if pid else ""
+                return refuse(ALREADY_UP.at(None, f"'{name}' is already up{shown}", help=f"rbxcompose down {name}"))
+            case Unsafe(reason):
+                self._started.wait()
+                return refuse(UNSAFE.at(None, reason))
+            case Ended(exit_code, reason, time, facts):
+                tell(summary(name, reason, time, facts))
+                self._started.wait()
+                return exit_code

@@ -1,0 +1,63 @@
+"""Bring a robot to rest and end all of its processes, also what a dead supervisor has left."""
+
+from __future__ import annotations
+
+import argparse
+
+from rbxcompose.cli.common.robots import NO_ANSWER, NotDoneError, add_robot_option, find_robot, known_state
+from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.runtime.control import NoAnswerError, RefusedError, ask
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.runtime.leftovers import end_leftovers, kill_supervisor
+from rbxcompose.runtime.processes import wait_until_ended
+
+_ANSWER = 1.0  # [s]
+_ORDERLY = 4.0  # [s] for a supervisor to bring everything down
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file")
+    add_robot_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """End the robot, in order if its supervisor answers and by force if not."""
+    try:
+        folder = find_robot(arguments.robot or arguments.path)
+        told = _end(folder)
+    except NotDoneError as error:
+        return refuse(error.finding)
+    for text in told:
+        tell(text)
+    tell(f"{folder.path.name} is down")
+    return 0
+
+
+def _end(folder: RobotFolder) -> list[str]:
+    """End the robot and return what a person should know of how it went.
+
+    Raises:
+        NotDoneError: if someone else holds the robot and cannot be found.
+    """
+    state = known_state(folder)
+    told: list[str] = []
+    if state is not None and state.is_supervised:
+        if _asked(folder) and not wait_until_ended([state.supervisor], _ORDERLY):
+            return told
+        told.append("the supervisor did not answer and was killed")
+        kill_supervisor(state.supervisor)
+    lock = folder.lock()
+    if lock is None:
+        raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' is held by a process that cannot be found"))
+    told += end_leftovers(folder)
+    folder.clear()
+    return told
+
+
+def _asked(folder: RobotFolder) -> bool:
+    try:
+        ask(folder, {"verb": "down"}, timeout=_ANSWER)
+    except (NoAnswerError, RefusedError):
+        return False
+    return True

@@ -1,0 +1,98 @@
+"""The command `rbxcompose`: finds the verb's file and hands over. One file in this folder is one verb.
+
+A verb's module has `add_arguments(parser)` and `run(arguments) -> exit code`; the first line of its docstring is its
+help. Only the verb that is asked for is imported.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import importlib
+import os
+import pkgutil
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+from typing import NoReturn, Protocol, cast
+
+import rbxcompose
+from rbxcompose import cli
+from rbxcompose.findings import suggest
+
+USAGE, INTERRUPTED = 2, 130
+_ABOUT = "Docker Compose for robots: YAML in, a checked and running robot out."
+
+
+class Verb(Protocol):
+    """What a verb's module holds."""
+
+    __doc__: str | None
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare options and arguments."""
+        ...
+
+    def run(self, arguments: argparse.Namespace) -> int:
+        """Do it and return the exit code."""
+        ...
+
+
+def verbs() -> list[str]:
+    """Return the names of all verbs, sorted."""
+    return sorted(one.name for one in pkgutil.iter_modules(cli.__path__) if not one.ispkg and one.name != "main")
+
+
+def load(verb: str) -> Verb:
+    """Import a verb."""
+    return cast(Verb, importlib.import_module(f"{cli.__name__}.{verb}"))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code: 0 fine, 1 findings, 2 wrong usage, 3 and 4 of `up`, 130 interrupted."""
+    if arguments is None:
+        signal.signal(signal.SIGINT, _interrupted)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if not words or words[0] in ("-h", "--help", "help"):
+        sys.stdout.write(_help())
+        return 0 if words else USAGE
+    if words[0] == "--version":
+        sys.stdout.write(f"rbxcompose {rbxcompose.__version__}\n")
+        return 0
+    if words[0] not in verbs():
+        hint = suggest(words[0], verbs(), "commands")
+        sys.stderr.write(f"rbxcompose: there is no command {words[0]!r}; {hint}\n")
+        return USAGE
+    return _run(words[0], words[1:])
+
+
+def _interrupted(number: int, frame: FrameType | None) -> NoReturn:
+    # At once and without a word, also in the middle of an import; a robot that is up is told by `up` itself.
+    os._exit(INTERRUPTED)
+
+
+def _run(name: str, words: Sequence[str]) -> int:
+    try:
+        verb = load(name)
+        about = verb.__doc__ or ""
+        parser = argparse.ArgumentParser(f"rbxcompose {name}", description=about, allow_abbrev=False)
+        verb.add_arguments(parser)
+        return verb.run(parser.parse_args(words))
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # so that the flush at exit has somewhere to go
+        return 1
+
+
+def _help() -> str:
+    width = max(len(name) for name in verbs())
+    lines = [f"  {name:<{width}}  {_about(name)}" for name in verbs()]
+    usage = "usage: rbxcompose COMMAND ...  (COMMAND --help tells more)"
+    return "\n".join([usage, "", _ABOUT, "", *lines]) + "\n"
+
+
+def _about(name: str) -> str:
+    """Return the first line of a verb's docstring from its text: importing all verbs would take its time."""
+    text = Path(next(iter(cli.__path__)), f"{name}.py").read_text(encoding="utf-8")
+    return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]

@@ -1,0 +1,79 @@
+"""Start a robot: check it, bring all components up, run its mission.
+
+In the foreground it goes down when the mission named by `start:` has ended, or at Ctrl-C; with -d it stays up.
+Exit codes: 0 fine, 1 findings, 2 wrong usage, 3 the mission failed, 4 the robot failed, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+
+from rbxcompose.cli.common.telling import tell_report
+from rbxcompose.cli.common.watch import run_plan
+from rbxcompose.compiler import compile_robot
+from rbxcompose.runtime.options import RunOptions
+from rbxcompose.units import TIME, UnitError, to_si
+
+USAGE = 2
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
+    parser.add_argument("--profile", action="append", default=[], metavar="P", help="put this profile on top")
+    parser.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="change one value")
+    parser.add_argument("--real", action="store_true", help="use the real devices; without it they are simulated")
+    parser.add_argument(
+        "--rate", type=_rate, default=RunOptions(), metavar="20x|max|1x", help="robot time per real time, reproducible"
+    )
+    parser.add_argument("-d", "--detach", action="store_true", help="return when all is active; the robot stays up")
+    parser.add_argument("--for", type=_duration, dest="duration", metavar="30s", help="end after this robot time")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compile the robot, start its supervisor, tell what happens."""
+    if arguments.real and arguments.rate.is_stepped:
+        sys.stderr.write("rbxcompose up: --real keeps its own time, so --rate cannot be given with it\n")
+        return USAGE
+    compilation = compile_robot(
+        arguments.path, profiles=arguments.profile, sets=arguments.sets, real=arguments.real, environment=os.environ
+    )
+    tell_report(compilation.report, compilation.sources)
+    if compilation.plan is None or compilation.report.has_errors:
+        return 1
+    return run_plan(
+        compilation.plan,
+        RunOptions(
+            is_stepped=arguments.rate.is_stepped,
+            rate=arguments.rate.rate,
+            duration=arguments.duration,
+            is_detached=arguments.detach,
+        ),
+    )
+
+
+def _rate(text: str) -> RunOptions:
+    """Read `20x`, `max` or `1x`."""
+    if text == "max":
+        return RunOptions(is_stepped=True)
+    try:
+        rate = float(text.removesuffix("x"))
+    except ValueError:
+        rate = math.nan
+    if not 0 < rate < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a rate; write '20x', '1x' or 'max'")
+    return RunOptions() if rate == 1 else RunOptions(is_stepped=True, rate=rate)
+
+
+def _duration(text: str) -> float:
+    """Read `30s` or `2 min` [s]."""
+    try:
+        seconds = to_si(text, TIME)
+    except UnitError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    if seconds <= 0:
+        raise argparse.ArgumentTypeError("must be longer than nothing")
+    return seconds

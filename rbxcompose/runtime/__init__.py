@@ -1,0 +1,1 @@
+"""Running a plan: scheduler, component host, process groups and their supervisor."""

@@ -1,0 +1,203 @@
+"""The channel between the supervisor and a process group: typed messages as lines of JSON over a socket pair."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import socket
+from dataclasses import dataclass, field
+
+_CHUNK = 65536
+
+
+@dataclass(frozen=True, slots=True)
+class Configure:
+    """Open the bus (at this router, if any) and configure all components."""
+
+    router: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Activate:
+    """Activate these components."""
+
+    names: list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """The whole robot is active: missions may begin, and stepped time runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Hold everything that moves until `Release`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """Allow motion again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Brake:
+    """Come to rest for good and say `AtRest`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """These components of another process have gone."""
+
+    names: list[str]
+    cause: str
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A person's command to one component; `Answer` carries the same number."""
+
+    number: int
+    instance: str
+    verb: str
+
+
+@dataclass(frozen=True, slots=True)
+class Shutdown:
+    """Send `Summary`, deactivate, clean up and end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Configured:
+    """All components have been configured, or are being tried again; a router names its endpoint."""
+
+    endpoint: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class States:
+    """Lifecycle state and number of restarts of components, by name."""
+
+    states: dict[str, tuple[str, int]]
+
+
+@dataclass(frozen=True, slots=True)
+class AtRest:
+    """Nothing moves any more after `Brake`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Notify:
+    """Something that concerns the whole robot, told by a component."""
+
+    event: str
+    data: dict[str, object]
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came of a `Command`."""
+
+    number: int
+    text: str
+    is_refused: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """Facts for the end: robot time [s], and text by instance and label."""
+
+    time: float
+    facts: dict[str, dict[str, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Alive:
+    """The loop of the process turns; its robot time [s]."""
+
+    time: float
+
+
+Order = Configure | Activate | Start | Stop | Release | Brake | Lost | Command | Shutdown
+Word = Configured | States | AtRest | Notify | Answer | Summary | Alive
+Message = Order | Word
+
+_TYPES: dict[str, type[Message]] = {
+    one.__name__.lower(): one
+    for one in (
+        Configure, Activate, Start, Stop, Release, Brake, Lost, Command, Shutdown,
+        Configured, States, AtRest, Notify, Answer, Summary, Alive,
+    )
+}  # fmt: skip
+
+
+def to_line(message: Message) -> bytes:
+    """Return a message as one line."""
+    fields = {one.name: getattr(message, one.name) for one in dataclasses.fields(message)}
+    return json.dumps({"type": type(message).__name__.lower(), **fields}).encode() + b"\n"
+
+
+def from_line(line: bytes) -> Message:
+    """Read what `to_line` wrote."""
+    fields = json.loads(line)
+    return _TYPES[fields.pop("type")](**fields)
+
+
+@dataclass
+class Channel:
+    """One end of a socket pair. It never blocks: what the other side does not take yet is kept for the next call."""
+
+    connection: socket.socket
+    is_open: bool = True
+    _received: bytearray = field(default_factory=bytearray)
+    _unsent: bytearray = field(default_factory=bytearray)
+
+    def __post_init__(self) -> None:
+        self.connection.setblocking(False)
+
+    def fileno(self) -> int:
+        """Return the descriptor to wait for."""
+        return self.connection.fileno()
+
+    def send(self, message: Message) -> None:
+        """Send a message; to a closed channel nothing is sent."""
+        if self.is_open:
+            self._unsent += to_line(message)
+        self.flush()
+
+    @property
+    def is_behind(self) -> bool:
+        """Tell whether the other side has not taken all; what can be left out may be left out."""
+        return bool(self._unsent)
+
+    def flush(self) -> None:
+        """Send what has not been taken yet, as far as it goes."""
+        try:
+            while self.is_open and self._unsent:
+                del self._unsent[: self.connection.send(self._unsent)]
+        except BlockingIOError:
+            return
+        except (BrokenPipeError, ConnectionResetError):
+            self.is_open = False
+
+    def receive(self) -> list[Message]:
+        """Return the messages that have come; `is_open` turns false at the end of the other side."""
+        with contextlib.suppress(BlockingIOError):
+            while self.is_open:
+                chunk = self._read()
+                self.is_open = bool(chunk)
+                self._received += chunk
+        *lines, rest = bytes(self._received).split(b"\n")
+        self._received[:] = rest
+        return [from_line(line) for line in lines]
+
+    def close(self) -> None:
+        """Close this end."""
+        self.is_open = False
+        self.connection.close()
+
+    def _read(self) -> bytes:
+        try:
+            return self.connection.recv(_CHUNK)
+        except ConnectionResetError:
+            return b""

@@ -1,0 +1,151 @@
+"""The supervisor's door: a unix socket in the robot's folder that answers one request per connection.
+
+A request is a JSON object with `verb`; the answer is `{"answer": ...}` or `{"refused": "why"}`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import selectors
+import socket
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rbxcompose.runtime.folder import SOCKET, RobotFolder
+
+_MOST = 65536  # [B] of a request
+_BACKLOG = 16
+_CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
+
+Handle = Callable[[dict[str, object], int], None]  # request, number of the connection
+
+
+class NoAnswerError(OSError):
+    """Raised when the supervisor does not answer."""
+
+
+class RefusedError(Exception):
+    """Raised with the reason when a request was refused."""
+
+
+@contextmanager
+def _short_address(folder: Path) -> Iterator[str]:
+    # The address of a unix socket holds 107 characters at most; that of a descriptor is short.
+    descriptor = os.open(folder, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        yield f"/proc/self/fd/{descriptor}/{SOCKET}"
+    finally:
+        os.close(descriptor)
+
+
+class ControlServer:
+    """Takes requests of this user; each is answered once, at once or later, by its number."""
+
+    def __init__(self, folder: RobotFolder, selector: selectors.BaseSelector) -> None:
+        """Open the door; `handle` is to be set before the next request is read."""
+        self.handle: Handle = lambda request, number: self.refuse(number, "nobody is here")
+        self._selector = selector
+        self._connections: dict[int, tuple[socket.socket, bytearray]] = {}
+        self._count = 0
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._listener.setblocking(False)
+        with _short_address(folder.path) as address:
+            self._listener.bind(address)
+        self._listener.listen(_BACKLOG)
+        selector.register(self._listener, selectors.EVENT_READ, self._accept)
+
+    def answer(self, number: int, answer: object) -> None:
+        """Answer a request."""
+        self._reply(number, {"answer": answer})
+
+    def refuse(self, number: int, reason: str) -> None:
+        """Refuse a request."""
+        self._reply(number, {"refused": reason})
+
+    def close(self) -> None:
+        """Close the door; who still waits hears the end."""
+        for number in list(self._connections):
+            self._drop(number)
+        self._selector.unregister(self._listener)
+        self._listener.close()
+
+    def _accept(self) -> None:
+        try:
+            connection, _ = self._listener.accept()
+        except BlockingIOError:
+            return
+        credentials = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+        if _CREDENTIALS.unpack(credentials)[1] != os.getuid():
+            connection.close()
+            return
+        connection.setblocking(False)
+        self._count += 1
+        number = self._count
+        self._connections[number] = (connection, bytearray())
+        self._selector.register(connection, selectors.EVENT_READ, lambda: self._read(number))
+
+    def _read(self, number: int) -> None:
+        connection, received = self._connections[number]
+        try:
+            chunk = connection.recv(_MOST)
+        except BlockingIOError:
+            return
+        except ConnectionResetError:
+            chunk = b""
+        received += chunk
+        if not chunk or len(received) > _MOST:
+            self._drop(number)
+        elif received.endswith(b"\n"):
+            self._request(number, bytes(received))
+            received.clear()
+
+    def _request(self, number: int, line: bytes) -> None:
+        try:
+            request = json.loads(line)
+        except ValueError:
+            request = None
+        if isinstance(request, dict):
+            self.handle(request, number)
+        else:
+            self.refuse(number, "this is not a request")
+
+    def _reply(self, number: int, reply: object) -> None:
+        found = self._connections.get(number)
+        if found is None:
+            return  # it did not wait
+        try:
+            found[0].sendall(json.dumps(reply).encode() + b"\n")
+        except (BlockingIOError, BrokenPipeError, ConnectionResetError):
+            self._drop(number)  # it does not read
+
+    def _drop(self, number: int) -> None:
+        connection, _ = self._connections.pop(number)
+        self._selector.unregister(connection)
+        connection.close()
+
+
+def ask(folder: RobotFolder, request: dict[str, object], *, timeout: float = 2.0) -> object:
+    """Send a request to a robot's supervisor and return the answer.
+
+    Raises:
+        NoAnswerError: if there is no supervisor, or it does not answer within `timeout` [s].
+        RefusedError: if it refuses.
+    """
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection, _short_address(folder.path) as address:
+            connection.settimeout(timeout)
+            connection.connect(address)
+            connection.sendall(json.dumps(request).encode() + b"\n")
+            with connection.makefile("rb") as file:
+                line = file.readline()
+    except (OSError, TimeoutError) as error:
+        raise NoAnswerError(str(error)) from error
+    if not line:
+        raise NoAnswerError("the supervisor has closed the connection")
+    reply = json.loads(line)
+    if "refused" in reply:
+        raise RefusedError(reply["refused"])
+    return reply["answer"]

@@ -1,0 +1,192 @@
+"""The folder of a robot: lock, state, socket, log. It is this user's alone."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import stat
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from rbxcompose.runtime.processes import Process, boot_id
+
+STATE, LOCK, SOCKET = "state.json", "lock", "control.sock"
+_VERSION = 1
+_TEMPORARY = ".new"
+_PASSING = (STATE, SOCKET, LOCK)  # what goes when the robot is down; the log stays
+
+
+class UnsafeFolderError(OSError):
+    """Raised when the folder belongs to somebody else or is open to others."""
+
+
+class BrokenStateError(ValueError):
+    """Raised when the state file is not what was written."""
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentState:
+    """One line of `ps`."""
+
+    name: str
+    type: str
+    state: str
+    process: str
+    pid: int | None
+    restarts: int
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """What is known of a robot from outside, also when its supervisor is dead."""
+
+    robot: str
+    file: str
+    supervisor: Process
+    processes: Mapping[str, Process]
+    components: Sequence[ComponentState]
+    router: str | None = None
+    boot: str = ""
+
+    def to_text(self) -> str:
+        """Return the text of the state file: a checksum, then JSON."""
+        body = json.dumps({"version": _VERSION, **asdict(self)})
+        return f"{_checksum(body)}\n{body}"
+
+    @classmethod
+    def from_text(cls, text: str) -> State:
+        """Read what `to_text` wrote.
+
+        Raises:
+            BrokenStateError: if it is something else.
+        """
+        checksum, _, body = text.partition("\n")
+        if checksum != _checksum(body):
+            raise BrokenStateError("its checksum is wrong")
+        fields = json.loads(body)
+        if fields.pop("version") != _VERSION:
+            raise BrokenStateError("another version of rbxcompose wrote it")
+        fields["supervisor"] = Process(**fields["supervisor"])
+        fields["processes"] = {name: Process(**one) for name, one in fields["processes"].items()}
+        fields["components"] = tuple(ComponentState(**one) for one in fields["components"])
+        return cls(**fields)
+
+    def alive(self) -> dict[str, Process]:
+        """Return those of its processes that still run, by name, without the supervisor."""
+        if self.boot != boot_id():
+            return {}
+        return {name: process for name, process in self.processes.items() if process.is_running}
+
+    @property
+    def is_supervised(self) -> bool:
+        """Tell whether the supervisor still runs."""
+        return self.boot == boot_id() and self.supervisor.is_running
+
+
+def _checksum(body: str) -> str:
+    return hashlib.sha256(body.encode()).hexdigest()
+
+
+def base_folder() -> Path:
+    """Return the folder that holds those of all robots of this user."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    return Path(runtime) / "rbxcompose" if runtime else Path(tempfile.gettempdir()) / f"rbxcompose-{os.getuid()}"
+
+
+def all_folders() -> list[RobotFolder]:
+    """Return the folders of all robots that are up or were left behind, by name."""
+    base = base_folder()
+    names = sorted(path.parent.name for path in base.glob(f"*/{STATE}")) if base.is_dir() else []
+    return [RobotFolder(base / name) for name in names]
+
+
+@dataclass(frozen=True, slots=True)
+class RobotFolder:
+    """Paths and files of one robot."""
+
+    path: Path
+
+    @classmethod
+    def of(cls, robot: str) -> RobotFolder:
+        """Return the folder of a robot by its name; it need not exist."""
+        return cls(base_folder() / robot)
+
+    def make(self) -> None:
+        """Create the folder if it is not there.
+
+        Raises:
+            UnsafeFolderError: if it, or the one above, is somebody else's or open to others.
+        """
+        for folder in (self.path.parent, self.path):
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            found = os.lstat(folder)
+            if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) & 0o077:
+                raise UnsafeFolderError(f"{folder} must be a folder of this user that nobody else can open (mode 0700)")
+
+    def lock(self) -> int | None:
+        """Return a descriptor that holds the lock until it is closed, or None if someone else holds it."""
+        while True:
+            descriptor = os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                os.close(descriptor)
+                return None
+            if self._is_current(descriptor):
+                return descriptor
+            os.close(descriptor)  # it was removed by who held it before
+
+    def _is_current(self, descriptor: int) -> bool:
+        try:
+            return os.path.samestat(os.fstat(descriptor), os.stat(self.path / LOCK))
+        except FileNotFoundError:
+            return False
+
+    def read_state(self) -> State | None:
+        """Return the state, or None if there is none.
+
+        Raises:
+            BrokenStateError: if the file is not what was written.
+        """
+        try:
+            return State.from_text((self.path / STATE).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return None
+
+    def write_state(self, state: State) -> None:
+        """Replace the state file: whole or not at all, whatever happens meanwhile."""
+        temporary = self.path / f"{STATE}.{os.getpid()}{_TEMPORARY}"
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        with open(descriptor, "w", encoding="utf-8") as file:
+            file.write(state.to_text())
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, self.path / STATE)
+        self._sync()
+
+    def _sync(self) -> None:
+        descriptor = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+    def sweep(self) -> None:
+        """Remove what a run that was killed has left: temporary files, outputs, its socket. Needs the lock."""
+        for path in self._leftovers():
+            path.unlink(missing_ok=True)
+
+    def clear(self) -> None:
+        """Remove everything but the log. Needs the lock, which goes last."""
+        self.sweep()
+        for name in _PASSING:
+            (self.path / name).unlink(missing_ok=True)
+
+    def _leftovers(self) -> Iterator[Path]:
+        yield from self.path.glob(f"*{_TEMPORARY}")
+        yield from self.path.glob("*.out")
+        yield self.path / SOCKET

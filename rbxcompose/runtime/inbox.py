@@ -1,0 +1,45 @@
+"""The one door through which other threads reach the thread of a process."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable
+
+from rbxcompose.scheduler import Scheduler
+
+
+class Inbox:
+    """Takes callbacks from any thread or signal handler and wakes who waits for its descriptor."""
+
+    def __init__(self) -> None:
+        self._descriptor = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._callbacks: deque[tuple[str, Callable[[], None]]] = deque()
+        self._is_signalled = False
+
+    def fileno(self) -> int:
+        """Return the descriptor that is readable when something has come."""
+        return self._descriptor
+
+    def put(self, owner: str, callback: Callable[[], None]) -> None:
+        """Let `callback` run for `owner` on the scheduler's thread. May be called from any thread."""
+        self._callbacks.append((owner, callback))
+        if not self._is_signalled:  # one system call per wake, not per sample
+            self._is_signalled = True
+            os.eventfd_write(self._descriptor, 1)
+
+    def drain(self, scheduler: Scheduler) -> None:
+        """Post everything that has come, in the order of arrival."""
+        if not self._is_signalled:
+            return
+        try:
+            os.eventfd_read(self._descriptor)
+        except BlockingIOError:
+            return  # the flag is set, its write is still to come
+        self._is_signalled = False  # before the reading: what comes from now on signals again
+        while self._callbacks:
+            scheduler.post(*self._callbacks.popleft())
+
+    def close(self) -> None:
+        """Give the descriptor back; nothing may be put in afterwards."""
+        os.close(self._descriptor)

@@ -1,0 +1,46 @@
+"""Ending what a dead or deaf supervisor has left behind."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Sequence
+
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder
+from rbxcompose.runtime.processes import Process, titled, wait_until_ended
+
+ORDERLY = 2.5  # [s] for process groups to come to rest and end by themselves
+AT_ONCE = 1.0  # [s] for the kernel to end what was killed
+
+
+def end_leftovers(folder: RobotFolder) -> list[str]:
+    """End the processes of a robot whose supervisor has gone and return what a person should know of it.
+
+    Those that still hear have been asked by the kernel to stop: they get the time for it.
+    """
+    told: list[str] = []
+    try:
+        state = folder.read_state()
+        found = dict(state.alive()) if state else {}
+    except BrokenStateError as error:
+        told.append(f"the state of '{folder.path.name}' cannot be read ({error}); its processes were found by title")
+        found = {str(one.pid): one for one in titled(f"rbxcompose {folder.path.name}: ")}
+    deaf = [process for process in found.values() if process.is_stopped]
+    _kill(deaf)
+    left = wait_until_ended(list(found.values()), ORDERLY)
+    _kill(left)
+    wait_until_ended(left, AT_ONCE)
+    killed = [name for name, process in found.items() if process in (*deaf, *left)]
+    if killed:
+        told.append(f"processes left behind were killed: {', '.join(sorted(killed))}")
+    return told
+
+
+def kill_supervisor(supervisor: Process) -> None:
+    """End a supervisor that does not answer; the kernel then asks its process groups to stop."""
+    _kill([supervisor])
+    wait_until_ended([supervisor], AT_ONCE)
+
+
+def _kill(processes: Sequence[Process]) -> None:
+    for process in processes:
+        process.send_signal(signal.SIGKILL)

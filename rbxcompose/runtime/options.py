@@ -1,0 +1,18 @@
+"""How a robot is to run: what `up` was asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """Real time (`is_stepped` false) or stepped time at `rate` times real time (None: as fast as it goes).
+
+    `duration` [s] of robot time ends the run; a robot that is detached stays up when its mission has ended.
+    """
+
+    is_stepped: bool = False
+    rate: float | None = None
+    duration: float | None = None
+    is_detached: bool = False

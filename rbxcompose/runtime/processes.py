@@ -1,0 +1,145 @@
+"""Processes of this machine, named so that a process id which was given to someone else cannot fool us."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import select
+import signal
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+_PR_SET_PDEATHSIG = 1
+_PR_SET_CHILD_SUBREAPER = 36
+_LIBC = ctypes.CDLL(None, use_errno=True)
+_STATE, _START_TIME = 0, 19  # fields of /proc/<pid>/stat, counted after the last bracket
+
+
+@dataclass(frozen=True, slots=True)
+class Process:
+    """A process: its id and its start time [clock ticks since boot], which together are never used twice."""
+
+    pid: int
+    started: int
+
+    @classmethod
+    def of(cls, pid: int) -> Process:
+        """Name the process that has this id now.
+
+        Raises:
+            ProcessLookupError: if there is none.
+        """
+        fields = _stat(pid)
+        if fields is None:
+            raise ProcessLookupError(f"there is no process {pid}")
+        return cls(pid, int(fields[_START_TIME]))
+
+    @property
+    def is_running(self) -> bool:
+        """Tell whether it still exists and has not ended."""
+        return self._state() not in ("", "Z", "X")
+
+    @property
+    def is_stopped(self) -> bool:
+        """Tell whether a signal has stopped it, so that it can hear no other but SIGKILL."""
+        return self._state() in ("T", "t")
+
+    def open(self) -> int | None:
+        """Return a pidfd for it, or None if it has ended. The caller closes it."""
+        try:
+            descriptor = os.pidfd_open(self.pid)
+        except ProcessLookupError:
+            return None
+        if self.is_running:  # read after opening: from here on the id cannot change hands unseen
+            return descriptor
+        os.close(descriptor)
+        return None
+
+    def send_signal(self, number: signal.Signals) -> bool:
+        """Send a signal to it and to no other process; tell whether it was there."""
+        descriptor = self.open()
+        if descriptor is None:
+            return False
+        try:
+            return signal_descriptor(descriptor, number)
+        finally:
+            os.close(descriptor)
+
+    def _state(self) -> str:
+        fields = _stat(self.pid)
+        return fields[_STATE] if fields is not None and int(fields[_START_TIME]) == self.started else ""
+
+
+def _stat(pid: int) -> list[str] | None:
+    try:
+        text = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
+    except (FileNotFoundError, ProcessLookupError):
+        return None
+    return text.rpartition(")")[2].split()
+
+
+def signal_descriptor(descriptor: int, number: signal.Signals) -> bool:
+    """Send a signal through a pidfd; tell whether the process was there."""
+    try:
+        signal.pidfd_send_signal(descriptor, number)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def wait_until_ended(processes: Sequence[Process], seconds: float) -> list[Process]:
+    """Wait until all have ended, but at most `seconds` of real time, and return those that have not."""
+    deadline = time.monotonic() + seconds
+    for process in processes:
+        descriptor = process.open()
+        if descriptor is None:
+            continue
+        try:
+            select.select([descriptor], [], [], max(0.0, deadline - time.monotonic()))
+        finally:
+            os.close(descriptor)
+    return [process for process in processes if process.is_running]
+
+
+def end_with(parent: int, number: signal.Signals) -> None:
+    """Let the kernel send `number` to this process when its parent ends; the process ends now if that has happened.
+
+    Call it in the main thread's child: the kernel means the thread that forked.
+    """
+    if _LIBC.prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG) failed")
+    if os.getppid() != parent:
+        os._exit(0)
+
+
+def adopt_orphans() -> None:
+    """Become the parent of descendants whose own parent ends, so that they can be waited for."""
+    if _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER) failed")
+
+
+def boot_id() -> str:
+    """Return what differs from one boot of this machine to the next."""
+    return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+
+
+def titled(prefix: str) -> Iterator[Process]:
+    """Yield the processes of this user whose title starts with `prefix`."""
+    for folder in Path("/proc").iterdir():
+        if not folder.name.isdigit():
+            continue
+        try:
+            if folder.stat().st_uid == os.getuid() and folder.joinpath("cmdline").read_bytes().startswith(
+                prefix.encode()
+            ):
+                yield Process.of(int(folder.name))
+        except (FileNotFoundError, ProcessLookupError):
+            continue  # it ended while we looked
+
+
+def describe_exit(status: int) -> str:
+    """Say in words how a process ended, from its wait status."""
+    code = os.waitstatus_to_exitcode(status)
+    return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with status {code}"

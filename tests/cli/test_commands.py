@@ -1,0 +1,183 @@
+"""The command line without a robot: usage, help, findings; and with one that is only written down."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.cli import main as command
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.runtime.folder import ComponentState, RobotFolder, State
+from rbxcompose.runtime.log import start_new
+from rbxcompose.runtime.processes import Process, boot_id
+from rbxcompose.runtime.records import Record
+
+ROOT = Path(__file__).parents[2]
+RUNNING = ["ps", "down", "stop", "release", "logs"]
+
+
+@pytest.fixture(autouse=True)
+def base(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    return tmp_path
+
+
+def written(name: str, supervisor: Process | None = None) -> RobotFolder:
+    """Write down a robot whose supervisor has gone."""
+    folder = RobotFolder.of(name)
+    folder.make()
+    component = ComponentState("base", "toy", "active", "robot", 77, 1)
+    gone = supervisor or Process(os.getpid(), 1)
+    folder.write_state(State(name, f"/robots/{name}/robot.yaml", gone, {"robot": gone}, (component,), None, boot_id()))
+    return folder
+
+
+def test_without_a_command_it_shows_its_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main([]) == 2
+    assert command.main(["--help"]) == 0
+    assert capsys.readouterr().out.startswith("usage: rbxcompose COMMAND")
+
+
+def test_the_help_has_one_line_for_each_verb(capsys: pytest.CaptureFixture[str]) -> None:
+    command.main(["--help"])
+    shown = {line.split()[0] for line in capsys.readouterr().out.splitlines() if line.startswith("  ")}
+    assert shown == set(command.verbs())
+    assert {"up", "down", "ps", "logs", "stop", "release", "mission"} <= shown
+
+
+def test_an_unknown_command_is_wrong_usage_with_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["dwon"]) == 2
+    assert "did you mean 'down'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verb", RUNNING)
+def test_without_a_robot_that_is_a_finding(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main([verb]) == 1
+    assert "error[RBX9002]: no robot is up" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verb", ["stop", "release"])
+def test_with_several_robots_one_must_be_named(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    written("a")
+    written("b")
+    assert command.main([verb]) == 1
+    assert "error[RBX9003]: several robots are up: a, b" in capsys.readouterr().err
+
+
+def test_a_misspelt_robot_gets_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
+    written("turtlebot")
+    assert command.main(["stop", "--robot", "turtelbot"]) == 1
+    assert "did you mean 'turtlebot'?" in capsys.readouterr().err
+
+
+def test_a_robot_that_does_not_answer_is_a_finding(capsys: pytest.CaptureFixture[str]) -> None:
+    written("a")
+    assert command.main(["stop"]) == 1
+    assert "error[RBX9005]: 'a' does not answer" in capsys.readouterr().err
+
+
+def test_ps_shows_what_a_dead_supervisor_last_wrote(capsys: pytest.CaptureFixture[str]) -> None:
+    written("a")
+    assert command.main(["ps", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "robot": "a",
+        "supervisor": {"pid": None},
+        "router": {"endpoint": None},
+        "components": [
+            {"name": "base", "type": "toy", "state": "dead", "process": "robot", "pid": None, "restarts": 1}
+        ],
+    }
+    assert command.main(["ps"]) == 0
+    assert "base  toy   dead   robot    -    1" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("wanted", ["a", "/robots/a/robot.yaml", "/robots/a"])
+def test_down_clears_what_is_left_by_name_or_by_file(wanted: str, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = written("a")
+    written("b")
+    assert command.main(["down", wanted]) == 0
+    assert capsys.readouterr().out == "a is down\n"
+    assert list(folder.path.iterdir()) == []
+
+
+def test_a_state_that_cannot_be_read_is_told_and_cleared(capsys: pytest.CaptureFixture[str]) -> None:
+    folder = written("a")
+    (folder.path / "state.json").write_text("nonsense")
+    assert command.main(["down", "a"]) == 0
+    assert "its checksum is wrong" in capsys.readouterr().out
+    assert list(folder.path.iterdir()) == []
+
+
+def test_logs_shows_the_last_run_also_when_the_robot_is_down(capsys: pytest.CaptureFixture[str]) -> None:
+    folder = RobotFolder.of("a")
+    folder.make()
+    log = start_new(folder.path)
+    for number in range(3):
+        log.write(Record(float(number), Level.OK, "base", f"text {number}"))
+    log.close()
+    assert command.main(["logs", "-n", "2"]) == 0
+    assert capsys.readouterr().out.splitlines() == ["    1.00  base   text 1", "    2.00  base   text 2"]
+    assert command.main(["logs", "-n", "0", "a"]) == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_following_a_log_ends_at_an_interrupt_without_a_word(base: Path) -> None:
+    folder = RobotFolder.of("a")
+    folder.make()
+    log = start_new(folder.path)
+    words = [sys.executable, "-m", "rbxcompose", "logs", "-f"]
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        log.write(Record(1.0, Level.OK, "base", "first"))
+        assert process.stdout
+        assert process.stdout.readline() == b"    1.00  base   first\n"
+        log.write(Record(2.0, Level.OK, "base", "second"))
+        assert process.stdout.readline() == b"    2.00  base   second\n"
+        process.send_signal(signal.SIGINT)
+        assert process.wait(5.0) == 130
+        assert process.stderr
+        assert process.stderr.read() == b""
+    log.close()
+
+
+def test_a_reader_that_goes_away_is_no_error_of_ours() -> None:
+    folder = RobotFolder.of("a")
+    folder.make()
+    log = start_new(folder.path)
+    for number in range(5000):
+        log.write(Record(float(number), Level.OK, "base", "x" * 100))
+    log.close()
+    words = [sys.executable, "-m", "rbxcompose", "logs"]
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout
+        process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr
+        assert process.stderr.read() == b""
+        process.wait(5.0)
+
+
+@pytest.mark.parametrize("verb", ["ps", "stop", "down", "logs", "mission"])
+def test_a_command_to_a_running_robot_imports_nothing_heavy(verb: str) -> None:
+    script = f"import sys; import rbxcompose.cli.main as m; m.load({verb!r}); print(*sys.modules)"
+    found = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert not {"pydantic", "numpy", "zenoh", "yaml", "rosbags"} & set(found.stdout.split())
+
+
+def test_each_verb_says_what_it_does_in_one_line() -> None:
+    for verb in command.verbs():
+        text = (ROOT / "rbxcompose" / "cli" / f"{verb}.py").read_text(encoding="utf-8")
+        first = (ast.get_docstring(ast.parse(text)) or "").splitlines()[0]
+        assert first.endswith(".")
+        assert len(first) <= 100
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("rbxcompose ")

@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+import argparse
+
+import pytest
+
+from rbxcompose.cli import up
+from rbxcompose.runtime.options import RunOptions
+
+
+def parse(*words: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    up.add_arguments(parser)
+    return parser.parse_args(["robot.yaml", *words])
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("1x", RunOptions()),
+        ("1", RunOptions()),
+        ("20x", RunOptions(is_stepped=True, rate=20.0)),
+        ("0.5x", RunOptions(is_stepped=True, rate=0.5)),
+        ("max", RunOptions(is_stepped=True)),
+    ],
+)
+def test_rates(text: str, options: RunOptions) -> None:
+    assert parse("--rate", text).rate == options
+
+
+@pytest.mark.parametrize("text", ["fast", "0", "-1x", "nan", "inf", "x"])
+def test_a_rate_that_is_none_is_wrong_usage(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as raised:
+        parse(f"--rate={text}")
+    assert raised.value.code == 2
+    assert "write '20x', '1x' or 'max'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("text", "seconds"), [("30s", 30.0), ("2 min", 120.0), ("500 ms", 0.5), ("10", 10.0)])
+def test_durations(text: str, seconds: float) -> None:
+    assert parse("--for", text).duration == pytest.approx(seconds)
+
+
+@pytest.mark.parametrize("text", ["3 m", "0 s", "-1 s", "soon"])
+def test_a_duration_that_is_none_is_wrong_usage(text: str) -> None:
+    with pytest.raises(SystemExit) as raised:
+        parse(f"--for={text}")
+    assert raised.value.code == 2
+
+
+def test_real_devices_keep_their_own_time(capsys: pytest.CaptureFixture[str]) -> None:
+    assert up.run(parse("--real", "--rate", "max")) == 2
+    assert "--rate" in capsys.readouterr().err
+
+
+def test_profiles_and_values_come_in_their_order() -> None:
+    arguments = parse("--profile", "a", "--set", "x.y=1", "--profile", "b", "--set", "z=2", "-d")
+    assert (arguments.profile, arguments.sets, arguments.detach) == (["a", "b"], ["x.y=1", "z=2"], True)

@@ -1,0 +1,374 @@
+"""What the supervisor decides, in virtual time and without processes."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rbxcompose.config import Config
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plan.model import BusPlan, Instance, Plan
+from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.conductor import Conductor, Phase
+from rbxcompose.runtime.options import RunOptions
+from rbxcompose.scheduler import Scheduler
+
+ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+def robot() -> Plan:
+    """Three processes; `base` starts first, `world` holds simulated truth."""
+    instances = (
+        Instance("base", "toy", Config(), "world"),
+        Instance("mux", "toy", Config(), "robot"),
+        Instance("go_to", "toy", Config(), "robot", starts_after=("base",)),
+        Instance("mission", "toy", Config(), "mission"),
+    )
+    return Plan("robot", "robot.yaml", instances, start="patrol")
+
+
+class Stage:
+    """Plays the processes: it records what the conductor does and answers as processes would."""
+
+    def __init__(
+        self, plan: Plan | None = None, options: RunOptions | None = None, router: str | None = "router"
+    ) -> None:
+        self.scheduler = Scheduler()
+        self.plan = plan or robot()
+        self.alive: set[str] = set()
+        self.forks: list[tuple[str, bool, bool]] = []
+        self.sent: list[tuple[str, say.Order]] = []
+        self.killed: list[str] = []
+        self.ended: list[str] = []
+        self.records: list[tuple[Level, str]] = []
+        self.answers: list[tuple[int, str, bool]] = []
+        self.ups = 0
+        self.beats: set[str] = set()
+        self.conductor = Conductor(self.plan, options or RunOptions(), self.scheduler, self, router=router)
+        self.conductor.begin()
+
+    # Effects
+
+    def fork(self, process: str, *, is_restart: bool, is_stopped: bool) -> None:
+        self.forks.append((process, is_restart, is_stopped))
+        self.alive.add(process)
+        self.beats.add(process)
+
+    def send(self, process: str, message: say.Order) -> None:
+        self.sent.append((process, message))
+
+    def end(self, process: str) -> None:
+        self.ended.append(process)
+
+    def kill(self, process: str) -> None:
+        self.killed.append(process)
+
+    def log(self, level: Level, text: str, detail: str = "") -> None:
+        self.records.append((level, text))
+
+    def is_up(self) -> None:
+        self.ups += 1
+
+    def answer(self, number: int, text: str, *, is_refused: bool) -> None:
+        self.answers.append((number, text, is_refused))
+
+    # Processes
+
+    def speak(self, process: str, message: say.Word) -> None:
+        self.conductor.heard(process, message)
+
+    def exit(self, process: str, how: str = "was killed by SIGKILL") -> None:
+        self.alive.discard(process)
+        self.conductor.exited(process, how)
+
+    def configure(self, *processes: str) -> None:
+        for process in processes:
+            self.speak(process, say.Configured(ENDPOINT if process == "router" else None))
+
+    def activate(self) -> None:
+        """Answer every order to activate, in turn, until there are no more."""
+        answered = 0
+        while answered < len(self.orders(say.Activate)):
+            process, message = self.orders(say.Activate)[answered]
+            assert isinstance(message, say.Activate)
+            self.speak(process, say.States(dict.fromkeys(message.names, ("active", 0))))
+            answered += 1
+
+    def start(self) -> Stage:
+        self.configure("router", "world", "robot", "mission")
+        self.activate()
+        return self
+
+    def orders(self, kind: type[say.Order]) -> list[tuple[str, say.Order]]:
+        return [(process, message) for process, message in self.sent if isinstance(message, kind)]
+
+    def told(self, kind: type[say.Order]) -> list[str]:
+        return [process for process, _ in self.orders(kind)]
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time pass while the processes in `beats` give signs of life."""
+        for _ in range(round(seconds / 0.1)):
+            for process in sorted(self.alive & self.beats):
+                self.speak(process, say.Alive(self.scheduler.now))
+            self.scheduler.advance(self.scheduler.now + 0.1)
+
+
+# The beginning
+
+
+def test_all_processes_are_forked_at_once_and_configured_when_the_router_listens() -> None:
+    stage = Stage()
+    assert [name for name, *_ in stage.forks] == ["router", "world", "robot", "mission"]
+    assert stage.told(say.Configure) == ["router"]
+    stage.configure("router")
+    assert stage.sent[1:] == [(name, say.Configure(ENDPOINT)) for name in ("world", "robot", "mission")]
+
+
+def test_with_an_existing_router_none_is_started() -> None:
+    plan = Plan("robot", "robot.yaml", robot().instances, BusPlan(router="tcp/10.0.0.1:7447"))
+    stage = Stage(plan, router=None)
+    assert [name for name, *_ in stage.forks] == ["world", "robot", "mission"]
+    assert stage.sent == [(name, say.Configure("tcp/10.0.0.1:7447")) for name in ("world", "robot", "mission")]
+
+
+def test_nothing_is_activated_before_all_are_configured() -> None:
+    stage = Stage()
+    stage.configure("router", "world", "robot")
+    assert stage.told(say.Activate) == []
+    stage.configure("mission")
+    assert stage.orders(say.Activate) == [("world", say.Activate(["base"]))]
+
+
+def test_components_are_activated_in_the_order_of_the_plan() -> None:
+    stage = Stage().start()
+    expected = [("world", ["base"]), ("robot", ["mux", "go_to"]), ("mission", ["mission"])]
+    assert stage.orders(say.Activate) == [(process, say.Activate(names)) for process, names in expected]
+
+
+def test_the_robot_starts_once_all_are_active() -> None:
+    stage = Stage()
+    stage.configure("router", "world", "robot", "mission")
+    assert (stage.ups, stage.told(say.Start)) == (0, [])
+    stage.activate()
+    assert (stage.ups, stage.told(say.Start)) == (1, ["world", "robot", "mission"])
+    assert stage.conductor.phase is Phase.RUNNING
+
+
+def test_a_component_that_is_restarted_in_place_delays_the_start() -> None:
+    stage = Stage()
+    stage.configure("router", "world", "robot", "mission")
+    stage.speak("world", say.States({"base": ("unconfigured", 1)}))
+    assert stage.told(say.Activate) == ["world"]
+    stage.speak("world", say.Notify("state", {"instance": "base", "state": "active", "restarts": 1}))
+    assert stage.told(say.Activate) == ["world", "robot"]
+    assert stage.conductor.states["base"] == ("active", 1)
+
+
+def test_a_component_that_fails_ends_the_start_with_its_reason() -> None:
+    stage = Stage()
+    stage.configure("router", "world", "robot", "mission")
+    stage.speak("robot", say.Notify("failed", {"instance": "mux", "message": "'mux' failed too often: no"}))
+    assert (stage.conductor.exit_code, stage.conductor.reason) == (4, "'mux' failed too often: no")
+    assert stage.conductor.is_going_down
+
+
+# The end
+
+
+def test_the_end_of_the_mission_ends_the_robot_in_the_foreground() -> None:
+    for outcome, code in (("success", 0), ("failure", 3)):
+        stage = Stage().start()
+        ended: dict[str, object] = {"mission": "patrol", "outcome": outcome, "message": ""}
+        stage.speak("mission", say.Notify("mission_ended", ended))
+        assert (stage.conductor.is_going_down, stage.conductor.exit_code) == (True, code)
+
+
+def test_a_detached_robot_stays_up_when_its_mission_has_ended() -> None:
+    stage = Stage(options=RunOptions(is_detached=True)).start()
+    ended: dict[str, object] = {"mission": "patrol", "outcome": "failure", "message": ""}
+    stage.speak("mission", say.Notify("mission_ended", ended))
+    assert not stage.conductor.is_going_down
+
+
+def test_in_real_time_the_duration_counts_from_the_start_of_robot_time() -> None:
+    stage = Stage(options=RunOptions(duration=3.0)).start()
+    stage.pass_time(2.9)
+    assert not stage.conductor.is_going_down
+    stage.pass_time(0.2)
+    assert (stage.conductor.is_going_down, stage.conductor.exit_code) == (True, 0)
+
+
+def test_going_down_brakes_all_waits_for_rest_and_closes_in_reverse_order() -> None:
+    stage = Stage().start()
+    stage.conductor.go_down(0, "asked")
+    assert stage.told(say.Brake) == ["world", "robot", "mission"]
+    for process in ("mission", "world"):
+        stage.speak(process, say.AtRest())
+    assert stage.told(say.Shutdown) == []
+    stage.speak("robot", say.AtRest())
+    for process in ("mission", "robot", "world", "router"):
+        assert stage.told(say.Shutdown)[-1] == process
+        stage.exit(process, "ended with status 0")
+    assert stage.conductor.phase is Phase.ENDED
+    assert (stage.killed, stage.forks[4:]) == ([], [])
+
+
+def test_what_does_not_come_to_rest_is_closed_after_a_second_and_what_does_not_close_is_killed_within_two() -> None:
+    stage = Stage().start()
+    stage.conductor.go_down(0, "asked")
+    stage.scheduler.advance(stage.scheduler.now + 0.99)
+    assert stage.told(say.Shutdown) == []
+    stage.scheduler.advance(stage.scheduler.now + 0.02)
+    assert stage.told(say.Shutdown) == ["mission"]
+    stage.scheduler.advance(stage.scheduler.now + 0.95)
+    assert stage.killed == ["router", "world", "robot", "mission"]
+
+
+def test_before_anything_is_configured_processes_are_ended_at_once() -> None:
+    stage = Stage()
+    stage.conductor.go_down(130, "interrupted")
+    assert stage.ended == ["world", "robot", "mission"]
+    for process in ("robot", "world", "mission"):
+        stage.exit(process, "ended with status 0")
+    assert stage.ended[-1] == "router"
+    stage.exit("router", "ended with status 0")
+    assert (stage.conductor.phase, stage.conductor.exit_code) == (Phase.ENDED, 130)
+
+
+def test_the_first_reason_counts() -> None:
+    stage = Stage().start()
+    stage.conductor.go_down(3, "the mission failed")
+    stage.conductor.go_down(0, "asked")
+    assert (stage.conductor.exit_code, stage.conductor.reason) == (3, "the mission failed")
+
+
+@given(st.permutations(["router", "world", "robot", "mission"]), st.integers(0, 4))
+def test_it_always_ends_once_all_have_exited(order: list[str], configured: int) -> None:
+    stage = Stage()
+    stage.configure(*["router", "world", "robot", "mission"][:configured])
+    stage.conductor.go_down(0, "asked")
+    for process in order:
+        assert stage.conductor.phase is not Phase.ENDED
+        stage.exit(process)
+    assert stage.conductor.phase is Phase.ENDED
+
+
+# Faults
+
+
+def test_a_dead_process_is_forked_again_and_the_others_hear_of_it() -> None:
+    stage = Stage().start()
+    stage.exit("robot")
+    heard = say.Lost(["mux", "go_to"], "process 'robot' was killed by SIGKILL")
+    assert stage.orders(say.Lost) == [("world", heard), ("mission", heard)]
+    assert len(stage.forks) == 4
+    stage.scheduler.advance(stage.scheduler.now + 0.1)
+    assert stage.forks[4:] == [("robot", True, False)]
+    stage.configure("robot")
+    assert stage.orders(say.Activate)[-1] == ("robot", say.Activate(["mux", "go_to"]))
+    stage.speak("robot", say.States({"mux": ("active", 0), "go_to": ("active", 0)}))
+    assert stage.told(say.Start) == ["world", "robot", "mission", "robot"]
+    assert stage.ups == 1
+
+
+def test_a_process_that_comes_again_to_a_stopped_robot_is_told_so() -> None:
+    stage = Stage().start()
+    stage.conductor.stop()
+    assert stage.told(say.Stop) == ["world", "robot", "mission"]
+    stage.exit("mission")
+    stage.scheduler.advance(stage.scheduler.now + 0.1)
+    assert stage.forks[-1] == ("mission", True, True)
+
+
+def test_one_restart_does_not_wait_for_the_trouble_of_another() -> None:
+    stage = Stage().start()
+    stage.speak("world", say.Notify("state", {"instance": "base", "state": "unconfigured", "restarts": 1}))
+    stage.exit("mission")
+    stage.scheduler.advance(stage.scheduler.now + 0.1)
+    stage.configure("mission")
+    assert stage.orders(say.Activate)[-1] == ("mission", say.Activate(["mission"]))
+
+
+def test_five_deaths_within_a_minute_fail_the_robot() -> None:
+    stage = Stage().start()
+    for _ in range(4):
+        stage.exit("mission")
+        stage.scheduler.advance(stage.scheduler.now + 5.0)
+        assert not stage.conductor.is_going_down
+    stage.exit("mission")
+    assert (stage.conductor.is_going_down, stage.conductor.exit_code) == (True, 4)
+
+
+def test_deaths_far_apart_do_not_fail_the_robot() -> None:
+    stage = Stage().start()
+    for _ in range(8):
+        stage.exit("mission")
+        stage.pass_time(30.0)
+    assert not stage.conductor.is_going_down
+
+
+def test_without_simulated_truth_the_robot_fails() -> None:
+    stage = Stage().start()
+    stage.exit("world")
+    assert (stage.conductor.is_going_down, stage.conductor.exit_code) == (True, 4)
+    assert "world" in stage.conductor.reason
+
+
+def test_a_lost_router_comes_again_where_it_was() -> None:
+    stage = Stage().start()
+    stage.exit("router")
+    stage.scheduler.advance(stage.scheduler.now + 0.1)
+    assert stage.sent[-1] == ("router", say.Configure(ENDPOINT))
+    assert stage.told(say.Lost) == []
+
+
+def test_silence_is_told_after_one_second_and_ends_a_process_after_two() -> None:
+    stage = Stage().start()
+    stage.beats.discard("robot")
+    stage.pass_time(0.9)
+    assert stage.told(say.Lost) == []
+    stage.pass_time(0.5)
+    assert stage.told(say.Lost) == ["world", "robot", "mission"]
+    assert stage.killed == []
+    stage.pass_time(1.0)
+    assert stage.killed == ["robot"]
+
+
+def test_a_process_that_answers_again_is_left_alone() -> None:
+    stage = Stage().start()
+    stage.beats.discard("robot")
+    stage.pass_time(1.5)
+    stage.beats.add("robot")
+    stage.pass_time(5.0)
+    assert stage.killed == []
+    assert stage.records == [(Level.WARN, "process 'robot' answers again")]
+
+
+def test_a_process_that_still_configures_may_be_silent() -> None:
+    stage = Stage()
+    stage.configure("router", "world", "mission")
+    stage.beats.discard("robot")
+    stage.pass_time(20.0)
+    assert stage.killed == []
+
+
+def test_on_a_stepped_clock_nobody_looks_for_silence() -> None:
+    stage = Stage(options=RunOptions(is_stepped=True)).start()
+    assert stage.scheduler.next_due() is None
+
+
+# Facts
+
+
+def test_facts_and_time_come_from_the_processes() -> None:
+    stage = Stage().start()
+    stage.speak("world", say.Summary(12.5, {"base": {"distance": "8.0 m"}}))
+    assert (stage.conductor.time, stage.conductor.facts) == (12.5, {"base": {"distance": "8.0 m"}})
+
+
+@pytest.mark.parametrize("is_refused", [True, False])
+def test_answers_reach_who_asked(is_refused: bool) -> None:
+    stage = Stage().start()
+    stage.speak("mission", say.Answer(7, "paused", is_refused))
+    assert stage.answers == [(7, "paused", is_refused)]

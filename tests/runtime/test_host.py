@@ -1,0 +1,145 @@
+"""Mistakes of one component: told with their line, repaired by a restart, and nobody else's business."""
+
+from __future__ import annotations
+
+import pytest
+
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
+from rbxcompose.msgs.std_msgs import Float32
+from rbxcompose.sdk import Component, Config, In, Out, Refused, component
+from rbxcompose.testing.bench import Bench, instance
+
+
+class ToyConfig(Config):
+    """When to break."""
+
+    breaks_in: str = ""
+    """Name of the method that raises."""
+    times: int = 1
+    """How often it does."""
+
+
+BROKEN: dict[str, int] = {}  # how often each test's component has raised
+
+
+@component("toy_for_host")
+class Toy(Component[ToyConfig]):
+    """Counts its steps and raises where it is told to."""
+
+    rate = 10.0
+    count = Out(Float32, "count")
+    add = In(Float32, "add")
+
+    def configure(self) -> None:
+        self.steps = 0
+        self.life: list[str] = ["configure"]
+        self.break_in("configure")
+
+    def activate(self) -> None:
+        self.life.append("activate")
+        self.break_in("activate")
+
+    def deactivate(self) -> None:
+        self.life.append("deactivate")
+        self.break_in("deactivate")
+
+    def step(self, dt: float) -> None:
+        self.break_in("step")
+        self.steps += 1
+        self.count(Float32(data=self.steps))
+
+    def on_add(self, message: Float32) -> None:
+        self.break_in("on_add")
+        self.steps += int(message.data)
+
+    def break_in(self, method: str) -> None:
+        if method == self.config.breaks_in and BROKEN.get(self.name, 0) < self.config.times:
+            BROKEN[self.name] = BROKEN.get(self.name, 0) + 1
+            raise ValueError("planted")
+
+
+@pytest.fixture(autouse=True)
+def _fresh() -> None:
+    BROKEN.clear()
+
+
+def bench(breaks_in: str, times: int = 1) -> Bench:
+    return Bench(
+        instance("broken", "toy_for_host", {"breaks_in": breaks_in, "times": times}),
+        instance("healthy", "toy_for_host"),
+    )
+
+
+@pytest.mark.parametrize("method", ["configure", "activate", "step"])
+def test_a_component_that_raises_is_restarted_and_the_others_go_on(method: str) -> None:
+    robot = bench(method)
+    robot.advance(2.0)
+    assert robot.host.states() == {"broken": ("active", 1), "healthy": ("active", 0)}
+    assert robot.component("healthy").steps == 20  # type: ignore[attr-defined]
+
+
+def test_a_mistake_is_told_with_method_cause_and_line_and_its_traceback_is_in_the_log() -> None:
+    robot = bench("step")
+    robot.advance(1.0)
+    record = next(one for one in robot.records if one.level is Level.ERROR)
+    assert record.source == "broken"
+    assert record.text.startswith("break_in raised ValueError: planted (test_host.py:")
+    assert "Traceback" in record.detail
+
+
+def test_a_component_in_error_says_so_in_diagnostics_until_it_is_back() -> None:
+    robot = bench("step")
+    reports = robot.collect("/diagnostics", DiagnosticArray)
+    robot.advance(0.15)
+    assert {one.name: one.level for one in reports[-1].status} == {"broken": Level.ERROR, "healthy": Level.OK}
+    robot.advance(2.0)
+    assert {one.level for one in reports[-1].status} == {Level.OK}
+
+
+def test_a_component_that_keeps_failing_has_failed_and_the_supervisor_is_told() -> None:
+    robot = bench("step", times=100)
+    robot.advance(10.0)
+    assert robot.host.states()["broken"] == ("failed", 4)
+    assert [data["instance"] for event, data in robot.events if event == "failed"] == ["broken"]
+    assert robot.host.states()["healthy"] == ("active", 0)
+
+
+def test_a_message_that_breaks_its_handler_restarts_only_that_component() -> None:
+    robot = bench("on_add")
+    robot.publish("/add", Float32(data=5.0))
+    robot.advance(1.0)
+    assert robot.host.states() == {"broken": ("active", 1), "healthy": ("active", 0)}
+    assert robot.component("healthy").steps == 15  # type: ignore[attr-defined]
+
+
+def test_the_lifecycle_runs_in_order_and_again_in_reverse() -> None:
+    robot = bench("")
+    lives = [robot.component(name).life for name in ("broken", "healthy")]  # type: ignore[attr-defined]
+    robot.host.shutdown()
+    assert lives == [["configure", "activate", "deactivate"]] * 2
+    assert {state for state, _ in robot.host.states().values()} == {"unconfigured"}
+
+
+def test_a_component_that_raises_on_the_way_down_does_not_keep_the_others() -> None:
+    robot = bench("deactivate")
+    life = robot.component("broken").life  # type: ignore[attr-defined]
+    robot.host.shutdown()
+    robot.advance(5.0)
+    assert life[-1] == "deactivate"
+    assert {state for state, _ in robot.host.states().values()} == {"unconfigured"}
+
+
+def test_a_command_that_a_component_does_not_know_is_refused() -> None:
+    robot = bench("")
+    with pytest.raises(Refused, match="does not know"):
+        robot.host.command("healthy", "dance")
+    with pytest.raises(Refused, match="not active"):
+        robot.host.command("nobody", "pause")
+
+
+def test_nothing_of_a_component_is_left_on_the_bus_after_shutdown() -> None:
+    robot = bench("")
+    ends = len(robot.bus)
+    robot.host.shutdown()
+    assert len(robot.bus) == ends - 4

@@ -1,0 +1,83 @@
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from rbxcompose.runtime.folder import RobotFolder, State
+from rbxcompose.runtime.leftovers import end_leftovers
+from rbxcompose.runtime.processes import Process, boot_id, describe_exit, titled, wait_until_ended
+
+
+@pytest.fixture
+def child() -> Iterator[subprocess.Popen[bytes]]:
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
+        yield process
+        process.kill()
+
+
+def wait_until_stopped(process: Process) -> None:
+    deadline = time.monotonic() + 5.0
+    while not process.is_stopped:
+        assert time.monotonic() < deadline
+
+
+def test_a_process_is_its_id_and_its_start(child: subprocess.Popen[bytes]) -> None:
+    process = Process.of(child.pid)
+    assert process.is_running
+    assert not process.is_stopped
+    assert not Process(process.pid, process.started + 1).is_running
+
+
+def test_another_process_with_the_same_id_is_never_signalled(child: subprocess.Popen[bytes]) -> None:
+    other = Process(child.pid, Process.of(child.pid).started - 1)
+    assert not other.send_signal(signal.SIGKILL)
+    assert child.poll() is None
+
+
+def test_there_is_no_process_without_an_entry() -> None:
+    with pytest.raises(ProcessLookupError):
+        Process.of(2**22 - 1)
+
+
+def test_waiting_ends_with_the_process(child: subprocess.Popen[bytes]) -> None:
+    process = Process.of(child.pid)
+    assert wait_until_ended([process], 0.01) == [process]
+    assert process.send_signal(signal.SIGKILL)
+    assert wait_until_ended([process], 5.0) == []
+    assert not process.send_signal(signal.SIGKILL)
+
+
+def test_a_zombie_has_ended(child: subprocess.Popen[bytes]) -> None:
+    process = Process.of(child.pid)
+    child.stdin.close() if child.stdin else None
+    assert wait_until_ended([process], 5.0) == []
+    assert not process.is_running
+
+
+def test_processes_are_found_by_title(child: subprocess.Popen[bytes]) -> None:
+    assert Process.of(child.pid) in list(titled(sys.executable))
+
+
+def test_exits_are_told_in_words() -> None:
+    assert describe_exit(signal.SIGKILL) == "was killed by SIGKILL"
+    assert describe_exit(3 << 8) == "ended with status 3"
+
+
+def test_a_stopped_process_that_was_left_behind_is_killed(
+    child: subprocess.Popen[bytes], tmp_path: os.PathLike[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    folder = RobotFolder.of("toys")
+    folder.make()
+    process = Process.of(child.pid)
+    folder.write_state(State("toys", "", process, {"robot": process}, (), None, boot_id()))
+    child.send_signal(signal.SIGSTOP)
+    wait_until_stopped(process)
+    assert end_leftovers(folder) == ["processes left behind were killed: robot"]
+    assert not process.is_running

@@ -1,0 +1,341 @@
+"""A robot of toys in real processes: what must hold whatever is killed, stopped or interrupted, and when."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.runtime.follow import read_log
+from rbxcompose.runtime.log import NAME, PREVIOUS
+from rbxcompose.runtime.processes import Process, titled, wait_until_ended
+
+ROOT = Path(__file__).parents[2]
+TOY = [sys.executable, str(Path(__file__).with_name("toy_robot.py"))]
+COMMAND = [sys.executable, "-m", "rbxcompose"]
+LOG_FILES = {NAME, PREVIOUS}
+PATIENCE = 10.0  # [s]
+
+
+def eventually(holds: Callable[[], bool]) -> None:
+    """Wait until something holds; it must within `PATIENCE`."""
+    deadline = time.monotonic() + PATIENCE
+    while not holds():
+        assert time.monotonic() < deadline, "it never came true"
+        time.sleep(0.01)
+
+
+class Robot:
+    """A toy robot with a name of its own, in a folder of its own."""
+
+    def __init__(self, name: str, base: Path) -> None:
+        self.name = name
+        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(base), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
+        self.folder = RobotFolder(base / "rbxcompose" / name)
+        self.started: list[subprocess.Popen[str]] = []
+
+    def up(self, *options: str, **config: object) -> subprocess.Popen[str]:
+        """Start it; the process is that of the foreground."""
+        words = [*TOY, "--name", self.name, "--config", json.dumps(config), *options]
+        process = subprocess.Popen(
+            words, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT
+        )
+        self.started.append(process)
+        return process
+
+    def up_detached(self, **config: object) -> str:
+        """Start it, wait until it is up, return what was printed."""
+        process = self.up("-d", **config)
+        output, _ = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0, output
+        return output
+
+    def do(self, *words: str) -> subprocess.CompletedProcess[str]:
+        """Run a command on it."""
+        return subprocess.run(
+            [*COMMAND, *words], env=self.environment, capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT
+        )
+
+    def ps(self) -> dict[str, Any]:
+        found: dict[str, Any] = json.loads(self.do("ps", "--json").stdout)
+        return found
+
+    def process_of(self, component: str) -> Process:
+        """Return the process that runs a component."""
+        return Process.of(next(one["pid"] for one in self.ps()["components"] if one["name"] == component))
+
+    def supervisor(self) -> Process:
+        return Process.of(self.ps()["supervisor"]["pid"])
+
+    def processes(self) -> list[Process]:
+        """Return all of its processes, whoever started them."""
+        return [one for one in titled(f"rbxcompose {self.name}: ") if one.is_running]
+
+    def texts(self, source: str | None = None) -> list[str]:
+        """Return what was logged."""
+        return [one.text for one in read_log(self.folder.path / NAME) if source in (None, one.source)]
+
+    def has_logged(self, text: str) -> bool:
+        return any(text in one for one in self.texts())
+
+
+@pytest.fixture
+def robot(request: pytest.FixtureRequest) -> Iterator[Robot]:
+    """A robot of which nothing may be left at the end but its logs."""
+    base = Path(tempfile.mkdtemp(prefix="rbx"))
+    made = Robot(f"toy_{os.getpid()}_{abs(hash(request.node.name)) % 10**6}", base)
+    yield made
+    for process in made.started:
+        with suppress(ProcessLookupError):
+            process.kill()
+        process.communicate()
+    left = made.processes()
+    for one in left:
+        one.send_signal(signal.SIGKILL)
+    files = {path.name for path in made.folder.path.glob("*")} - LOG_FILES
+    shutil.rmtree(base)
+    assert (left, files) == ([], set())
+
+
+def test_up_ps_down(robot: Robot) -> None:
+    assert "is up: 2 components in 2 processes" in robot.up_detached()
+    shown = robot.ps()
+    assert shown["robot"] == robot.name
+    assert shown["router"]["endpoint"].startswith("tcp/127.0.0.1:")
+    assert [(one["name"], one["state"], one["restarts"]) for one in shown["components"]] == [
+        ("first", "active", 0),
+        ("second", "active", 0),
+    ]
+    done = robot.do("down")
+    assert (done.returncode, done.stdout) == (0, f"{robot.name} is down\n")
+    assert robot.do("ps").returncode == 1
+    assert robot.texts("first")[-2:] == ["braking", "deactivated"]
+
+
+def test_commands_reach_the_running_robot(robot: Robot) -> None:
+    robot.up_detached()
+    assert robot.do("release").returncode == 1
+    assert robot.do("stop", "--robot", robot.name).returncode == 0
+    eventually(lambda: robot.has_logged("held"))
+    assert robot.do("release").returncode == 0
+    eventually(lambda: robot.has_logged("free again"))
+    refused = robot.do("mission", "pause")
+    assert (refused.returncode, "RBX9004" in refused.stderr) == (1, True)
+    assert robot.do("down", robot.name).returncode == 0
+
+
+def test_a_second_up_is_a_finding(robot: Robot) -> None:
+    robot.up_detached()
+    pid = robot.supervisor().pid
+    second = robot.up("-d")
+    output, _ = second.communicate(timeout=PATIENCE)
+    assert second.returncode == 1
+    assert f"error[RBX9001]: '{robot.name}' is already up (pid {pid})" in output
+    assert robot.supervisor().pid == pid
+    robot.do("down")
+
+
+def test_the_foreground_ends_with_the_mission_and_tells_the_whole_story(robot: Robot) -> None:
+    process = robot.up(runs=0.5, outcome="failure")
+    output, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 3
+    lines = output.splitlines()
+    summary = lines.index(f"{robot.name} is down: mission toy: failure")
+    assert sum("deactivated" in line for line in lines[:summary]) == 2
+    assert any(line.split()[:2] == ["second", "steps"] for line in lines[summary:])
+
+
+def test_an_interrupt_while_it_runs_ends_it_in_order(robot: Robot) -> None:
+    process = robot.up()
+    eventually(lambda: robot.has_logged("step 10"))
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert "interrupted" in output
+    assert robot.texts("first")[-2:] == ["braking", "deactivated"]
+
+
+def test_an_interrupt_during_the_start_ends_it_at_once(robot: Robot) -> None:
+    process = robot.up(is_slow=True)
+    eventually(lambda: len(robot.processes()) == 5)
+    began = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert time.monotonic() - began < 2.0
+
+
+@pytest.mark.parametrize("processes", [1, 2, 3, 4, 5])
+def test_an_interrupt_at_any_moment_leaves_nothing(robot: Robot, processes: int) -> None:
+    process = robot.up()
+    eventually(lambda: len(robot.processes()) >= processes)
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130, output
+
+
+def test_a_second_interrupt_waits_for_nothing(robot: Robot) -> None:
+    process = robot.up(brakes=60.0)
+    eventually(lambda: robot.has_logged("step 10"))
+    process.send_signal(signal.SIGINT)
+    eventually(lambda: robot.has_logged("braking"))
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert not robot.has_logged("deactivated")
+
+
+def test_the_end_of_the_terminal_is_the_end_of_the_robot(robot: Robot) -> None:
+    process = robot.up()
+    eventually(lambda: robot.has_logged("step 10"))
+    process.kill()
+    assert wait_until_ended(robot.processes(), 2.0) == []
+    assert robot.texts("first")[-2:] == ["braking", "deactivated"]
+
+
+def test_a_killed_process_is_started_again(robot: Robot) -> None:
+    robot.up_detached()
+    process = robot.process_of("first")
+    process.send_signal(signal.SIGKILL)
+    eventually(lambda: robot.texts("first").count("started") == 2)
+    assert robot.has_logged("lost first: process 'robot' was killed by SIGKILL")
+    assert [(one["state"], one["restarts"]) for one in robot.ps()["components"]] == [("active", 1), ("active", 0)]
+    assert robot.process_of("first") != process
+    robot.do("down")
+
+
+def test_a_killed_router_comes_again_where_it_was(robot: Robot) -> None:
+    robot.up_detached()
+    endpoint = robot.ps()["router"]
+    router = next(iter(titled(f"rbxcompose {robot.name}: router")))
+    router.send_signal(signal.SIGKILL)
+    eventually(lambda: robot.has_logged("process 'router' was killed") and len(robot.processes()) == 5)
+    assert robot.ps()["router"] == endpoint
+    robot.do("down")
+
+
+def test_without_its_supervisor_the_robot_comes_to_rest_and_ends(robot: Robot) -> None:
+    robot.up_detached()
+    processes = robot.processes()
+    assert len(processes) == 5
+    robot.supervisor().send_signal(signal.SIGKILL)
+    assert wait_until_ended(processes, 2.0) == []
+    assert robot.texts("first")[-2:] == ["braking", "deactivated"]
+    assert [one["state"] for one in robot.ps()["components"]] == ["dead", "dead"]
+    assert robot.do("down").returncode == 0
+
+
+def test_without_the_prefork_parent_the_robot_goes_down(robot: Robot) -> None:
+    process = robot.up()
+    eventually(lambda: robot.has_logged("step 10"))
+    next(iter(titled(f"rbxcompose {robot.name}: parent"))).send_signal(signal.SIGKILL)
+    output, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 4
+    assert "the pre-fork parent has gone" in output
+    assert robot.texts("first")[-2:] == ["braking", "deactivated"]
+
+
+def test_down_ends_a_stopped_process(robot: Robot) -> None:
+    robot.up_detached()
+    robot.process_of("first").send_signal(signal.SIGSTOP)
+    assert robot.do("down").returncode == 0
+
+
+@pytest.mark.parametrize("who", ["down", "the next up"])
+def test_what_a_dead_supervisor_left_is_ended_by(who: str, robot: Robot) -> None:
+    robot.up_detached()
+    robot.process_of("first").send_signal(signal.SIGSTOP)
+    before = robot.processes()
+    robot.supervisor().send_signal(signal.SIGKILL)
+    if who == "the next up":
+        robot.up_detached()
+    assert robot.do("down").returncode == 0
+    assert wait_until_ended(before, 0.0) == []
+
+
+def test_down_ends_a_robot_whose_supervisor_is_stopped(robot: Robot) -> None:
+    robot.up_detached()
+    robot.supervisor().send_signal(signal.SIGSTOP)
+    assert [one["state"] for one in robot.ps()["components"]] == ["active", "active"]
+    assert robot.do("down").returncode == 0
+    assert robot.texts("first")[-2:] == ["braking", "deactivated"]
+
+
+def test_a_process_that_hangs_ends_itself_and_says_where(robot: Robot) -> None:
+    process = robot.up(hangs_at=0.3)
+    eventually(lambda: robot.has_logged("hung and ended itself"))
+    hang = next(one for one in read_log(robot.folder.path / NAME) if "hung" in one.text)
+    assert "in step" in hang.detail
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=PATIENCE)
+
+
+def test_a_process_that_dies_again_and_again_fails_the_robot(robot: Robot) -> None:
+    process = robot.up(dies_at=0.01)
+    output, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 4
+    assert "too often to go on" in output
+
+
+def test_a_component_that_cannot_be_configured_ends_the_start_with_its_reason(robot: Robot) -> None:
+    process = robot.up("-d", is_broken=True)
+    output, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 4
+    assert "'second' failed too often: configure raised OSError: no such device" in output
+
+
+def test_a_robot_beside_another_takes_the_next_port(robot: Robot) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        robot.up("-d", "--port", str(port)).communicate(timeout=PATIENCE)
+        endpoint = robot.ps()["router"]["endpoint"]
+        assert port < int(endpoint.rpartition(":")[2]) <= port + 20
+    robot.do("down")
+
+
+def test_what_a_component_prints_is_in_the_log(robot: Robot) -> None:
+    process = robot.up(runs=0.3, prints="hello from a toy")
+    process.communicate(timeout=PATIENCE)
+    printed = [one.detail for one in read_log(robot.folder.path / NAME) if "what it had printed" in one.text]
+    assert printed == ["hello from a toy\n"]
+
+
+@pytest.mark.parametrize("options", [[], ["--rate", "200"]], ids=["max", "paced"])
+def test_on_a_stepped_clock_two_runs_write_the_same_log(robot: Robot, options: list[str]) -> None:
+    logs = []
+    for _ in range(2):
+        process = robot.up("--stepped", *options, runs=20.0, brakes=0.33)
+        process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0
+        logs.append((robot.folder.path / NAME).read_bytes())
+    assert logs[0] == logs[1]
+    assert logs[0].count(b"deactivated") == 2
+    assert robot.texts("second")[-2:] == ["braking", "deactivated"]
+
+
+def test_on_a_stepped_clock_the_duration_is_exact(robot: Robot) -> None:
+    process = robot.up("--stepped", "--duration", "7")
+    process.communicate(timeout=PATIENCE)
+    braking = [one.time for one in read_log(robot.folder.path / NAME) if one.text == "braking"]
+    assert (process.returncode, braking) == (0, [7.0, 7.0])
+
+
+def test_a_command_to_a_stepped_robot_is_told_to_end_reproducibility(robot: Robot) -> None:
+    robot.up("--stepped", "--rate", "1")
+    eventually(lambda: robot.has_logged("step 10"))
+    assert robot.do("stop").returncode == 0
+    eventually(lambda: robot.has_logged("from outside: stop; this run is not reproducible"))
+    robot.do("down")

@@ -1,0 +1,128 @@
+"""A robot of toy components, as a program: what `up` does, without a manifest. Tests run it in processes of its own."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import time
+
+from rbxcompose.cli.common.watch import run_plan
+from rbxcompose.plan.model import BusPlan, Instance, Plan
+from rbxcompose.runtime.options import RunOptions
+from rbxcompose.sdk import Component, Config, Refused, component
+
+SLOW = 5.0  # [s]
+
+
+class ToyConfig(Config):
+    """How a toy behaves."""
+
+    runs: float = 0.0
+    """When its mission ends [s of robot time]; 0: never."""
+    outcome: str = "success"
+    """How its mission ends."""
+    brakes: float = 0.1
+    """Time to come to rest [s]."""
+    is_broken: bool = False
+    """Cannot be configured."""
+    prints: str = ""
+    """What it prints when it starts."""
+    is_slow: bool = False
+    """Takes long to configure."""
+    dies_at: float = 0.0
+    """When its process kills itself [s of robot time]; 0: never."""
+    hangs_at: float = 0.0
+    """When it hangs [s of robot time]; 0: never."""
+
+
+@component("toy")
+class Toy(Component[ToyConfig]):
+    """Counts its steps, tells what it is told."""
+
+    rate = 20.0
+
+    def configure(self) -> None:
+        if self.config.is_slow:
+            time.sleep(SLOW)
+        if self.config.is_broken:
+            raise OSError("no such device")
+        self.steps = 0
+        self.has_started = False
+        self.is_moving = False
+        self.rests_at = 0.0
+
+    def activate(self) -> None:
+        self.is_moving = True
+
+    def start(self) -> None:
+        self.has_started = True
+        self.info("started")
+        if self.config.prints:
+            print(self.config.prints)  # noqa: T201
+
+    def stop(self) -> None:
+        self.info("held")
+
+    def release(self) -> None:
+        self.info("free again")
+
+    def brake(self) -> None:
+        self.is_moving, self.rests_at = False, self.now + self.config.brakes
+        self.info("braking")
+
+    def lost(self, names: tuple[str, ...], cause: str) -> None:
+        self.warn(f"lost {', '.join(names)}: {cause}")
+
+    @property
+    def is_at_rest(self) -> bool:
+        return not self.is_moving and self.now >= self.rests_at
+
+    def step(self, dt: float) -> None:
+        self.steps += 1
+        if self.steps % 10 == 0:
+            self.info(f"step {self.steps}")
+        if self.config.dies_at and self.now >= self.config.dies_at:
+            signal.raise_signal(signal.SIGKILL)
+        if self.config.hangs_at and self.now >= self.config.hangs_at:
+            time.sleep(60.0)
+        if self.config.runs and self.has_started and self.now >= self.config.runs:
+            self.has_started = False
+            self.context.notify("mission_ended", mission="toy", outcome=self.config.outcome, message="")
+
+    def command(self, verb: str) -> str:
+        if verb != "pause":
+            raise Refused(f"a toy cannot {verb}")
+        return "paused"
+
+    def deactivate(self) -> None:
+        self.info("deactivated")
+
+    def summary(self) -> dict[str, str]:
+        return {"steps": str(self.steps)}
+
+
+def toy_plan(name: str = "toys", *, port: int = 17447, **config: object) -> Plan:
+    """Return a plan of two toys in two processes; `config` is that of the second."""
+    first = Instance("first", "toy", ToyConfig(), "robot")
+    second = Instance("second", "toy", ToyConfig.model_validate(config), "other", starts_after=("first",))
+    return Plan(name, "toys.yaml", (first, second), BusPlan(port=port), start="toy")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--name", default="toys")
+    parser.add_argument("--config", default="{}", help="JSON")
+    parser.add_argument("--port", type=int, default=17447)
+    parser.add_argument("--rate", type=float, default=None)
+    parser.add_argument("--stepped", action="store_true")
+    parser.add_argument("--duration", type=float, default=None)
+    parser.add_argument("-d", action="store_true")
+    arguments = parser.parse_args()
+    config = ToyConfig.model_validate_json(arguments.config).model_dump()
+    options = RunOptions(arguments.stepped, arguments.rate, arguments.duration, arguments.d)
+    return run_plan(toy_plan(arguments.name, port=arguments.port, **config), options)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
