@@ -21,8 +21,9 @@ types: $(VENV)/.test
 unit: $(VENV)/.test
 	$(BIN)/python -m pytest -q
 
-docs: $(VENV)/.test  ## Write the generated pages of docs/ anew
+docs: $(VENV)/.test  ## Write the generated pages and the picture of docs/ anew
 	$(BIN)/python docs/generate.py
+	$(BIN)/python docs/draw_patrol.py
 
 messages: $(VENV)/.test  ## Write rbxcompose/msgs/ anew from the interface texts
 	$(BIN)/python -m rbxcompose.msgs.generate
@@ -34,7 +35,7 @@ lock: $(VENV)/.test  ## Choose newest versions for the lock files
 
 # An editable install needs the build backend; what runs is locked with hashes.
 $(VENV)/bin/python:
-	$(PYTHON) -c 'import sys; sys.exit("rbxcompose needs Python 3.11 or newer") if sys.version_info < (3, 11) else None'
+	@$(PYTHON) -c 'import sys; sys.exit("rbxcompose needs Python 3.11 or newer") if sys.version_info < (3, 11) else None'
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.up: requirements.lock pyproject.toml | $(VENV)/bin/python

@@ -1,1 +1,8 @@
 """What tests of robots and plug-ins need: virtual time, a bus within the process, findings of a text, golden files."""
+
+from rbxcompose.testing.bench import Bench, instance
+from rbxcompose.testing.golden import Golden
+from rbxcompose.testing.manifests import Checked, check_text
+from rbxcompose.testing.robots import Ran, run_robot
+
+__all__ = ["Bench", "Checked", "Golden", "Ran", "check_text", "instance", "run_robot"]

@@ -5,7 +5,7 @@ import pytest
 from rbxcompose.msgs.rbxcompose_msgs import SetBatteryLevel
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.sdk import Reply
-from rbxcompose.testing.bench import Bench, instance
+from rbxcompose.testing import Bench, instance
 
 
 def bench() -> Bench:

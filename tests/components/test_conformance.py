@@ -15,7 +15,7 @@ from rbxcompose.plan.model import Instance
 from rbxcompose.rendering import render_text
 from rbxcompose.sdk.ports import In, Serves
 from rbxcompose.sdk.registry import component_names, component_type
-from rbxcompose.testing.bench import Bench
+from rbxcompose.testing import Bench
 
 ROBOT = """
 rbx: 1

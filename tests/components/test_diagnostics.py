@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
-from rbxcompose.testing.bench import Bench, instance
+from rbxcompose.testing import Bench, instance
 
 
 def bench() -> Bench:

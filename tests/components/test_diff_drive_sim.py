@@ -5,7 +5,7 @@ import pytest
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.testing.bench import Bench, instance
+from rbxcompose.testing import Bench, instance
 
 FORWARDS = Twist(linear=Vector3(x=0.4))
 

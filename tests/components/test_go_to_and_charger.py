@@ -13,7 +13,7 @@ from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk import Ended, Outcome, SentGoal
-from rbxcompose.testing.bench import Bench, instance
+from rbxcompose.testing import Bench, instance
 
 DOCK = Place("dock", 0.5, 0.5, 0.0)
 

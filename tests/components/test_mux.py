@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
-from rbxcompose.testing.bench import Bench, instance
+from rbxcompose.testing import Bench, instance
 
 SLOW, FAST, ZERO = Twist(linear=Vector3(x=0.1)), Twist(linear=Vector3(x=0.4)), Twist()
 

@@ -8,7 +8,7 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.sdk import Component, Config, In, Out, Refused, component
-from rbxcompose.testing.bench import Bench, instance
+from rbxcompose.testing import Bench, instance
 
 
 class ToyConfig(Config):

@@ -1,0 +1,107 @@
+"""Fenced blocks of pages, and the project in which the manifests among them are compiled: that of the patrol robot."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rbxcompose.testing.manifests import Checked, check_text
+
+ROOT = Path(__file__).parents[2]
+ROBOT = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
+PATROL = (ROOT / "missions/patrol.yaml").read_text(encoding="utf-8")
+HEADER = "rbx: 1\nkind: Mission\nname: example\n"
+EXAMPLE = f"{HEADER}do: recharge\n"
+
+_FENCE = re.compile(r"^```(?P<info>[^\n`]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
+_SECTION = re.compile(r"^(?=[^\s#])", re.MULTILINE)
+_ENTRY = re.compile(r"^(?=  [^\s#])", re.MULTILINE)
+_MISSION_FILE = re.compile(r"(?:\.\./)*missions/")  # however far above the robot's file a page sees it
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A fenced block: its page and line, the words behind the fence, what stands inside."""
+
+    page: str
+    line: int
+    words: tuple[str, ...]
+    text: str
+
+    @property
+    def language(self) -> str:
+        return self.words[0] if self.words else ""
+
+    @property
+    def wrong(self) -> str | None:
+        """The code that `check` must give, for an example of a mistake."""
+        return self.words[self.words.index("wrong") + 1] if "wrong" in self.words else None
+
+    def __str__(self) -> str:
+        return f"{self.page}:{self.line}"
+
+
+def blocks_of(text: str, page: str) -> Iterator[Block]:
+    for match in _FENCE.finditer(text):
+        yield Block(page, text.count("\n", 0, match.start()) + 1, tuple(match["info"].split()), match["text"])
+
+
+def page_blocks(language: str) -> list[Block]:
+    """Return the blocks of one language in the pages that are written by hand."""
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+    found = (block for page in pages for block in blocks_of(page.read_text(encoding="utf-8"), page.name))
+    return [block for block in found if block.language == language]
+
+
+def checked(block: Block, folder: Path) -> Checked:
+    """Compile the manifest or the fragment that a block holds."""
+    kind = next((word for word in ("robot", "mission") if word in block.words[1:]), "")
+    if kind == "mission":
+        return check_mission(HEADER + block.text, folder)
+    if kind == "robot":
+        return check_robot(with_sections(ROBOT, block.text), folder, profiles=profiles_of(block.text))
+    if "\nkind: Mission\n" in block.text:
+        return check_mission(block.text, folder)
+    return check_robot(block.text, folder)
+
+
+def check_mission(text: str, folder: Path) -> Checked:
+    """Compile the patrol robot with one more mission; one that does not say what to do recharges."""
+    whole = text if "\ndo:" in text else f"{text}do: recharge\n"
+    robot = with_sections(ROBOT, "missions:\n  example: ../../missions/example.yaml\n")
+    return check_robot(robot, folder, example=whole)
+
+
+def check_robot(
+    text: str,
+    folder: Path,
+    *,
+    profiles: Sequence[str] = (),
+    real: bool = False,
+    example: str = EXAMPLE,
+) -> Checked:
+    others = {"../../missions/patrol.yaml": PATROL, "../../missions/example.yaml": example}
+    robot = _MISSION_FILE.sub("../../missions/", text)
+    home = folder / "robots" / "example"
+    return check_text(robot, home, others=others, profiles=profiles, real=real, environment={})
+
+
+def with_sections(robot: str, fragment: str) -> str:
+    """Return a robot's text with the sections of a fragment: an entry takes the place of the one of its name."""
+    sections = _parts(robot, _SECTION)
+    for name, section in _parts(fragment, _SECTION).items():
+        entries = {**_parts(sections.get(name, ""), _ENTRY), **_parts(section, _ENTRY)}
+        is_map = bool(_parts(section, _ENTRY))
+        sections[name] = f"{name}:\n{''.join(entries.values())}" if is_map else section
+    return "".join(sections.values())
+
+
+def profiles_of(fragment: str) -> list[str]:
+    return list(_parts(_parts(fragment, _SECTION).get("profiles", ""), _ENTRY))
+
+
+def _parts(text: str, begins: re.Pattern[str]) -> dict[str, str]:
+    pieces = begins.split(text)[1:]
+    return {piece.partition(":")[0].strip(): piece for piece in pieces}

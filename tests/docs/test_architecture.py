@@ -1,0 +1,77 @@
+"""The architecture page is true to the tree: packages, stages, families of codes."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+import pytest
+
+from tests.docs.examples import ROOT
+
+PACKAGE = ROOT / "rbxcompose"
+PAGE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+MAP = re.findall(r"^- `(\w+)`: ", PAGE.partition("## Package map\n")[2].partition("\n## ")[0], re.MULTILINE)
+STAGES = re.findall(r"^\d+\. \*\*.+?\*\* by `(\w+)` in `([\w/.]+)`", PAGE, re.MULTILINE)
+
+
+def calls_of(file: str, function: str) -> list[str]:
+    """Return the names that a function calls, in the order of the text."""
+    [found] = [node for node in functions(file) if node.name == function]
+    calls = [node for node in ast.walk(found) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)]
+    ordered = sorted(calls, key=lambda call: (call.lineno, call.col_offset))
+    return [call.func.id for call in ordered if isinstance(call.func, ast.Name)]
+
+
+def functions(file: str) -> list[ast.FunctionDef]:
+    tree = ast.parse((PACKAGE / file).read_text(encoding="utf-8"))
+    return [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+
+
+def test_the_map_names_every_package_and_module_and_nothing_else() -> None:
+    there = {path.stem for path in PACKAGE.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
+    assert sorted(MAP) == sorted(there - {"__init__"})
+
+
+def imports_of(part: str) -> set[str]:
+    home = PACKAGE / part
+    files = home.rglob("*.py") if home.is_dir() else [home.with_suffix(".py")]
+    nodes = (node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
+    modules = [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+    return {module.split(".")[1] for module in modules if module.startswith("rbxcompose.")} - {part}
+
+
+@pytest.mark.parametrize("part", MAP)
+def test_imports_point_downwards_in_the_map(part: str) -> None:
+    below = set(MAP[MAP.index(part) + 1 :])
+    assert imports_of(part) - below == ({"manifest"} if part == "missions" else set())
+
+
+def test_every_stage_is_a_function_of_the_file_that_is_named() -> None:
+    assert len(STAGES) == 8
+    assert [name for name, file in STAGES if name not in {one.name for one in functions(file)}] == []
+
+
+def test_the_compiler_calls_the_stages_in_this_order() -> None:
+    names = [name for name, _ in STAGES]
+    called = [name for name in calls_of("compiler.py", "compile_robot") if name in names]
+    assert called == names[:5]
+
+
+def test_up_compiles_and_then_runs_the_plan() -> None:
+    assert [name for name in calls_of("cli/up.py", "run") if name in ("compile_robot", "run_plan")] == [
+        "compile_robot",
+        "run_plan",
+    ]
+    assert "start_supervisor" in calls_of("cli/common/watch.py", "run_plan")
+
+
+def test_every_family_of_codes_is_told_and_every_one_that_is_told_exists() -> None:
+    told = set(re.findall(r"^\| (RBX\d\d) \|", PAGE, re.MULTILINE))
+    assert told == {page.stem[:5] for page in (ROOT / "docs/findings").glob("RBX*.md")}
+
+
+def test_every_file_that_is_named_exists() -> None:
+    files = set(re.findall(r"`([\w/]+\.py)`", PAGE))
+    homes = (PACKAGE, PACKAGE / "runtime", ROOT)
+    assert [file for file in files if not any((home / file).exists() for home in homes)] == []

@@ -1,0 +1,74 @@
+"""What the pages show is so: manifests compile or have the mistake that is told, commands parse, code runs."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.cli.main import load, verbs
+from rbxcompose.msgs.std_msgs import Float32
+from rbxcompose.sdk import registry
+from rbxcompose.testing.bench import Bench, instance
+from tests.docs.examples import ROOT, Block, checked, page_blocks
+
+
+@pytest.mark.parametrize("block", page_blocks("yaml"), ids=str)
+def test_a_manifest_compiles_or_has_the_mistake_that_is_told(block: Block, tmp_path: Path) -> None:
+    found = checked(block, tmp_path)
+    assert set(found.codes) == ({block.wrong} if block.wrong else set()), found.text
+
+
+def commands(block: Block) -> list[list[str]]:
+    lines = (shlex.split(line, comments=True) for line in block.text.splitlines())
+    return [words[1:] for words in lines if words and Path(words[0]).name == "rbxcompose"]
+
+
+@pytest.mark.parametrize("block", page_blocks("sh"), ids=str)
+def test_a_command_parses(block: Block) -> None:
+    for verb, *words in commands(block):
+        assert verb in verbs()
+        parser = argparse.ArgumentParser(verb, allow_abbrev=False, exit_on_error=False)
+        load(verb).add_arguments(parser)
+        parser.parse_args(words)
+
+
+def test_the_pages_show_commands() -> None:
+    assert len([words for block in page_blocks("sh") for words in commands(block)]) > 10
+
+
+@pytest.mark.parametrize("block", page_blocks("python"), ids=str)
+def test_code_is_python(block: Block) -> None:
+    compile(block.text, str(block), "exec")
+
+
+def test_the_component_of_the_contributing_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "_TYPES", dict(registry._TYPES))
+    [block] = [block for block in page_blocks("python") if block.page == "CONTRIBUTING.md"]
+    file = tmp_path / "thermometer.py"
+    file.write_text(block.text, encoding="utf-8")
+    spec = importlib.util.spec_from_file_location("thermometer", file)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "thermometer", module)
+    spec.loader.exec_module(module)
+    bench = Bench(instance("thermometer", "thermometer", {"offset": 0.5}))
+    corrected = bench.collect("temperature", Float32)
+    bench.publish("raw_temperature", Float32(data=20.0))
+    assert [message.data for message in corrected] == [20.5]
+
+
+def test_no_page_leads_to_a_page_that_is_not_there() -> None:
+    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")):
+        for target in links(page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def links(text: str) -> list[str]:
+    targets = (piece.partition(")")[0].partition("#")[0] for piece in text.split("](")[1:])
+    return [target for target in targets if target and "://" not in target]

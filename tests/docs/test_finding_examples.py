@@ -1,0 +1,77 @@
+"""The page of each kind of finding shows the mistake and its cure, and both are what they say."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import re
+import textwrap
+from pathlib import Path
+
+import pytest
+
+import rbxcompose
+from rbxcompose.findings import KINDS, Kind
+from tests.docs.examples import HEADER, ROBOT, check_mission, check_robot, profiles_of, with_sections
+
+for _module in pkgutil.walk_packages(rbxcompose.__path__, "rbxcompose."):
+    if not _module.name.endswith("__main__"):
+        importlib.import_module(_module.name)
+
+NOT_SHOWN = {
+    "RBX1103": "an example would be too large to read; the long number of its page is told as RBX1109",
+    "RBX1105": "the comma of its example is told as text that needs quotes, RBX1101",
+    "RBX1111": "the mistake is in the bytes of a file",
+    "RBX1303": "the mistake is on the command line",
+    "RBX4115": "the example is cut short: nobody wants to read 40 levels",
+    "RBX4116": "no component that ships has an action that cannot be restarted",
+}
+ONLY_SAID = {code for code in KINDS if code.startswith("RBX90")}  # they are about running robots, not about texts
+
+BATTERY = "components:\n  battery:\n    type: battery_sim\n", 4
+BASE = "components:\n  base:\n    type: diff_drive_sim\n", 4
+GO_TO = "components:\n  go_to:\n    type: go_to\n", 4
+INPUTS = "muxes:\n  cmd_vel:\n    inputs:\n      navigation: {from: go_to, priority: 10, timeout: 0.5 s}\n", 6
+STANDS_BELOW = {
+    "RBX1001": ("components:\n", 2),
+    "RBX1002": INPUTS,
+    "RBX1003": BASE,
+    "RBX1102": ("diagnostics:\n  analyzers:\n    power:\n", 6),
+    "RBX1104": BATTERY,
+    "RBX1109": GO_TO,
+    **dict.fromkeys(("RBX1201", "RBX1202", "RBX1203", "RBX1205"), GO_TO),
+    "RBX1204": ("bus:\n", 2),
+}
+"""The lines above an example that is less than a section, and how far it is indented below them."""
+
+_EXAMPLE = re.compile(r"^(Bad|Good):[^\n]*\n\n?```yaml\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def examples(kind: Kind) -> dict[str, str]:
+    return dict(_EXAMPLE.findall(kind.doc))
+
+
+def codes_of(kind: Kind, text: str, folder: Path) -> set[str]:
+    above, depth = STANDS_BELOW.get(kind.code, ("", 0))
+    fragment = above + textwrap.indent(text, " " * depth)
+    if kind.code.startswith("RBX41") and not fragment.startswith("missions:"):
+        return set(check_mission(HEADER + fragment, folder).codes)
+    robot = with_sections(ROBOT, fragment)
+    return set(check_robot(robot, folder, profiles=profiles_of(fragment), real=kind.code == "RBX8001").codes)
+
+
+SHOWN = [kind for code, kind in sorted(KINDS.items()) if code not in {*NOT_SHOWN, *ONLY_SAID}]
+
+
+@pytest.mark.parametrize("kind", SHOWN, ids=lambda kind: kind.code)
+def test_the_bad_example_has_the_mistake(kind: Kind, tmp_path: Path) -> None:
+    assert kind.code in codes_of(kind, examples(kind)["Bad"], tmp_path)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in SHOWN if "Good" in examples(kind)], ids=lambda kind: kind.code)
+def test_the_good_example_has_it_no_more(kind: Kind, tmp_path: Path) -> None:
+    assert kind.code not in codes_of(kind, examples(kind)["Good"], tmp_path)
+
+
+def test_every_exception_is_a_kind() -> None:
+    assert NOT_SHOWN.keys() <= KINDS.keys()

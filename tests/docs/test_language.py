@@ -1,0 +1,80 @@
+"""The language page names everything that there is, so that nobody has to read the code for a word."""
+
+from __future__ import annotations
+
+import argparse
+import re
+
+import pytest
+
+from rbxcompose.cli.main import load, verbs
+from rbxcompose.config import Config
+from rbxcompose.expressions.functions import FUNCTIONS
+from rbxcompose.expressions.types import TYPES
+from rbxcompose.manifest.arguments import ArgumentModel
+from rbxcompose.manifest.models import Analyzer, Bus, ComponentOptions, Mission, MuxInput, PlaceModel, RobotFile, Value
+from rbxcompose.missions.header import INPUT_KEYS
+from rbxcompose.missions.modifiers import MODIFIERS
+from rbxcompose.missions.reading import AFTERWARDS, INTERRUPT_KEYS, KEYS
+from rbxcompose.missions.registry import kinds
+from rbxcompose.sdk.registry import PLUGINS, component_type
+from rbxcompose.units import UNITS
+from tests.docs.examples import ROOT
+
+PAGE = (ROOT / "docs/language.md").read_text(encoding="utf-8")
+ROWS = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in PAGE.splitlines() if line[:1] == "|"]
+QUOTED = frozenset(word for piece in re.findall(r"`([^`\n]+)`", PAGE) for word in piece.replace(":", " ").split())
+WORDS = frozenset(re.findall(r"[\w%/^]+", PAGE))
+
+NOT_WRITTEN_BY_USERS = {"mux", "diagnostics", "transforms", "mission"}  # the compiler makes them of sections
+
+
+def row(first: str) -> str:
+    found = [" ".join(cells) for cells in ROWS if re.match(rf"`{re.escape(first)}[`( ]", cells[0])]
+    assert found, f"no table has a row for '{first}'"
+    return " ".join(found)
+
+
+def test_it_has_every_unit_type_and_function() -> None:
+    assert UNITS.keys() - QUOTED == set()
+    assert {*TYPES, "choice"} - QUOTED == set()
+    assert [name for name in FUNCTIONS if f"`{name}(" not in PAGE] == []
+
+
+@pytest.mark.parametrize("model", [RobotFile, ArgumentModel, Bus, MuxInput, Analyzer, PlaceModel, Value, Mission])
+def test_it_has_every_key_of_a_robot(model: type[Config]) -> None:
+    keys = {field.alias or name for name, field in model.model_fields.items()}
+    assert keys - WORDS == set()
+
+
+def test_it_has_every_option_of_components() -> None:
+    assert all(row(option) for option in ComponentOptions.model_fields)
+
+
+@pytest.mark.parametrize("name", sorted(PLUGINS.shipped - NOT_WRITTEN_BY_USERS))
+def test_it_has_every_component_type_with_its_settings(name: str) -> None:
+    settings = component_type(name).config_type().model_fields
+    assert [setting for setting in settings if f"`{setting}`" not in row(name)] == []
+
+
+@pytest.mark.parametrize("name", sorted(kinds()))
+def test_it_has_every_kind_of_node_with_its_options(name: str) -> None:
+    assert [option for option in kinds()[name].options if f"`{option}" not in row(name)] == []
+
+
+def test_it_has_the_modifiers_in_their_order() -> None:
+    first = [cells[0].strip("`") for cells in ROWS]
+    places = [first.index(name) for name in MODIFIERS]
+    assert places == sorted(places)
+
+
+def test_it_has_every_key_of_a_mission() -> None:
+    assert {*KEYS, *INTERRUPT_KEYS, *INPUT_KEYS, *AFTERWARDS} - WORDS == set()
+
+
+@pytest.mark.parametrize("verb", verbs())
+def test_it_has_every_command_with_its_options(verb: str) -> None:
+    parser = argparse.ArgumentParser(verb)
+    load(verb).add_arguments(parser)
+    options = re.findall(r"--[a-z]+", parser.format_help())
+    assert [option for option in {*options} - {"--help"} if option not in row(verb)] == []
