@@ -9,7 +9,6 @@ from pathlib import Path
 WITHIN = 60.0  # [s] in which failures are counted
 MOST = 5  # failures within that time after which there is no further try
 FIRST_BACKOFF = 0.1  # [s], doubled by each failure in a row
-LONGEST_BACKOFF = 5.0  # [s]
 
 
 class RestartPolicy:
@@ -26,7 +25,7 @@ class RestartPolicy:
         if recent >= MOST:
             return None
         self.restarts += 1
-        return float(min(FIRST_BACKOFF * 2 ** (recent - 1), LONGEST_BACKOFF))
+        return float(FIRST_BACKOFF * 2 ** (recent - 1))
 
 
 def explain(error: BaseException, file: str | None = None) -> tuple[str, str]:
