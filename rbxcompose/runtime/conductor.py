@@ -83,6 +83,7 @@ class Member:
     is_at_rest: bool = False
     is_told_lost: bool = False
     is_closing: bool = False
+    is_stopped: bool = False  # as it was told last
     last_word: float = 0.0  # [s]
     restarts: int = 0
     requested: set[str] = field(default_factory=set)  # components that were told to become active
@@ -129,6 +130,7 @@ class Conductor:
         member = self.members[name]
         is_restart = member.restarts > 0
         member.forked(self._scheduler.now)
+        member.is_stopped = self.is_stopped
         self._effects.fork(name, is_restart=is_restart, is_stopped=self.is_stopped)
         if name == self._router or self.endpoint is not None:
             self._effects.send(name, say.Configure(self.endpoint))
@@ -193,6 +195,8 @@ class Conductor:
 
     def _configured(self, member: Member, endpoint: str | None) -> None:
         member.is_configured = True
+        if member.is_stopped is not self.is_stopped:  # that changed after it was forked
+            self._tell_stop(member)
         if member.name == self._router and self.endpoint is None:
             self.endpoint = endpoint
             for group in self._plan.groups:
@@ -272,13 +276,21 @@ class Conductor:
 
     def stop(self) -> None:
         """Hold everything that moves until `release`."""
-        self.is_stopped = True
-        self._to_configured(say.Stop())
+        self._set_stopped(True)
 
     def release(self) -> None:
         """Allow motion again."""
-        self.is_stopped = False
-        self._to_configured(say.Release())
+        self._set_stopped(False)
+
+    def _set_stopped(self, is_stopped: bool) -> None:
+        self.is_stopped = is_stopped
+        for group in self._plan.groups:
+            if self.members[group].is_configured:
+                self._tell_stop(self.members[group])
+
+    def _tell_stop(self, member: Member) -> None:
+        member.is_stopped = self.is_stopped
+        self._effects.send(member.name, say.Stop() if self.is_stopped else say.Release())
 
     def _to_configured(self, message: say.Order) -> None:
         for group in self._plan.groups:

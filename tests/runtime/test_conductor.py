@@ -281,6 +281,27 @@ def test_a_process_that_comes_again_to_a_stopped_robot_is_told_so() -> None:
     assert stage.forks[-1] == ("mission", True, True)
 
 
+def test_a_stop_reaches_a_process_that_was_being_started_before_any_of_it_is_active() -> None:
+    stage = Stage().start()
+    stage.exit("robot")
+    stage.scheduler.advance(stage.scheduler.now + 0.1)
+    stage.conductor.stop()
+    stage.configure("robot")
+    orders = [message for process, message in stage.sent if process == "robot"]
+    assert orders[-2:] == [say.Stop(), say.Activate(["mux", "go_to"])]
+
+
+def test_a_release_reaches_a_process_that_was_being_started_during_a_stop() -> None:
+    stage = Stage().start()
+    stage.conductor.stop()
+    stage.exit("robot")
+    stage.scheduler.advance(stage.scheduler.now + 0.1)
+    stage.conductor.release()
+    stage.configure("robot")
+    orders = [message for process, message in stage.sent if process == "robot"]
+    assert orders[-2:] == [say.Release(), say.Activate(["mux", "go_to"])]
+
+
 def test_one_restart_does_not_wait_for_the_trouble_of_another() -> None:
     stage = Stage().start()
     stage.speak("world", say.Notify("state", {"instance": "base", "state": "unconfigured", "restarts": 1}))
