@@ -6,10 +6,10 @@ A check is a function from the robot to findings; its docstring is the docs page
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from rbxcompose.findings import Finding, Kind, Severity, register_kind
+from rbxcompose.findings import Finding, Kind, Report, Severity, register_kind
 from rbxcompose.model.robot import Robot
 from rbxcompose.plugins import Plugins
 
@@ -32,7 +32,7 @@ class Check(Kind):
 CHECKS: dict[str, Check] = {}  # every check that has been imported, by code
 
 
-def check(code: str, severity: Severity = Severity.ERROR) -> Callable[[Rule], Check]:
+def check(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False) -> Callable[[Rule], Check]:
     """Declare a rule under its code.
 
     Raises:
@@ -42,7 +42,7 @@ def check(code: str, severity: Severity = Severity.ERROR) -> Callable[[Rule], Ch
     def declare(rule: Rule) -> Check:
         if not rule.__doc__:
             raise ValueError(f"check {code} has no docstring, so it would have no docs page")
-        made = Check(code, inspect.cleandoc(rule.__doc__), severity, rule)
+        made = Check(code, inspect.cleandoc(rule.__doc__), severity, is_fixable, rule=rule)
         register_kind(made)
         CHECKS[code] = made
         return made
@@ -57,7 +57,9 @@ def all_checks() -> list[Check]:
     return [CHECKS[code] for code in sorted(CHECKS)]
 
 
-def run_checks(robot: Robot) -> Iterator[Finding]:
-    """Yield what any check finds."""
-    for one in all_checks():
-        yield from one(robot)
+def run_checks(robot: Robot, report: Report) -> None:
+    """Add what the checks find; warnings only about a robot without errors, from which they might follow."""
+    for severity in (Severity.ERROR, Severity.WARNING):
+        for one in all_checks():
+            if one.severity is severity and not (severity is Severity.WARNING and report.has_errors):
+                report.extend(one(robot))

@@ -6,22 +6,32 @@ adds its findings to the report; nothing here prints, exits or starts anything.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
 
 from rbxcompose.checking import run_checks
-from rbxcompose.findings import Report
+from rbxcompose.findings import Related, Report, Severity, Span
+from rbxcompose.manifest.overlay import SET
+from rbxcompose.manifest.reader import Texts
 from rbxcompose.manifest.robot_file import load_robot
+from rbxcompose.manifest.walk import TWICE
 from rbxcompose.missions.semantics import check_program
 from rbxcompose.model.build import build_robot
+from rbxcompose.model.robot import Robot
 from rbxcompose.plan.build import build_plan
 from rbxcompose.plan.model import Plan
 
 
 @dataclass(slots=True)
 class Compilation:
-    """What came out: a plan unless there are errors, the findings, and the texts that they point into."""
+    """What came out: a plan unless there are errors, the findings, and the texts that they point into.
 
+    The robot is there as far as it could be read.
+    """
+
+    robot: Robot | None = None
     plan: Plan | None = None
     report: Report = field(default_factory=Report)
     sources: dict[str, str] = field(default_factory=dict)
@@ -31,27 +41,61 @@ def compile_robot(
     path: str,
     *,
     profiles: Sequence[str] = (),
+    overlays: Sequence[str] = (),
     sets: Sequence[str] = (),
     real: bool = False,
     environment: Mapping[str, str],
+    unsaved: Mapping[Path, str] = MappingProxyType({}),
 ) -> Compilation:
-    """Compile a robot's file (a path, a folder with a `robot.yaml`, or `rbx:...`) and tell all its mistakes."""
-    out = Compilation()
-    manifest = load_robot(
-        path,
-        profiles=profiles,
-        sets=sets,
-        sim=not real,
-        environment=environment,
-        report=out.report,
-        sources=out.sources,
-    )
-    if manifest is None:
+    """Compile a robot's file (a path, a folder with a `robot.yaml`, or `rbx:...`) and tell all its mistakes.
+
+    `overlays` are files that change it. `unsaved` are texts of an editor, by the real path of the file that each stands
+    for. Where no profile was chosen, each profile is tried as well: a broken one is found before it is used.
+    """
+
+    def compiled(chosen: Sequence[str]) -> Compilation:
+        out = Compilation(sources=Texts(unsaved))
+        manifest = load_robot(
+            path,
+            profiles=chosen,
+            overlays=overlays,
+            sets=sets,
+            sim=not real,
+            environment=environment,
+            report=out.report,
+            sources=out.sources,
+        )
+        if manifest is None:
+            return out
+        out.robot = build_robot(manifest, environment=environment, report=out.report, sources=out.sources)
+        if not any(finding.code == TWICE.code for finding in out.report):  # else half of what was written is not there
+            for mission in out.robot.missions.values():
+                out.report.extend(check_program(mission.program, out.robot.names))
+            run_checks(out.robot, out.report)
+        out.report.findings = manifest.inclusions.told(out.report.findings)
         return out
-    robot = build_robot(manifest, environment=environment, report=out.report, sources=out.sources)
-    for mission in robot.missions.values():
-        out.report.extend(check_program(mission.program, robot.names))
-    out.report.extend(run_checks(robot))
-    if not out.report.has_errors:
-        out.plan = build_plan(robot)
+
+    out = compiled(profiles)
+    if out.robot is not None and not profiles:
+        for name, span in out.robot.manifest.profiles.items():
+            _tell_profile(span, compiled([name]), out, {SET, *out.robot.manifest.overlays})
+    if out.robot is not None and not out.report.has_errors:
+        out.plan = build_plan(out.robot)
     return out
+
+
+def _tell_profile(profile: Span, tried: Compilation, out: Compilation, above: Set[str]) -> None:
+    """Add what is wrong only with a profile: inside its own text, and errors that it makes in the robot's files.
+
+    What lies `above` profiles was chosen without this one.
+    """
+    known = {(finding.code, finding.span) for finding in out.report}
+    for finding in tried.report:
+        span = finding.span
+        if span is None or (finding.code, span) in known or span.file not in out.sources or span.file in above:
+            continue
+        if profile.contains(span):
+            out.report.add(finding)
+        elif finding.severity is Severity.ERROR:
+            related = (*finding.related, Related(profile, "with this profile"))
+            out.report.add(replace(finding, related=related, fix=None))

@@ -7,13 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, StringConstraints, ValidationInfo
-from pydantic_core import PydanticCustomError
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    StringConstraints,
+    ValidationInfo,
+    WithJsonSchema,
+)
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from rbxcompose import units
-from rbxcompose.findings import suggest
 from rbxcompose.units import Dimension, to_si
 
 
@@ -34,7 +41,8 @@ def _reads(dimension: Dimension) -> BeforeValidator:
     def read(value: object) -> float:
         return to_si(value, dimension)
 
-    return BeforeValidator(read)
+    shape = Annotated[Any, WithJsonSchema({"x-dimension": dimension.name})]
+    return BeforeValidator(read, json_schema_input_type=shape)
 
 
 Length = Annotated[float, _reads(units.LENGTH), Dimensioned(units.LENGTH)]
@@ -60,6 +68,52 @@ class Place:
     heading: float
 
 
+class Secret:
+    """A text that nobody is shown: it is `***` wherever it is printed or dumped. `reveal()` gives it.
+
+    `name` is what the manifest calls it: `${secret.NAME}`.
+    """
+
+    __slots__ = ("_text", "name")
+
+    def __init__(self, text: str, name: str = "") -> None:
+        self._text = text
+        self.name = name
+
+    def reveal(self) -> str:
+        """Return the text, for the device or service that it is for."""
+        return self._text
+
+    def __str__(self) -> str:
+        return HIDDEN
+
+    __repr__ = __str__
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Secret) and other._text == self._text
+
+    def __hash__(self) -> int:
+        return hash(self._text)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(
+            _secret,
+            serialization=core_schema.plain_serializer_function_ser_schema(str, when_used="json"),
+            json_schema_input_schema=core_schema.str_schema(),
+        )
+
+
+HIDDEN = "***"
+
+
+def _secret(value: object) -> Secret:
+    if not isinstance(value, Secret):
+        help_text = "write '${secret.NAME}', and put it into the file 'secrets/NAME'"
+        raise PydanticCustomError("secret", "a secret does not stand in a manifest", {"help": help_text})
+    return value
+
+
 def _place(value: object, info: ValidationInfo) -> Place:
     places: Mapping[str, Place] = (info.context or {}).get("places", {})
     if isinstance(value, Place):
@@ -67,10 +121,11 @@ def _place(value: object, info: ValidationInfo) -> Place:
     if not isinstance(value, str):
         raise PydanticCustomError("place", "must be the name of a place")
     if value not in places:
-        help_text = suggest(value, places, "places of this robot")
-        raise PydanticCustomError("place", "there is no place '{name}'", {"name": value, "help": help_text})
+        context = {"name": value, "valid": list(places), "what": "places of this robot"}
+        raise PydanticCustomError("place", "there is no place '{name}'", context)
     return places[value]
 
 
-PlaceName = Annotated[Place, BeforeValidator(_place)]
+_Word = Annotated[str, WithJsonSchema({"type": "string", "x-names": "place"})]
+PlaceName = Annotated[Place, BeforeValidator(_place, json_schema_input_type=_Word)]
 """A field that names one of the robot's `places` and holds the place itself."""

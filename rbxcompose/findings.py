@@ -6,12 +6,19 @@ A stage never prints or raises for a user's mistake; it adds a `Finding` to the 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Mapping
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import lru_cache
 
 SIMILAR = 0.6  # difflib ratio from which on a name is offered as "did you mean"
 MOST_NAMES = 6  # valid names listed when none is similar
+SURE = 0.8  # difflib ratio from which on a similar name may be written in the place of a misspelt one,
+LEAD = 0.1  # if no other name comes that near to it
+VALID = "valid names"
+MOST_COMPARED = 100  # names, before only those that are one slip away are looked at
+_LONGEST_COMPARED = 60  # characters of a name
 
 
 class Severity(StrEnum):
@@ -34,6 +41,12 @@ class Span:
     def __str__(self) -> str:
         return f"{self.file}:{self.line}:{self.column}"
 
+    def contains(self, other: Span) -> bool:
+        """Tell whether another place lies inside this one."""
+        starts = (self.line, self.column) <= (other.line, other.column)
+        ends = (other.end_line, other.end_column) <= (self.end_line, self.end_column)
+        return self.file == other.file and starts and ends
+
 
 @dataclass(frozen=True, slots=True)
 class Related:
@@ -41,6 +54,28 @@ class Related:
 
     span: Span
     message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """`text` to be written in the place of `old`, which must be what stands at `span` (perhaps in quotes).
+
+    If it is not, there is nothing to be edited: the value came from elsewhere, or is written in another way. An edit
+    whose `text` is `old` changes nothing and only guards what must stand there.
+    """
+
+    span: Span
+    old: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """Edits that together cure a mistake; a safe one cannot change what the author meant. `title` says what it does."""
+
+    edits: tuple[Edit, ...]
+    is_safe: bool
+    title: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,33 +89,64 @@ class Finding:
     help: str = ""
     related: tuple[Related, ...] = ()
     severity: Severity = Severity.ERROR
+    fix: Fix | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of finding: a stable code and the text of its docs page (first line: title)."""
+    """A kind of finding: a stable code and the text of its docs page (first line: title).
+
+    `is_fixable` tells that `check --fix` cures at least some of its findings.
+    """
 
     code: str
     doc: str
     severity: Severity = Severity.ERROR
+    is_fixable: bool = False
 
     def at(
-        self, span: Span | None, message: str, *, label: str = "", help: str = "", related: Iterable[Related] = ()
+        self,
+        span: Span | None,
+        message: str,
+        *,
+        label: str = "",
+        help: str = "",
+        related: Iterable[Related] = (),
+        fix: Fix | None = None,
     ) -> Finding:
         """Return a finding of this kind at `span`."""
-        return Finding(self.code, message, span, label, help, tuple(related), self.severity)
+        return Finding(self.code, message, span, label, help, tuple(related), self.severity, fix)
+
+    def misspelt(
+        self,
+        span: Span | None,
+        message: str,
+        name: str,
+        valid: Iterable[str],
+        what: str = VALID,
+        *,
+        taken: Collection[str] = (),
+        within: str = "",
+    ) -> Finding:
+        """Return a finding about a `name` at `span` that is none of `valid`, with what was probably meant.
+
+        `what` are the valid ones if none is near; see `correction` for the rest.
+        """
+        names = list(valid)
+        fix = correction(name, names, span, taken=taken, within=within)
+        return self.at(span, message, help=suggest(name, names, what), fix=fix)
 
 
 KINDS: dict[str, Kind] = {}  # every kind that has been imported, by code
 
 
-def kind(code: str, doc: str, severity: Severity = Severity.ERROR) -> Kind:
+def kind(code: str, doc: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False) -> Kind:
     """Declare a kind of finding beside the code that finds it.
 
     Raises:
         ValueError: if another kind has this code.
     """
-    made = Kind(code, doc, severity)
+    made = Kind(code, doc, severity, is_fixable)
     register_kind(made)
     return made
 
@@ -120,16 +186,86 @@ def _place(finding: Finding) -> tuple[bool, Span | None, str, str]:
     return (finding.span is not None, finding.span, finding.code, finding.message)
 
 
-def suggest(name: str, valid: Iterable[str], what: str = "valid names") -> str:
+def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
     """Return the help for a misspelt `name`: the nearest of `valid`, else up to six of them, else nothing."""
     names = sorted(set(valid))
-    near = difflib.get_close_matches(name, names, n=1, cutoff=SIMILAR)
+    near = nearest(name, names)
     if near:
         return f"did you mean '{near[0]}'?"
     if not names:
         return ""
     rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return f"{what}: {', '.join(names[:MOST_NAMES])}{rest}"
+
+
+def nearest(name: str, valid: Iterable[str], *, most: int = 1, cutoff: float = SIMILAR) -> list[str]:
+    """Return the valid names that are most like `name`, the nearest first; among very many, only those one slip away.
+
+    A comparison takes its time, and a file may have thousands of names that are all wrong.
+    """
+    names = frozenset(valid)
+    if len(names) > MOST_COMPARED:
+        slips = _slips(names)
+        names = frozenset(near for short in _shortened(name) for near in slips.get(short, ()))
+    return difflib.get_close_matches(name, sorted(names), n=most, cutoff=cutoff)
+
+
+@lru_cache(maxsize=8)
+def _slips(names: frozenset[str]) -> dict[str, list[str]]:
+    """Return which names become which text when one character is left out, or none."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        for short in _shortened(name):
+            found.setdefault(short, []).append(name)
+    return found
+
+
+def _shortened(name: str) -> set[str]:
+    kept = name[:_LONGEST_COMPARED]
+    return {kept, *(kept[:index] + kept[index + 1 :] for index in range(len(kept)))}
+
+
+def correction(
+    name: str, valid: Iterable[str], span: Span | None, *, taken: Collection[str] = (), within: str = ""
+) -> Fix | None:
+    """Return the safe fix for a misspelt `name` at `span`, None where more than one name may be meant, or none.
+
+    `taken` are names that are used there already, so that writing one again would be a mistake of its own. Where the
+    name is only a part of the text at `span`, `within` is the whole text, in which it comes first.
+    """
+    meant = surely_meant(name, set(valid))
+    if span is None or meant is None or meant in taken:
+        return None
+    old = within or name
+    new = old.replace(name, meant, 1)
+    return replacement(span, old, new)
+
+
+def replacement(span: Span, old: str, new: str, *, is_safe: bool = True) -> Fix:
+    """Return the fix that writes `new` in the place of `old`."""
+    return Fix((Edit(span, old, new),), is_safe, f"'{old}' -> '{new}'")
+
+
+def surely_meant(name: str, valid: Iterable[str]) -> str | None:
+    """Return the only name that `name` can be a slip of the hand for."""
+    near = nearest(name, valid, most=2, cutoff=SURE - LEAD)
+    ratios = [_similarity(one, name) for one in near]
+    is_clear = bool(near) and ratios[0] >= SURE and ratios[0] - sum(ratios[1:]) >= LEAD * len(near[1:])
+    return near[0] if is_clear and _is_slip(name, near[0]) else None
+
+
+def _similarity(one: str, other: str) -> float:
+    return difflib.SequenceMatcher(None, one, other).ratio()
+
+
+def _is_slip(name: str, meant: str) -> bool:
+    """Tell whether two names differ within words: `corner_2` for `corner_1` or `min_speed` for `max_speed` do not."""
+    if re.findall(r"\d+", name) != re.findall(r"\d+", meant):
+        return False
+    words, others = re.split(r"[\W_]+", name), re.split(r"[\W_]+", meant)
+    if len(words) != len(others):
+        return _similarity("".join(words), "".join(others)) >= 1 - LEAD
+    return all(_similarity(word, other) >= SIMILAR for word, other in zip(words, others, strict=True))
 
 
 Sources = Mapping[str, str]  # text of every file that a span may name

@@ -9,7 +9,10 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from functools import cached_property
-from importlib.metadata import EntryPoint, entry_points
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP = "rbxcompose.plugins"
 
@@ -29,6 +32,8 @@ class Plugins:
     @cached_property
     def third_party(self) -> dict[str, EntryPoint]:
         """Entry points of other distributions, by name."""
+        from importlib.metadata import entry_points  # slow to import, and most commands need no plug-in
+
         prefix = f"{self.family}."
         found = [entry for entry in entry_points(group=GROUP) if entry.name.startswith(prefix)]
         return {entry.name.removeprefix(prefix): entry for entry in found}

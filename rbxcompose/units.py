@@ -248,6 +248,8 @@ def parse_quantity(text: str) -> Quantity:
     if not match:
         raise UnitError("not a number with a unit, such as '0.3 m/s'")
     number, unit = match.groups()
+    if re.match(r",\d", unit):
+        raise UnitError("a number has a decimal point, no comma", help=f"write '{text.strip().replace(',', '.', 1)}'")
     if unit and unit not in UNITS:
         raise UnitError(f"unknown unit '{_shortened(unit)}'", help=unit_help(unit))
     return quantity(number, UNITS.get(unit))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.checking import check
-from rbxcompose.findings import Finding, suggest
+from rbxcompose.findings import Finding
 from rbxcompose.model.robot import Robot
 from rbxcompose.sdk.ports import Looks
 
 
-@check("RBX3007")
+@check("RBX3007", is_fixable=True)
 def connected_port(robot: Robot) -> Iterator[Finding]:
     """`connect:` names a port that the component does not have
 
@@ -37,8 +37,11 @@ def connected_port(robot: Robot) -> Iterator[Finding]:
         ports = [end.name for end in robot.parts[name].ends if not isinstance(end.port, Looks)]
         for port in entry.options.connect:
             if port not in ports:
-                yield connected_port.at(
+                yield connected_port.misspelt(
                     robot.key("components", name, "connect", port),
                     f"'{name}' has no port '{port}'",
-                    help=suggest(port, ports, "its ports"),
+                    port,
+                    ports,
+                    "its ports",
+                    taken=entry.options.connect,
                 )

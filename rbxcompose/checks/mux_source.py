@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 
 from rbxcompose.checking import check
-from rbxcompose.findings import Finding, suggest
+from rbxcompose.findings import Finding, correction, suggest
 from rbxcompose.model.robot import Robot
 from rbxcompose.sdk.ports import Out
 
 
-@check("RBX3003")
+@check("RBX3003", is_fixable=True)
 def mux_source(robot: Robot) -> Iterator[Finding]:
     """The `from:` of a mux input names no output
 
@@ -42,26 +43,50 @@ def mux_source(robot: Robot) -> Iterator[Finding]:
         for name, source in entry.inputs.items():
             if source.source is None:
                 continue
-            finding = missing(robot, source.source)
-            if finding:
-                message, help_text = finding
+            if wrong := missing(robot, source.source) or unclear(robot, mux, source.source):
                 span = robot.value("muxes", mux, "inputs", name, "from")
-                yield mux_source.at(span, f"input '{name}' of mux '{mux}' {message}", help=help_text)
+                fix = correction(wrong.name, wrong.valid, span, within=source.source)
+                message = f"input '{name}' of mux '{mux}' {wrong.message}"
+                yield mux_source.at(span, message, help=wrong.help, fix=fix)
 
 
-def missing(robot: Robot, source: str) -> tuple[str, str] | None:
-    """Return what is wrong with the source of a mux input, and what may help; None if it is there."""
+@dataclass(frozen=True, slots=True)
+class Wrong:
+    """What is wrong with a source, what may help, and the name in it that is none of `valid`, if one is."""
+
+    message: str
+    help: str = ""
+    name: str = ""
+    valid: Collection[str] = ()
+
+
+def missing(robot: Robot, source: str) -> Wrong | None:
+    """Return what is wrong with the source of a mux input; None if it is there."""
     component, _, port = source.partition(".")
     if component not in robot.written:
-        return f"takes from a component that the robot does not have: '{component}'", suggest(
-            component, robot.manifest.components, "components of this robot"
-        )
+        message = f"takes from a component that the robot does not have: '{component}'"
+        valid = robot.manifest.components
+        return Wrong(message, suggest(component, valid, "components of this robot"), component, valid)
     part = robot.parts.get(component)
     if part is None:
         return None  # it is there, but broken: that is said at its own place
     outputs = [end.name for end in part.ends if isinstance(end.port, Out)]
     if port and port not in outputs:
-        return f"takes from an output that '{component}' does not have: '{port}'", suggest(port, outputs, "its outputs")
+        message = f"takes from an output that '{component}' does not have: '{port}'"
+        return Wrong(message, suggest(port, outputs, "its outputs"), port, outputs)
     if not outputs:
-        return f"takes from '{component}', which publishes nothing", ""
+        return Wrong(f"takes from '{component}', which publishes nothing")
     return None
+
+
+def unclear(robot: Robot, mux: str, source: str) -> Wrong | None:
+    """Return what is wrong with the source of an input that does not say which of several outputs is meant."""
+    component, _, port = source.partition(".")
+    part = robot.parts.get(component)
+    if part is None or port:
+        return None
+    outputs = [end for end in part.ends if isinstance(end.port, Out)]
+    if len(outputs) == 1 or any(end.port.topic == mux for end in outputs):
+        return None
+    names = ", ".join(f"{component}.{end.name}" for end in outputs)
+    return Wrong(f"takes from '{component}', which publishes nothing on '{mux}'", f"name one of its outputs: {names}")

@@ -8,6 +8,7 @@ from itertools import groupby
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
+from rbxcompose.model.wiring import resolve
 from rbxcompose.sdk.ports import Looks
 
 
@@ -34,7 +35,13 @@ def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
           odom: wheel_odometry
     ```
     """
-    ends = [end for end in robot.ends if not isinstance(end.port, Looks)]
+    taken = {
+        (resolve(f"{mux}/{name}", robot.manifest.bus.namespace or ""), one.source.partition(".")[0])
+        for mux, entry in robot.manifest.muxes.items()
+        for name, one in entry.inputs.items()
+        if one.source  # what does not fit there is said where the mux names its source
+    }
+    ends = [end for end in robot.ends if not isinstance(end.port, Looks) and (end.topic, end.instance) not in taken]
     for topic, group in groupby(sorted(ends, key=lambda end: end.topic), key=lambda end: end.topic):
         first, *others = sorted(group, key=robot.end_span)
         for other in others:

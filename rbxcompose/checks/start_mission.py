@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.checking import check
-from rbxcompose.findings import Finding, suggest
+from rbxcompose.findings import Finding
 from rbxcompose.model.robot import Robot
 
 
-@check("RBX3009")
+@check("RBX3009", is_fixable=True)
 def start_mission(robot: Robot) -> Iterator[Finding]:
     """`start:` names a mission that the robot does not have
 
@@ -28,8 +28,10 @@ def start_mission(robot: Robot) -> Iterator[Finding]:
     """
     start = robot.manifest.start
     if start is not None and start not in robot.manifest.missions:
-        yield start_mission.at(
+        yield start_mission.misspelt(
             robot.value("start"),
             f"the robot has no mission '{start}' to start",
-            help=suggest(start, robot.manifest.missions, "missions of this robot"),
+            start,
+            robot.manifest.missions,
+            "missions of this robot",
         )

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.checking import check
-from rbxcompose.findings import Finding, suggest
+from rbxcompose.findings import Finding
 from rbxcompose.model.order import cycle_of
 from rbxcompose.model.robot import Robot
 
 
-@check("RBX3006")
+@check("RBX3006", is_fixable=True)
 def start_order(robot: Robot) -> Iterator[Finding]:
     """`starts_after:` names no component, or goes round in a circle
 
@@ -35,10 +35,12 @@ def start_order(robot: Robot) -> Iterator[Finding]:
     for name, part in robot.parts.items():
         for index, other in enumerate(part.starts_after):
             if other not in robot.parts and other not in robot.written:
-                yield start_order.at(
+                yield start_order.misspelt(
                     robot.value(*part.path, "starts_after", index),
                     f"'{name}' starts after a component that the robot does not have: '{other}'",
-                    help=suggest(other, robot.parts, "components of this robot"),
+                    other,
+                    robot.parts,
+                    "components of this robot",
                 )
     if cycle := cycle_of(after):
         yield start_order.at(

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from rbxcompose.checking import check
 from rbxcompose.diagnostics.core import Analyzer
-from rbxcompose.findings import Finding, suggest
+from rbxcompose.findings import Finding
 from rbxcompose.model.robot import Robot
 
 
-@check("RBX5001")
+@check("RBX5001", is_fixable=True)
 def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
     """A pattern of an analyzer matches no component
 
@@ -35,8 +35,11 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
         for index, pattern in enumerate(analyzer.match):
             known = {*robot.parts, *robot.written}
             if not any(Analyzer((pattern,)).matches(part) for part in known):
-                yield unmatched_analyzer.at(
+                yield unmatched_analyzer.misspelt(
                     robot.value("diagnostics", "analyzers", name, "match", index),
                     f"analyzer '{name}' matches no component with '{pattern}'",
-                    help=suggest(pattern, known, "components of this robot"),
+                    pattern,
+                    known,
+                    "components of this robot",
+                    taken=analyzer.match,
                 )

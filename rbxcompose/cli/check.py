@@ -1,43 +1,86 @@
 """Tell every mistake of a robot before a motor moves.
 
-Exit codes: 0 fine, 1 errors found, 2 wrong usage. Warnings do not count.
+PATH is a robot's file or folder, a folder with robots below it, or a mission, part or overlay: then the robots of its
+project that use it are checked. Exit codes: 0 fine, 1 errors found (with --strict also warnings), 2 wrong usage.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
+from dataclasses import dataclass, field
 
+from rbxcompose.cli.common.fixing import fix, only_ours
+from rbxcompose.cli.common.robot_options import add_layer_options, compiled
+from rbxcompose.cli.common.targets import Targets, projects_of, targets
 from rbxcompose.cli.common.telling import FINDINGS, has_colour, tell
-from rbxcompose.compiler import Compilation, compile_robot
-from rbxcompose.rendering import render_json, render_text
+from rbxcompose.compiler import Compilation
+from rbxcompose.findings import Report
+from rbxcompose.formats import format_names, renderer
+from rbxcompose.plan.model import Plan
 
-FORMATS = ("text", "json")
+TEXT = "text"
+FOR_PEOPLE = (TEXT, "github")  # formats in which also a line without a finding has a meaning
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
-    parser.add_argument("--profile", action="append", default=[], metavar="P", help="put this profile on top")
-    parser.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="change one value")
-    parser.add_argument("--real", action="store_true", help="check for the real devices, not for the simulation")
-    parser.add_argument("--format", choices=FORMATS, default="text", help="how findings are written")
+    parser.add_argument("paths", nargs="*", default=["."], metavar="PATH", help="what to check; else the robots here")
+    add_layer_options(parser)
+    parser.add_argument("--format", choices=format_names(), default=TEXT, help="how findings are written")
+    parser.add_argument("--strict", action="store_true", help="let warnings count as errors")
+    parser.add_argument("--fix", action="store_true", help="write what can safely be fixed into the files")
+
+
+@dataclass(slots=True)
+class Checked:
+    """What was found in all robots together; `fine` are the plans of those that can run."""
+
+    report: Report = field(default_factory=Report)
+    sources: dict[str, str] = field(default_factory=dict)
+    fine: list[Plan] = field(default_factory=list)
+
+    def add(self, one: Compilation) -> None:
+        """Add what was found in one robot."""
+        self.report.extend(one.report)
+        self.sources.update(one.sources)
+        if one.plan is not None:
+            self.fine.append(one.plan)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Compile the robot and write its findings to stdout."""
-    out = compile_robot(
-        arguments.path, profiles=arguments.profile, sets=arguments.sets, real=arguments.real, environment=os.environ
+    """Compile the robots, fix what is asked for, and write the findings to stdout."""
+    wanted = targets(arguments.paths)
+    if arguments.fix:
+        fix(lambda: _check(wanted, arguments), tell if arguments.format == TEXT else _whisper)
+    checked = _check(wanted, arguments)
+    tell(_written(checked, arguments.format).rstrip("\n"))
+    is_wrong = checked.report.has_errors or (arguments.strict and any(checked.report))
+    return FINDINGS if is_wrong else 0
+
+
+def _check(wanted: Targets, arguments: argparse.Namespace) -> Checked:
+    checked = Checked()
+    for robot in wanted.robots:
+        checked.add(compiled(robot, arguments))
+    for robot in wanted.users:
+        one = compiled(robot, arguments)
+        if any(file in one.sources for file in wanted.files):
+            checked.add(one)
+    projects = projects_of([*wanted.robots, *wanted.users])
+    checked.report = Report([*only_ours(checked.report, projects), *wanted.unused(checked.sources)])
+    return checked
+
+
+def _written(checked: Checked, form: str) -> str:
+    if any(checked.report) or form not in FOR_PEOPLE:
+        return renderer(form)(checked.report, checked.sources, has_colour(sys.stdout))
+    return "\n".join(
+        f"{plan.robot} is fine: {len(plan.instances)} components in {len(plan.groups)} processes"
+        for plan in checked.fine
     )
-    tell(_written(out, arguments.format).rstrip("\n"))
-    return FINDINGS if out.report.has_errors else 0
 
 
-def _written(out: Compilation, form: str) -> str:
-    if form == "json":
-        return render_json(out.report)
-    if out.plan is None or list(out.report):
-        return render_text(out.report, out.sources, has_colour(sys.stdout))
-    groups = len(out.plan.groups)
-    return f"{out.plan.robot} is fine: {len(out.plan.instances)} components in {groups} processes"
+def _whisper(text: str) -> None:
+    """Write beside the output that a program reads."""
+    sys.stderr.write(f"{text}\n")

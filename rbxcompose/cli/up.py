@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import sys
 
+from rbxcompose.cli.common.robot_options import add_layer_options, layers_of
 from rbxcompose.cli.common.telling import tell_report
 from rbxcompose.cli.common.watch import run_plan
 from rbxcompose.compiler import compile_robot
@@ -23,9 +23,7 @@ USAGE = 2
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
-    parser.add_argument("--profile", action="append", default=[], metavar="P", help="put this profile on top")
-    parser.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="change one value")
-    parser.add_argument("--real", action="store_true", help="use the real devices; without it they are simulated")
+    add_layer_options(parser)
     parser.add_argument(
         "--rate", type=_rate, default=RunOptions(), metavar="20x|max|1x", help="robot time per real time, reproducible"
     )
@@ -38,9 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.real and arguments.rate.is_stepped:
         sys.stderr.write("rbxcompose up: --real keeps its own time, so --rate cannot be given with it\n")
         return USAGE
-    compilation = compile_robot(
-        arguments.path, profiles=arguments.profile, sets=arguments.sets, real=arguments.real, environment=os.environ
-    )
+    compilation = compile_robot(arguments.path, **layers_of(arguments))
     tell_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.report.has_errors:
         return 1

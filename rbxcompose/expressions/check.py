@@ -39,7 +39,7 @@ from rbxcompose.expressions.types import (
     list_of,
     quantity_of,
 )
-from rbxcompose.findings import suggest
+from rbxcompose.findings import suggest, surely_meant
 from rbxcompose.units import LENGTH, NUMBER, QUOTIENT, RATIO, TIME, Dimension, bare_number_help, format_number
 
 
@@ -71,6 +71,8 @@ class Problem:
     start: int
     end: int
     help: str = ""
+    meant: str = ""
+    """What can only have been meant in its place, if that is known."""
 
 
 def check(expression: Expression, scope: StaticScope) -> tuple[Type, list[Problem]]:
@@ -102,8 +104,8 @@ class _Checker:
     def sorted(self) -> list[Problem]:
         return sorted(self.problems, key=lambda problem: (problem.start, problem.end))
 
-    def wrong(self, node: Node, message: str, fix: str = "") -> Type:
-        self.problems.append(Problem(message, node.start, node.end, fix))
+    def wrong(self, node: Node, message: str, fix: str = "", meant: str | None = "") -> Type:
+        self.problems.append(Problem(message, node.start, node.end, fix, meant or ""))
         return UNKNOWN
 
     def type_of(self, node: Node, expected: Type = UNKNOWN) -> Type:
@@ -165,20 +167,26 @@ class _Checker:
         if found := self.scope.variable(node.name):
             return found
         if self.scope.word(node.name):
-            return self.wrong(node, f"unknown name '${node.name}'", f"write '{node.name}' without '$'")
+            return self.wrong(node, f"unknown name '${node.name}'", f"write '{node.name}' without '$'", node.name)
         names = [f"${name}" for name in self.scope.variables()]
-        return self.wrong(node, f"unknown name '${node.name}'", suggest(f"${node.name}", names, "names"))
+        meant = surely_meant(node.name, self.scope.variables())
+        fix = suggest(f"${node.name}", names, "names")
+        return self.wrong(node, f"unknown name '${node.name}'", fix, f"${meant}" if meant else "")
 
     def word(self, node: Word, expected: Type) -> Type:
         if found := self.scope.word(node.name):
             return found
         if self.scope.variable(node.name):
-            fix = f"write '${node.name}'"
+            fix, meant = f"write '${node.name}'", f"${node.name}"
         elif expected == TEXT:
-            fix = f"a text needs quotes: '{node.name}'"
+            fix, meant = f"a text needs quotes: '{node.name}'", ""
         else:
-            fix = suggest(node.name, expected.choices or self.scope.words())
-        return self.wrong(node, f"unknown name '{node.name}'", fix)
+            known = list(expected.choices or self.scope.words())
+            fix, meant = suggest(node.name, known), surely_meant(node.name, known) or ""
+            variable = "" if meant else surely_meant(node.name, self.scope.variables())
+            if variable:
+                fix, meant = f"did you mean '${variable}'?", f"${variable}"
+        return self.wrong(node, f"unknown name '{node.name}'", fix, meant)
 
     def part(self, node: Field | Index) -> Type:
         whole = self.type_of(node.of)

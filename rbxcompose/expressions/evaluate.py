@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from operator import add, ge, gt, le, lt, mul, sub, truediv
 
 from rbxcompose.expressions.functions import FUNCTIONS, items
@@ -27,7 +27,9 @@ from rbxcompose.expressions.tree import (
 )
 from rbxcompose.expressions.values import (
     LONGEST_TEXT,
+    MOST_IN_ALL,
     MOST_ITEMS,
+    MOST_LEVELS,
     NOT_ARRIVED,
     EvaluationError,
     NotArrivedError,
@@ -54,7 +56,7 @@ def evaluate(expression: Expression, scope: Scope) -> Value:
     value = _value(tree, scope)
     if is_number(value):
         return _moderate(_number(value, tree), tree)
-    return _limited(value, tree)
+    return _limited_within(_limited(value, tree), tree)
 
 
 def holds(expression: Expression, scope: Scope) -> bool:
@@ -142,6 +144,25 @@ def _limited(value: Value, node: Node) -> Value:
     if isinstance(value, list | tuple | Mapping) and len(value) > MOST_ITEMS:
         raise EvaluationError(f"there are more than {MOST_ITEMS:,} items", node.start, node.end)
     return value
+
+
+def _limited_within(value: Value, node: Node) -> Value:
+    """Return a value; one that a mission makes larger with each round, such as `[$x, $x]`, comes to its end here."""
+    level, left = [value], MOST_IN_ALL
+    for _ in range(MOST_LEVELS):
+        level = [item for group in level if not isinstance(group, float | str) for item in _inside(group)]
+        left -= len(level)
+        if left < 0:
+            raise EvaluationError(f"there are more than {MOST_IN_ALL:,} items in all", node.start, node.end)
+        if not level:
+            return value
+    raise EvaluationError(f"there are more than {MOST_LEVELS} levels of lists", node.start, node.end)
+
+
+def _inside(value: Value) -> Collection[Value]:
+    if isinstance(value, Mapping):
+        return value.values()
+    return value if isinstance(value, list | tuple) else ()
 
 
 def _items(value: Value, node: Node) -> list[Value]:

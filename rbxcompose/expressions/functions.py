@@ -14,11 +14,13 @@ from rbxcompose.units import MOST
 class Function:
     """A function: it takes `least` to `most` arguments; `compute` raises ValueError in plain words.
 
-    Without `compute` it asks the scope about a `$name`.
+    Without `compute` it asks the scope about a `$name`. `form` and `about` tell how it is written and what it gives.
     """
 
     least: int
     most: int
+    form: str
+    about: str
     compute: Callable[..., Value] | None = None
 
     def wrong_count(self, given: int) -> str:
@@ -93,12 +95,14 @@ def _rounded(value: Value) -> float:
 _MANY = 1000  # no expression is long enough for more
 
 FUNCTIONS: Mapping[str, Function] = {
-    "count": Function(1, 1, _count),
-    "age": Function(1, 1),
-    "new": Function(1, 1),
-    "distance": Function(2, 2, _distance),
-    "min": Function(1, _MANY, _least),
-    "max": Function(1, _MANY, _greatest),
-    "abs": Function(1, 1, _absolute),
-    "round": Function(1, 1, _rounded),
+    "count": Function(1, 1, "count(list)", "How many items a list has, or entries a map.", _count),
+    "age": Function(1, 1, "age($name)", "The time since the last message of a value."),
+    "new": Function(
+        1, 1, "new($name)", "Whether a message came since its node started; in an interrupt, since that last acted."
+    ),
+    "distance": Function(2, 2, "distance(a, b)", "The length between two places or poses.", _distance),
+    "min": Function(1, _MANY, "min(a, b, ...)", "The smallest of several values, or of one list.", _least),
+    "max": Function(1, _MANY, "max(a, b, ...)", "The largest of several values, or of one list.", _greatest),
+    "abs": Function(1, 1, "abs(x)", "A number or quantity without its sign.", _absolute),
+    "round": Function(1, 1, "round(x)", "The nearest whole number, halves away from zero; of a bare number.", _rounded),
 }

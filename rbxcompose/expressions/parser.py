@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 from rbxcompose.expressions.functions import FUNCTIONS
+from rbxcompose.expressions.operators import OPERATORS
 from rbxcompose.expressions.tokens import KEYWORDS, Token, TokenKind, tokens
 from rbxcompose.expressions.tree import (
     Arithmetic,
@@ -31,15 +33,15 @@ from rbxcompose.findings import suggest
 
 LONGEST = 1000  # characters
 LEVELS = 50  # of the tree, and of brackets
+_REMEMBERED = 1000  # texts; robots say the same again and again
 STEPS = 500  # nodes; an expression has no loops, so this bounds its evaluation
 
-_OR, _AND, _NOT, _COMPARED, _SUM, _PRODUCT, _MINUS = range(1, 8)
+_OR, _AND, _NOT, _COMPARED, _SUM, _PRODUCT, _MINUS = range(1, 8)  # as in OPERATORS
 _BINDING = {
-    "or": _OR,
-    "and": _AND,
-    **dict.fromkeys(("<", "<=", ">", ">=", "==", "!=", "in", "not"), _COMPARED),  # 'not' as in 'not in'
-    **dict.fromkeys("+-", _SUM),
-    **dict.fromkeys("*/", _PRODUCT),
+    symbol.split()[0]: strength  # 'not' as in 'not in'
+    for strength, operator in enumerate(OPERATORS, start=_OR)
+    if not operator.is_prefix
+    for symbol in operator.symbols
 }
 
 # Words of other languages; the names of places and choices never look like these.
@@ -54,6 +56,7 @@ _FOREIGN = {
 }
 
 
+@lru_cache(_REMEMBERED)
 def parse(text: str) -> Expression:
     """Read a condition, a value or an argument, in which `$name` is looked up while the robot runs.
 

@@ -76,12 +76,14 @@ def fill(template: Template, scope: Scope, show: Show | None = None) -> str:
         NotArrivedError: if a value has not arrived yet.
         EvaluationError: if there is no such value, or the text grows beyond its limit.
     """
-    filled = "".join(
-        part if isinstance(part, str) else _filled(part, scope, show or show_value) for part in template.parts
-    )
-    if len(filled) > LONGEST_TEXT:
-        raise EvaluationError(f"the text has more than {LONGEST_TEXT:,} characters", 0, len(template.text))
-    return filled
+    filled: list[str] = []
+    left = LONGEST_TEXT
+    for part in template.parts:
+        filled.append(part if isinstance(part, str) else _filled(part, scope, show or show_value))
+        left -= len(filled[-1])
+        if left < 0:  # asked each time, since many long values would take their time and memory
+            raise EvaluationError(f"the text has more than {LONGEST_TEXT:,} characters", 0, len(template.text))
+    return "".join(filled)
 
 
 def _filled(slot: Slot, scope: Scope, show: Show) -> str:

@@ -7,6 +7,8 @@ from typing import Final, Protocol, TypeAlias, runtime_checkable
 
 LONGEST_TEXT = 4096  # characters
 MOST_ITEMS = 1000  # of a list or a map
+MOST_IN_ALL = 10_000  # items of lists within lists, each as often as it is reached
+MOST_LEVELS = 50  # of lists within lists
 
 Value: TypeAlias = object
 """A number in SI (float), bool, str, list, dict with text keys, or something opaque such as a place or a pose."""

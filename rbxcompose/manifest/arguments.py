@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from rbxcompose.config import Config
+from pydantic import Field
+
+from rbxcompose.config import Config, Secret
 from rbxcompose.expressions.types import TYPES, Type, TypeKind, choice_of
-from rbxcompose.findings import Report, suggest
+from rbxcompose.findings import Report
 from rbxcompose.manifest.scalars import describe
 from rbxcompose.manifest.tree import Mapping, Node, Path, Scalar, Sequence, key_span
 from rbxcompose.manifest.validate import (
@@ -30,7 +32,7 @@ CHOICE = "choice"
 class ArgumentModel(Config):
     """One entry of `args:` or `inputs:`; the values are read by its type."""
 
-    type: str
+    type: str = Field(json_schema_extra={"enum": [*TYPES, CHOICE]})
     """What it is: a dimension, `count`, `number`, `text`, `flag`, `place`, `pose`, `choice`, `list` or `map`."""
     default: Any = None
     """Its value if nobody gives one."""
@@ -92,8 +94,8 @@ def _type(model: ArgumentModel, node: Mapping, path: Path, report: Report) -> Ty
     elif found := TYPES.get(model.type):
         return found
     elif written:
-        fix = suggest(model.type, [*TYPES, CHOICE], "types")
-        report.add(NOT_A_CHOICE.at(written.span, f"there is no type '{model.type}'", help=fix))
+        message = f"there is no type '{model.type}'"
+        report.add(NOT_A_CHOICE.misspelt(written.span, message, model.type, [*TYPES, CHOICE], "types"))
     return None
 
 
@@ -117,7 +119,7 @@ def read_value(node: Node, expected: Type, name: str, report: Report) -> object:
         case TypeKind.FLAG if isinstance(value, bool):
             read = value
         case TypeKind.TEXT if isinstance(node, Scalar) and value is not None:
-            read = node.text if node.filled is None else show(value)
+            read = node.text if node.filled is None else value if isinstance(value, Secret) else show(value)
         case TypeKind.CHOICE if isinstance(node, Scalar):
             if node.text not in expected.choices:
                 report.add(not_a_choice(node.span, name, node, list(expected.choices)))

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection
 from collections.abc import Mapping as AnyMapping
 from dataclasses import replace
+from difflib import get_close_matches
 
 from rbxcompose.config import Place
-from rbxcompose.findings import Related, Report, kind, suggest
+from rbxcompose.findings import SIMILAR, Related, Report, kind
 from rbxcompose.manifest.models import ALWAYS_THERE, OPTIONS, SECTIONS, ComponentEntry, ComponentOptions
 from rbxcompose.manifest.tree import Entry, Mapping, Scalar
-from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, is_broken, label_of, validate
+from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, label_of, validate
 from rbxcompose.plain import plain
 from rbxcompose.sdk import registry
 
@@ -33,6 +34,7 @@ components:
     type: diff_drive_sim
 ```
 """,
+    is_fixable=True,
 )
 TAKEN_NAME = kind(
     "RBX1007",
@@ -46,12 +48,14 @@ Bad:
 components:
   diagnostics:
     type: battery_sim
+    runtime: 45 s
 ```
 Good:
 ```yaml
 components:
   battery:
     type: battery_sim
+    runtime: 45 s
 ```
 """,
 )
@@ -63,6 +67,8 @@ def read_component(
     """Return one component; None if it has no known type, without a `config` if there are mistakes in that."""
     _check_name(name, entry, root, report)
     node, path = entry.value, ("components", name)
+    if is_broken(node):
+        return None
     if not isinstance(node, Mapping):
         message = f"component '{name}' must be a map with a 'type:' and its configuration"
         report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
@@ -99,9 +105,12 @@ def _type_name(name: str, entry: Entry, node: Mapping, report: Report) -> str | 
     """Return the type of a component, or None after a finding if there is none of that name."""
     written = node.get("type")
     if written is None:
-        misspelt = suggest("type", [key for key in node.entries if key not in OPTIONS])
-        help_text = misspelt.replace("did you mean", "is it") if misspelt.startswith("did you mean") else ""
-        report.add(MISSING_KEY.at(entry.key.span, f"component '{name}' needs the key 'type'", help=help_text))
+        misspelt = get_close_matches("type", [key for key in node.entries if key not in OPTIONS], n=1, cutoff=SIMILAR)
+        if misspelt:
+            key, message = node.entries[misspelt[0]].key, f"unknown key '{misspelt[0]}' in component '{name}'"
+            report.add(UNKNOWN_KEY.misspelt(key.span, message, key.text, ["type"]))
+        else:
+            report.add(MISSING_KEY.at(entry.key.span, f"component '{name}' needs the key 'type'"))
         return None
     if not isinstance(written, Scalar):
         report.add(WRONG_TYPE.at(written.span, "'type' must be the name of a type", label=label_of(written)))
@@ -110,7 +119,6 @@ def _type_name(name: str, entry: Entry, node: Mapping, report: Report) -> str | 
         return None
     if written.text not in registry.component_names():
         message = f"component '{name}' is of a type that does not exist: '{plain(written.text, 60)}'"
-        fix = suggest(written.text, registry.component_names(), "types")
-        report.add(UNKNOWN_TYPE.at(written.span, message, help=fix))
+        report.add(UNKNOWN_TYPE.misspelt(written.span, message, written.text, registry.component_names(), "types"))
         return None
     return written.text

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from rbxcompose.findings import Finding, Span, kind, suggest
-from rbxcompose.manifest.library import PREFIX, library_root
+from rbxcompose.findings import Finding, Span, kind
+from rbxcompose.manifest.library import PARTS, PREFIX, library_root
 from rbxcompose.manifest.reader import UNREADABLE
 from rbxcompose.plain import plain
 
@@ -34,8 +34,10 @@ _MOST_NEIGHBOURS = 1000
 
 
 def shown_name(path: Path) -> str:
-    """Return how findings call a file: relative to the current folder where it lies below it."""
+    """Return how findings call a file: relative to the current folder where it lies below it, else as it was named."""
     relative = os.path.relpath(path)
+    if relative.startswith("..") and path.is_relative_to(library_root() / PARTS):
+        return PREFIX + path.relative_to(library_root()).as_posix()
     return str(path) if relative.startswith("..") else relative
 
 
@@ -51,8 +53,9 @@ def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
     """Return the file that a manifest names, or the finding that says why it may not or cannot."""
     path = _absolute(written, writer.resolve().parent)
     if path is None or not any(path.is_relative_to(root) for root in (project_of(writer), library_root())):
-        message = f"'{plain(written)}' leads out of the project '{plain(shown_name(project_of(writer)))}'"
-        return OUTSIDE.at(span, message, help="move the file into the project, or use what 'rbx:' has")
+        message, folder = f"'{plain(written)}' leads out of the project", plain(shown_name(project_of(writer)))
+        where = f"'{folder}'" if folder != "." else "this folder"
+        return OUTSIDE.at(span, message, help=f"the project is {where}: move the file there, or use what 'rbx:' has")
     return path if path.is_file() else _missing(written, path, span)
 
 
@@ -82,8 +85,8 @@ def _missing(written: str, path: Path, span: Span | None) -> Finding:
         neighbours = [entry.name for entry in list(path.parent.iterdir())[:_MOST_NEIGHBOURS]]
     except OSError:
         return UNREADABLE.at(span, f"'{plain(written)}' does not exist", help=_nearest_folder(path))
-    fix = suggest(path.name, neighbours, f"in '{plain(shown_name(path.parent))}'")
-    return UNREADABLE.at(span, f"'{plain(written)}' does not exist", help=fix)
+    message, there = f"'{plain(written)}' does not exist", f"in '{plain(shown_name(path.parent))}'"
+    return UNREADABLE.misspelt(span, message, path.name, neighbours, there, within=written)
 
 
 def _nearest_folder(path: Path) -> str:

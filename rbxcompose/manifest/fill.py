@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
-from rbxcompose.expressions import types
+from rbxcompose.config import Secret
 from rbxcompose.expressions.check import check
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.parser import parse_fill
 from rbxcompose.expressions.tree import Expression, ExpressionError
 from rbxcompose.expressions.types import Type, TypeKind
 from rbxcompose.expressions.values import EvaluationError
-from rbxcompose.findings import Report, kind, suggest
+from rbxcompose.findings import Report, correction, kind, replacement, suggest
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.arguments import show
+from rbxcompose.manifest.composing import TOO_LARGE
+from rbxcompose.manifest.limits import ALL_BYTES
+from rbxcompose.manifest.names import Names, NameTypes, NameValues
 from rbxcompose.manifest.parts import part_span
 from rbxcompose.manifest.scalars import describe
-from rbxcompose.manifest.tree import Entry, Node, Scalar, Sequence
+from rbxcompose.manifest.secrets import NoSecretError
+from rbxcompose.manifest.tree import Entry, Node, Scalar, Sequence, size
 from rbxcompose.manifest.validate import BROKEN, to_plain
 from rbxcompose.plain import plain
 from rbxcompose.units import NUMBER, QUOTIENT, Quantity
@@ -55,6 +58,7 @@ Good:
 speed: ${args.speed}
 ```
 """,
+    is_fixable=True,
 )
 WRONG_OPERATION = kind(
     "RBX1203",
@@ -104,28 +108,41 @@ Good:
 speed: ${args.speed}
 ```
 """,
+    is_fixable=True,
+)
+
+SECRET = kind(
+    "RBX1207",
+    """A secret that cannot be had
+
+`${secret.NAME}` is the text in the file `secrets/NAME` of the project, which only its owner may read (mode 0600), or in
+the variable `RBX_SECRET_NAME` of the environment.
+
+Bad: `${secret.token}` without the file `secrets/token`.
+Good: `mkdir -p secrets; cat > secrets/token; chmod 600 secrets/token`
+""",
+)
+SHOWN_SECRET = kind(
+    "RBX1208",
+    """A secret where it would be shown
+
+A secret stands alone, as the value of a component's setting that takes one. Names, texts and missions are shown and
+logged, so that they cannot hold it.
+
+Bad:
+```yaml
+about: Speaks with ${secret.token}
+```
+Good:
+```yaml
+about: Speaks with the cloud
+```
+""",
 )
 
 _PIECE = re.compile(r"\$\$|\$\{(?P<body>[^}]*)(?P<end>\}?)|\$(?P<name>[A-Za-z][A-Za-z0-9_.]*)")
+_SECRET = re.compile(r"\s*secret\.(?P<name>[a-z][a-z0-9_]{0,59})\s*")
 _ENVIRONMENT = re.compile(r"\s*env\.(?P<name>[A-Za-z_][A-Za-z0-9_]*)(:(?P<mode>[-?])(?P<rest>.*))?\s*", re.DOTALL)
-
-
-@dataclass(frozen=True, slots=True)
-class Names:
-    """What `${...}` may name: a type and a typed value by dotted name, and the variables of the environment."""
-
-    values: Mapping[str, tuple[Type, object]] = field(default_factory=dict)
-    environment: Mapping[str, str] = field(default_factory=dict)
-
-
-def names_of(robot: str, sim: bool, environment: Mapping[str, str]) -> Names:
-    """Return the names that every file of a robot knows."""
-    return Names({"robot.name": (types.TEXT, robot), "sim": (types.FLAG, sim)}, environment)
-
-
-def with_arguments(names: Names, arguments: Mapping[str, tuple[Type, object]]) -> Names:
-    """Return `names` with `args.NAME` for each argument; the value of a broken one is `BROKEN`."""
-    return replace(names, values={**names.values, **{f"args.{name}": value for name, value in arguments.items()}})
 
 
 def fill(root: tree.Mapping, names: Names, report: Report, *, runs: bool = False) -> tree.Mapping:
@@ -144,6 +161,9 @@ class _Filler:
         self.names = names
         self.report = report
         self.runs = runs
+        self.scope = ""
+        self.known = names.known("")
+        self.left = ALL_BYTES  # by which the tree may grow
 
     def node(self, node: Node) -> Node:
         match node:
@@ -163,13 +183,19 @@ class _Filler:
         return mapping if is_same else replace(mapping, entries=entries)
 
     def scalar(self, scalar: Scalar) -> Node:
+        if scalar.scope != self.scope:
+            self.scope, self.known = scalar.scope, self.names.known(scalar.scope)
         pieces = list(_PIECE.finditer(scalar.text))
         values = {piece: value for piece in pieces if (value := self.piece(scalar, piece)) is not None}
         is_whole = len(pieces) == 1 and pieces[0].group() == scalar.text
         if any(value is BROKEN for value in values.values()):
             return replace(scalar, filled=BROKEN)
         if is_whole and values:
-            return _typed(scalar, values[pieces[0]])
+            return self.within(scalar, _typed(scalar, values[pieces[0]]))
+        for piece, value in values.items():
+            if isinstance(value, Secret):
+                broken = self.shown_secret(scalar, piece, "a secret cannot stand inside a text")
+                return replace(scalar, filled=broken)
         for piece, value in values.items():
             if isinstance(value, Sequence | tree.Mapping):
                 span = part_span(scalar, piece.start(), piece.end())
@@ -180,19 +206,33 @@ class _Filler:
         for piece, value in values.items():
             parts += [scalar.text[position : piece.start()], _as_text(value)]
             position = piece.end()
-        return replace(scalar, text="".join(parts) + scalar.text[position:]) if parts else scalar
+        return self.within(scalar, replace(scalar, text="".join(parts) + scalar.text[position:])) if parts else scalar
+
+    def within(self, scalar: Scalar, filled: Node) -> Node:
+        """Return what was filled in, or `BROKEN` after a finding if all of it together has become too large."""
+        if self.left >= 0:
+            self.left -= size(filled) - size(scalar)
+            if self.left >= 0:
+                return filled
+            message = f"what is filled in from here on makes this robot larger than {ALL_BYTES:,} bytes"
+            self.report.add(TOO_LARGE.at(scalar.span, message))
+        return replace(scalar, filled=BROKEN)
 
     def piece(self, scalar: Scalar, piece: re.Match[str]) -> object:
         """Return the value of one `${...}`, None for what stays as it is, `BROKEN` after a finding."""
         body, name = piece["body"], piece["name"]
+        if body is None and name:
+            return None if self.runs else self.running_name(scalar, piece)
         if body is None:
-            return self.running_name(scalar, piece) if name and not self.runs else None
+            return None if self.runs else "$"
         span = part_span(scalar, piece.start(), piece.end())
         if not piece["end"]:
             self.report.add(SYNTAX.at(span, "this '${' is never closed", help="write '}' at its end"))
             return BROKEN
         if variable := _ENVIRONMENT.fullmatch(body):
             return self.variable(scalar, piece, variable)
+        if secret := _SECRET.fullmatch(body):
+            return self.secret(scalar, piece, secret["name"])
         try:
             expression = parse_fill(body)
         except ExpressionError as error:
@@ -203,10 +243,12 @@ class _Filler:
 
     def running_name(self, scalar: Scalar, piece: re.Match[str]) -> object:
         name = piece["name"].rstrip(".")
-        known = [key for key in self.names.values if name in (key, key.removeprefix("args."))]
-        fix = f"write '${{{known[0]}}}'" if known else "what is filled in has braces; a dollar is written '$$'"
+        known = [key for key in self.known if name in (key, key.removeprefix("args."))]
+        help_text = f"write '${{{known[0]}}}'" if known else "what is filled in has braces; a dollar is written '$$'"
         message = f"'${plain(name, 60)}' is looked up while the robot runs, and this is filled in before"
-        self.report.add(NOT_RUNNING.at(part_span(scalar, piece.start(), piece.end()), message, help=fix))
+        span = part_span(scalar, piece.start(), piece.start() + 1 + len(name))
+        fix = replacement(span, f"${name}", f"${{{known[0]}}}") if known else None
+        self.report.add(NOT_RUNNING.at(span, message, help=help_text, fix=fix))
         return BROKEN
 
     def variable(self, scalar: Scalar, piece: re.Match[str], variable: re.Match[str]) -> object:
@@ -222,24 +264,46 @@ class _Filler:
         self.report.add(ENVIRONMENT.at(span, message, label=why, help=f"set it, or write '${{env.{name}:-DEFAULT}}'"))
         return BROKEN
 
+    def secret(self, scalar: Scalar, piece: re.Match[str], name: str) -> object:
+        if piece.group() != scalar.text:
+            return self.shown_secret(scalar, piece, "a secret cannot stand inside a text")
+        if self.names.secrets is None:
+            return self.shown_secret(scalar, piece, "a mission cannot hold a secret: what it does is logged")
+        try:
+            return self.names.secrets.get(name)
+        except NoSecretError as error:
+            self.report.add(SECRET.at(part_span(scalar, piece.start(), piece.end()), error.message, help=error.help))
+            return BROKEN
+
+    def shown_secret(self, scalar: Scalar, piece: re.Match[str], message: str) -> object:
+        help_text = "give it, alone, to a setting of a component that takes a secret"
+        self.report.add(SHOWN_SECRET.at(part_span(scalar, piece.start(), piece.end()), message, help=help_text))
+        return BROKEN
+
     def expression(self, scalar: Scalar, offset: int, expression: Expression) -> object:
-        known = self.names.values
+        known = self.known
         unknown = [word for word in expression.words if word.name not in known]
         for word in unknown:
             span = part_span(scalar, offset + word.start, offset + word.end)
-            self.report.add(UNKNOWN_NAME.at(span, f"unknown name '{word.name}'", help=self.name_help(word.name)))
+            fix = correction(word.name, known, span)
+            message = f"unknown name '{word.name}'"
+            self.report.add(UNKNOWN_NAME.at(span, message, help=self.name_help(word.name), fix=fix))
         if unknown or any(known[word.name][1] is BROKEN for word in expression.words):
             return BROKEN
         if expression.text.strip() in known:
             return known[expression.text.strip()][1]
-        type_, problems = check(expression, _Types(known))
+        if secret := next((word for word in expression.words if isinstance(known[word.name][1], Secret)), None):
+            span = part_span(scalar, offset + secret.start, offset + secret.end)
+            self.report.add(SHOWN_SECRET.at(span, "nothing can be computed with a secret", help="it stands alone"))
+            return BROKEN
+        type_, problems = check(expression, NameTypes(known))
         for problem in problems:
             span = part_span(scalar, offset + problem.start, offset + problem.end)
             self.report.add(WRONG_OPERATION.at(span, problem.message, help=problem.help))
         if problems:
             return BROKEN
         try:
-            return _with_type(evaluate(expression, _Values(known)), type_)
+            return _with_type(evaluate(expression, NameValues(known)), type_)
         except EvaluationError as error:
             span = part_span(scalar, offset + error.start, offset + error.end)
             self.report.add(WRONG_OPERATION.at(span, error.message))
@@ -248,7 +312,9 @@ class _Filler:
     def name_help(self, name: str) -> str:
         if name.startswith("env."):
             return "a variable of the environment stands alone: '${" + name + "}'"
-        fix = suggest(name, self.names.values, "what can be filled in")
+        if name.startswith("secret."):
+            return "a secret stands alone: '${" + name.lower() + "}'"
+        fix = suggest(name, self.known, "what can be filled in")
         if self.runs and not fix.startswith("did you mean"):
             return f"what is known while the robot runs is written '${name}'"
         return fix
@@ -279,44 +345,3 @@ def _with_type(value: object, type_: Type) -> object:
         return Quantity(value, type_.dimension)
     is_whole = isinstance(value, float) and type_.kind is TypeKind.COUNT and value.is_integer()
     return int(value) if is_whole and isinstance(value, float) else value
-
-
-@dataclass(frozen=True, slots=True)
-class _Types:
-    """The names as the static check of an expression sees them."""
-
-    names: Mapping[str, tuple[Type, object]]
-
-    def variable(self, name: str) -> Type | None:
-        return None
-
-    def word(self, name: str) -> Type | None:
-        return self.names[name][0] if name in self.names else None
-
-    def variables(self) -> Iterable[str]:
-        return ()
-
-    def words(self) -> Iterable[str]:
-        return self.names
-
-
-@dataclass(frozen=True, slots=True)
-class _Values:
-    """The names as the evaluation of an expression sees them: numbers in SI, lists and maps as plain data."""
-
-    names: Mapping[str, tuple[Type, object]]
-
-    def variable(self, name: str) -> object:
-        raise KeyError(name)
-
-    def word(self, name: str) -> object:
-        value = self.names[name][1]
-        if isinstance(value, Quantity):
-            return value.value
-        return to_plain(value) if isinstance(value, Scalar | Sequence | tree.Mapping) else value
-
-    def age(self, name: str) -> float:
-        raise KeyError(name)
-
-    def is_new(self, name: str) -> bool:
-        raise KeyError(name)

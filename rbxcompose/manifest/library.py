@@ -1,10 +1,11 @@
-"""The robots and missions that ship with the package, named `rbx:...`."""
+"""The robots, missions and parts that ship with the package, named `rbx:...`."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 PREFIX = "rbx:"
+PARTS = "parts"  # its folder of parts
 _PACKAGE = Path(__file__).resolve().parent.parent
 
 

@@ -3,6 +3,9 @@
 FILE_BYTES = 2_000_000
 ALL_BYTES = 8_000_000  # sum over the files of one robot
 FILES = 500
+INSTANCES = 500  # of parts; each instance counts its file's text towards `ALL_BYTES`
+INCLUDE_DEPTH = 16
+SECRET = 64_000  # bytes of a secret's file
 NODES = 200_000  # per file
 DEPTH = 64
 ALIAS_NODES = 10_000  # reached through aliases and merge keys

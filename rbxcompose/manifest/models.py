@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,6 +12,8 @@ from pydantic import BeforeValidator, Field, StringConstraints
 
 from rbxcompose.config import Angle, Config, Length, Name, Place, Time
 from rbxcompose.findings import Span
+from rbxcompose.manifest.history import History
+from rbxcompose.manifest.inclusions import Inclusions
 from rbxcompose.manifest.tree import Mapping
 
 SECTIONS = (
@@ -24,12 +27,15 @@ ALWAYS_THERE = ("transforms", "mission")
 """Components that every robot runs, beside `diagnostics`."""
 
 TopicName = Annotated[str, StringConstraints(pattern=r"^/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*$", max_length=255)]
+InterfaceName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(/(msg|srv|action))?/[A-Z][A-Za-z0-9]*$")]
 PortName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)?$", max_length=121)]
 
 
-def _short_for(key: str) -> BeforeValidator:
+def _short_for(key: str, model: type[Config]) -> BeforeValidator:
     """Let one word stand for a map with that one key."""
-    return BeforeValidator(lambda value: {key: value} if isinstance(value, str) else value)
+    return BeforeValidator(
+        lambda value: {key: value} if isinstance(value, str) else value, json_schema_input_type=model | str
+    )
 
 
 class Header(Config):
@@ -45,13 +51,13 @@ class Header(Config):
     """What it is for, in a sentence."""
 
 
-class RobotFile(Header):
-    """A robot: what it is made of and how that is connected."""
+class Sections(Header):
+    """What robots, parts and overlays have in common."""
 
     args: Any = None
     """Typed arguments by name."""
-    bus: Any = None
-    """How its messages travel."""
+    include: Any = None
+    """Parts, by the name of the instance."""
     components: Any = None
     """What runs, by name."""
     muxes: Any = None
@@ -64,10 +70,64 @@ class RobotFile(Header):
     """Short names for data that missions read."""
     missions: Any = None
     """Mission files by name."""
+
+
+class RobotFile(Sections):
+    """A robot: what it is made of and how that is connected."""
+
+    bus: Any = None
+    """How its messages travel."""
     start: Any = None
     """The mission that `up` runs."""
     profiles: Any = None
     """Named overlays."""
+
+
+class OverlayFile(Sections):
+    """Changes to a robot, given by `-f FILE`."""
+
+    bus: Any = None
+    """How its messages travel."""
+    start: Any = None
+    """The mission that `up` runs."""
+
+
+class PartFile(Sections):
+    """Something that robots are made of: sections of a robot with arguments of their own."""
+
+    needs: Any = None
+    """What must be there outside of the part."""
+    provides: Any = None
+    """What the part gives to the rest of the robot."""
+
+
+class Needs(Config):
+    """What must be there outside of a part."""
+
+    ports: dict[TopicName, InterfaceName] = {}
+    """Topics with their types, such as `cmd_vel: geometry_msgs/Twist`."""
+
+
+class Provides(Config):
+    """What a part gives to the rest of the robot, by the names that its file has for it."""
+
+    ports: dict[TopicName, InterfaceName] = {}
+    """Topics with their types."""
+    skills: tuple[Name, ...] = ()
+    """Skills of missions."""
+    values: tuple[Name, ...] = ()
+    """Values that missions read."""
+
+
+class Include(Config):
+    """An instance of a part."""
+
+    part: str
+    """The part's file."""
+    with_: dict[Name, Any] = Field({}, alias="with")
+    """Values of its arguments."""
+    connect: dict[TopicName, TopicName] = {}
+    """Other names for its topics: those of its ports, of its muxes, and `MUX/INPUT` of a mux's inputs."""
 
 
 class Bus(Config):
@@ -183,8 +243,9 @@ class Mission(Config):
     """Values of its inputs."""
 
 
-ValueModel = Annotated[Value, _short_for("port")]
-MissionModel = Annotated[Mission, _short_for("file")]
+IncludeModel = Annotated[Include, _short_for("part", Include)]
+ValueModel = Annotated[Value, _short_for("port", Value)]
+MissionModel = Annotated[Mission, _short_for("file", Mission)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +269,41 @@ class MissionEntry:
     span: Span
 
 
+class About(StrEnum):
+    """What a claim of a part is about."""
+
+    NEED = "a topic that it needs"
+    PORT = "a topic that it gives"
+    SKILL = "a skill"
+    VALUE = "a value"
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """One thing that a part needs or provides, by the name that it has in the robot; `type` is that of a topic."""
+
+    about: About
+    name: str
+    type: str
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class IncludedPart:
+    """An instance of a part: what it brought, by the names that this has in the robot.
+
+    `name` is the path of the instance (`arm.hand`); what a part includes belongs to it too.
+    """
+
+    name: str
+    file: str  # as findings show it
+    span: Span  # of the entry that includes it
+    components: frozenset[str]
+    muxes: frozenset[str]  # those that it has an input or a lock of
+    values: frozenset[str]
+    claims: tuple[Claim, ...]  # what it needs and provides
+
+
 @dataclass(frozen=True, slots=True)
 class RobotManifest:
     """A robot after composition: everything that its file says, in the order in which it says it."""
@@ -225,3 +321,10 @@ class RobotManifest:
     values: AnyMapping[str, Value] = field(default_factory=dict)
     missions: AnyMapping[str, MissionEntry] = field(default_factory=dict)
     start: str | None = None
+    parts: AnyMapping[str, IncludedPart] = field(default_factory=dict)
+    profiles: AnyMapping[str, Span] = field(default_factory=dict)  # from the name to the end of what it changes
+    include: Mapping = field(default_factory=Mapping)  # composed; what it names is part of `root` already
+    history: History = field(default_factory=History)
+    overlays: tuple[str, ...] = ()  # the files of `-f`, as findings show them
+    files: AnyMapping[str, Path] = field(default_factory=dict)  # every file that was read, by the name that is shown
+    inclusions: Inclusions = field(default_factory=Inclusions)

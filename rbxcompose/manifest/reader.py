@@ -5,10 +5,10 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
 
-from rbxcompose.findings import Finding, Span, kind
+from rbxcompose.findings import Edit, Finding, Fix, Span, kind
 from rbxcompose.manifest.composing import TOO_LARGE, compose
 from rbxcompose.manifest.limits import ALL_BYTES, FILE_BYTES, FILES
 from rbxcompose.manifest.tree import Node
@@ -43,7 +43,21 @@ missions:
   patrol: ../missions/patrol.yaml
 ```
 """,
+    is_fixable=True,
 )
+
+INDENT = "  "  # of one level
+
+
+class Texts(dict[str, str]):
+    """The texts of the files that were read, by the names that findings show.
+
+    `unsaved` are texts that an editor holds: each stands in the place of that of its file.
+    """
+
+    def __init__(self, unsaved: Mapping[Path, str]) -> None:
+        super().__init__()
+        self.unsaved = unsaved
 
 
 def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> tuple[Node | None, list[Finding]]:
@@ -59,16 +73,12 @@ def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> tupl
 def _bytes(path: Path, shown: str, sources: MutableMapping[str, str]) -> bytes | Finding:
     if len(sources) >= FILES:
         return TOO_LARGE.at(None, f"'{shown}' would be file number {FILES + 1} of this robot, {FILES} are the limit")
-    try:
-        # A pipe without a writer must not hold us up, hence O_NONBLOCK before we know what it is.
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                return UNREADABLE.at(None, f"'{shown}' is no regular file")
-            data = file.read(FILE_BYTES + 1)
-    except OSError as error:
-        is_missing = error.errno == errno.ENOENT
-        reason = "does not exist" if is_missing else f"cannot be read: {os.strerror(error.errno or 0)}"
-        return UNREADABLE.at(None, f"'{shown}' {reason}")
+    if isinstance(sources, Texts) and path in sources.unsaved:
+        data = sources.unsaved[path].encode(errors="surrogatepass")
+    elif isinstance(saved := _saved(path, shown), Finding):
+        return saved
+    else:
+        data = saved
     if len(data) > FILE_BYTES:
         return TOO_LARGE.at(None, f"'{shown}' is larger than {FILE_BYTES:,} bytes, the limit of a manifest")
     if sum(map(len, sources.values())) + len(data) > ALL_BYTES:
@@ -76,6 +86,19 @@ def _bytes(path: Path, shown: str, sources: MutableMapping[str, str]) -> bytes |
             None, f"with '{shown}' the files of this robot are larger than {ALL_BYTES:,} bytes together"
         )
     return data
+
+
+def _saved(path: Path, shown: str) -> bytes | Finding:
+    try:
+        # A pipe without a writer must not hold us up, hence O_NONBLOCK before we know what it is.
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                return UNREADABLE.at(None, f"'{shown}' is no regular file")
+            return file.read(FILE_BYTES + 1)
+    except OSError as error:
+        is_missing = error.errno == errno.ENOENT
+        reason = "does not exist" if is_missing else f"cannot be read: {os.strerror(error.errno or 0)}"
+        return UNREADABLE.at(None, f"'{shown}' {reason}")
 
 
 def _decode(data: bytes, file: str) -> tuple[str, list[Finding]]:
@@ -126,13 +149,27 @@ def _trouble_in_characters(text: str, file: str) -> Iterator[Finding]:
         lines = sum("\t" in line for line in text.split("\n"))
         label = f"and {lines - 1} more {'line' if lines == 2 else 'lines'}" if lines > 1 else ""
         help_text = r'use spaces (in text with double quotes a tab is written "\t")'
-        yield CHARACTER.at(span, "there is a tab here, and a manifest has none", label=label, help=help_text)
+        message, fix = "there is a tab here, and a manifest has none", _spaces_for_tabs(text, file)
+        yield CHARACTER.at(span, message, label=label, help=help_text, fix=fix)
     for number, line in enumerate(text.split("\n"), 1):
         if line.startswith("%"):
             span = Span(file, number, 1, number, len(line) + 1)
             yield NOT_YAML.at(span, "a manifest has no lines that begin with '%'", help="remove this line")
         if line.strip() and not line.lstrip().startswith("#"):
             return  # directives stand before everything else
+
+
+def _spaces_for_tabs(text: str, file: str) -> Fix | None:
+    """Return the fix for a text that is indented by tabs alone; beside spaces nobody knows how wide a tab was meant."""
+    indents = [line[: len(line) - len(line.lstrip(" \t"))] for line in text.split("\n")]
+    if not any(indents) or " " in "".join(indents):
+        return None
+    edits = [
+        Edit(Span(file, number, 1, number, len(tabs) + 1), tabs, INDENT * len(tabs))
+        for number, tabs in enumerate(indents, 1)
+        if tabs
+    ]
+    return Fix(tuple(edits), True, f"tabs -> spaces in {len(edits)} lines")
 
 
 def _character_span(text: str, offset: int, file: str) -> Span:

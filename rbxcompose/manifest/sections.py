@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from collections.abc import Mapping as AnyMapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
-from rbxcompose.config import Config, Name, Place
+from rbxcompose.config import Config, Name, Place, Secret
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.components import read_component
 from rbxcompose.manifest.files import resolve
+from rbxcompose.manifest.fill import SHOWN_SECRET
 from rbxcompose.manifest.models import (
     Analyzer,
     Bus,
@@ -23,16 +26,21 @@ from rbxcompose.manifest.models import (
     RobotManifest,
     ValueModel,
 )
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, at
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, at, children
 from rbxcompose.manifest.validate import WRONG_TYPE, label_of, validate
 
 C = TypeVar("C", bound=Config)
 
 
-def read_sections(root: Mapping, file: Path, sim: bool, report: Report) -> RobotManifest:
-    """Return the robot that a composed and filled tree describes; entries with mistakes are left out."""
+def read_sections(
+    root: Mapping, file: Path, sim: bool, report: Report, files: AnyMapping[str, Path] = MappingProxyType({})
+) -> RobotManifest:
+    """Return the robot that a composed and filled tree describes; entries with mistakes are left out.
+
+    `files` are all that were read, by the names that findings show: a path is relative to the one that writes it.
+    """
     places = _places(root, report)
-    missions = _missions(root, file, report)
+    missions = _missions(root, file, files, report)
     return RobotManifest(
         name=_text(root, "name"),
         about=_text(root, "about"),
@@ -107,19 +115,29 @@ def _places(root: Mapping, report: Report) -> dict[str, Place]:
     return places
 
 
-def _missions(root: Mapping, file: Path, report: Report) -> dict[str, MissionEntry]:
+def _missions(root: Mapping, file: Path, files: AnyMapping[str, Path], report: Report) -> dict[str, MissionEntry]:
     missions = {}
     for name, entry in named_entries(root, ("missions",), report):
         read = validate(Mission, entry.value, ("missions", name), report)
         if read is None or not isinstance(entry.value, Mapping):
             continue
-        path = resolve(read.file, file, entry.value.entries["file"].value.span)
+        _refuse_secrets(entry.value, report)
+        span = entry.value.entries["file"].value.span
+        path = resolve(read.file, files.get(span.file, file), span)
         if isinstance(path, Finding):
             report.add(path)
             continue
         inputs = entry.value.get("with")
         missions[name] = MissionEntry(name, path, inputs if isinstance(inputs, Mapping) else Mapping(), entry.key.span)
     return missions
+
+
+def _refuse_secrets(node: Node, report: Report) -> None:
+    """Add a finding for each secret that would go into a mission, where it would be shown."""
+    if isinstance(node, Scalar) and isinstance(node.filled, Secret):
+        report.add(SHOWN_SECRET.at(node.span, "a mission cannot hold a secret: what it does is logged"))
+    for _, below in children(node):
+        _refuse_secrets(below, report)
 
 
 def _components(root: Mapping, places: dict[str, Place], report: Report) -> dict[str, ComponentEntry]:

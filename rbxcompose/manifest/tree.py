@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 from rbxcompose.findings import Span
 
+NODE_BYTES = 40  # that a node counts beside its text
+
 Key = str | int
 Path = tuple[Key, ...]  # from the root of a file: ("components", "base", "max_speed") or ("do", 0, "go_to")
 
@@ -16,13 +18,15 @@ class Scalar:
     """One word, number or text as written.
 
     `plain` tells whether it stands without quotes, so that YAML 1.2's core types apply. `filled` is the typed value
-    of a scalar that was nothing but `${...}` (a `Quantity`, number, text or flag), else None.
+    of a scalar that was nothing but `${...}` (a `Quantity`, number, text or flag), else None. `scope` is the instance
+    of a part whose file wrote it (`arm.hand`), so that `${args...}` means that part's arguments; empty in other files.
     """
 
     text: str
     span: Span
     plain: bool = True
     filled: object = None
+    scope: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +79,16 @@ def children(node: Node) -> Iterator[tuple[Key, Node]]:
             yield from enumerate(items)
         case _:
             return
+
+
+def size(node: Node) -> int:
+    """Return about how large a tree is [bytes]: its texts, and something for each node."""
+    total, waiting = 0, [node]
+    while waiting:
+        now = waiting.pop()
+        total += NODE_BYTES + (len(now.text) if isinstance(now, Scalar) else 0)
+        waiting += (child for _, child in children(now))
+    return total
 
 
 def at(node: Node, path: Path) -> Node | None:

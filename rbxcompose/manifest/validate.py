@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Mapping as AnyMapping
+from dataclasses import replace
 from difflib import get_close_matches
 from functools import cache
 from itertools import islice
@@ -13,8 +14,8 @@ from typing import Any, TypeVar, cast
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from rbxcompose.findings import SIMILAR, Finding, Report, Span, kind, suggest
-from rbxcompose.manifest.scalars import describe, plain_value
+from rbxcompose.findings import SIMILAR, Finding, Report, Span, correction, kind
+from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import dimension_at, keys_at
 from rbxcompose.manifest.tree import Mapping, Node, Path, Scalar, Sequence, at, key_span, value_span
 from rbxcompose.plain import plain
@@ -39,6 +40,7 @@ base:
   max_speed: 0.5 m/s
 ```
 """,
+    is_fixable=True,
 )
 MISSING_KEY = kind(
     "RBX1002",
@@ -93,6 +95,7 @@ bus:
   wire: jazzy
 ```
 """,
+    is_fixable=True,
 )
 OUT_OF_RANGE = kind(
     "RBX1005",
@@ -138,6 +141,7 @@ BROKEN = object()
 """What `Scalar.filled` holds if filling it in failed: that was said, and nothing more is said of the value."""
 
 T = TypeVar("T")
+KEYS = "keys that it takes"
 _SINGULAR = {"components": "component", "muxes": "mux", "places": "place", "args": "argument", "missions": "mission"}
 _MOST_FINDINGS = 100  # of one part: nobody writes more by mistake, and each costs a search for the nearest name
 _ROUNDS = 8  # of repairs; each one goes at least one level deeper into a value
@@ -277,9 +281,11 @@ def _unknown_key(known: Iterable[str], node: Node, path: Path, loc: Path, lackin
     key = str(loc[-1])
     missing = [str(place[-1]) for place in lacking if place[:-1] == loc[:-1]]
     meant = get_close_matches(key, missing, n=1, cutoff=SIMILAR)
-    fix = suggest(key, meant or known, "keys that it takes")
     message = f"unknown key '{plain(key, 60)}' in {where((*path, *loc[:-1]))}"
-    return UNKNOWN_KEY.at(key_span(node, loc), message, help=fix), meant[0] if meant else ""
+    above = at(node, loc[:-1])
+    taken = above.entries if isinstance(above, Mapping) else ()
+    finding = UNKNOWN_KEY.misspelt(key_span(node, loc), message, key, meant or known, KEYS, taken=taken)
+    return finding, meant[0] if meant else ""
 
 
 def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails) -> Finding:
@@ -315,7 +321,10 @@ def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails)
             return OUT_OF_RANGE.at(span, f"'{name}' must be {words} {bound}")
         case kind_of_error if kind_of_error in _EXPECTED:
             return WRONG_TYPE.at(span, f"'{name}' must be {_EXPECTED[kind_of_error]}", label=label_of(value))
-    if "help" in context:  # a validator of ours, which brings its own words
+    if "valid" in context:  # a validator of ours, which tells what there is
+        message = f"'{name}': {error['msg']}"
+        return NOT_A_CHOICE.misspelt(span, message, context["name"], context["valid"], context["what"])
+    if "help" in context:  # or brings its own words
         return NOT_A_CHOICE.at(span, f"'{name}': {error['msg']}", help=str(context["help"]))
     return WRONG_TYPE.at(span, f"'{name}': {error['msg'][:1].lower()}{error['msg'][1:]}", label=label_of(value))
 
@@ -324,10 +333,12 @@ def not_a_choice(span: Span, name: str, value: Node | None, choices: list[str]) 
     """Return the finding for a value that is none of the few words that its key takes."""
     written = value.text if isinstance(value, Scalar) else ""
     if len(choices) == 1:
-        return NOT_A_CHOICE.at(span, f"'{name}' must be '{choices[0]}'", label=label_of(value) if not written else "")
-    message = f"'{name}' must be one of {', '.join(choices)}"
-    close = get_close_matches(written, choices, n=1, cutoff=SIMILAR)
-    return NOT_A_CHOICE.at(span, message, help=f"did you mean '{close[0]}'?" if close else "")
+        label = "" if written else label_of(value)
+        fix = correction(written, choices, span)
+        return NOT_A_CHOICE.at(span, f"'{name}' must be '{choices[0]}'", label=label, fix=fix)
+    finding = NOT_A_CHOICE.misspelt(span, f"'{name}' must be one of {', '.join(choices)}", written, choices)
+    is_near = finding.help.startswith("did you mean")
+    return finding if is_near else replace(finding, help="")  # the message lists all there are
 
 
 def _called(path: Path) -> str:
@@ -337,8 +348,8 @@ def _called(path: Path) -> str:
 
 
 def is_broken(node: Node | None) -> bool:
-    """Tell whether a value could not be filled in, which was said."""
-    return isinstance(node, Scalar) and node.filled is BROKEN
+    """Tell whether a value could not be filled in, or is no number that can be taken, which was said."""
+    return isinstance(node, Scalar) and (node.filled is BROKEN or (node.filled is None and bool(number_trouble(node))))
 
 
 def label_of(node: Node | None) -> str:

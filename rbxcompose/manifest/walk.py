@@ -72,6 +72,7 @@ Good:
 about: red text
 ```
 """,
+    is_fixable=True,
 )
 TAG = kind(
     "RBX1107",

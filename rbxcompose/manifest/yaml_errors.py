@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import yaml
 
-from rbxcompose.findings import Finding, Related, Span, kind
+from rbxcompose.findings import Finding, Fix, Related, Span, kind, replacement
 from rbxcompose.plain import plain
 
 QUOTES_NEEDED = kind(
@@ -25,6 +26,7 @@ Good:
 about: "Note: drives slowly"
 ```
 """,
+    is_fixable=True,
 )
 NOT_YAML = kind(
     "RBX1102",
@@ -42,9 +44,11 @@ Good:
 match: [battery, charger]
 ```
 """,
+    is_fixable=True,
 )
 QUOTE_HELP = "put quotes round this"
 
+_NO_SIGIL = "@`%>|"  # at the beginning of a text; `&`, `*` and `!` may have been meant as such
 _CLOSES = {"sequence": ("list", "[", "]"), "mapping": ("map", "{", "}")}
 
 
@@ -81,6 +85,29 @@ class _Trouble:
         end = max(len(self.line_text.rstrip()), column + 1)
         return Span(self.file, self.line + 1, column + 1, self.line + 1, end + 1)
 
+    def quoting(self, span: Span) -> Fix | None:
+        """Return the fix that puts quotes round a text that goes to the end of its line, if that is all of it."""
+        written = self.line_text[span.column - 1 : span.end_column - 1]
+        meant = written
+        if written[:1] == written[-1:] == "'":
+            if written.count("'") != 3:
+                return None  # which of the quotes belong to the text?
+            meant = written[1:-1]
+        is_simple = '"' not in meant and "\\" not in meant
+        quoted = f'"{meant}"' if is_simple else "'" + meant.replace("'", "''") + "'"
+        is_whole = " #" not in written and not self.goes_on
+        return replacement(span, written, quoted) if written and is_whole else None
+
+    @property
+    def goes_on(self) -> bool:
+        """Tell whether the next line lies deeper than this one, so that it may belong to the same text."""
+        below = next((line for line in self.lines[self.line + 1 :] if line.strip()), "")
+        return _indent(below) > _indent(self.line_text)
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip(" "))
+
 
 def explain(error: yaml.YAMLError, text: str, file: str) -> Finding:
     """Return the one finding for an error of the parser in `text`."""
@@ -98,15 +125,42 @@ def _colon(trouble: _Trouble) -> Finding:
     key = re.match(r"\s*(- +)*[^\s:][^:]*: +", before)
     if key and key.end() < len(before):
         span = trouble.to_line_end(key.end())
-        return QUOTES_NEEDED.at(span, "text with a colon and a space needs quotes", label=QUOTE_HELP)
+        message = "text with a colon and a space needs quotes"
+        return QUOTES_NEEDED.at(span, message, label=QUOTE_HELP, fix=trouble.quoting(span))
+    if found := _step_above(trouble):
+        step, value = found
+        word = trouble.lines[step.line - 1][step.column - 1 : step.end_column - 1]
+        fix = replacement(step, word, f"{word}:", is_safe=not value)  # with a value, it may be a text as well
+        message, help_text = (
+            "with settings below it, a step needs a colon",
+            f"write '{word}: {value}'".replace(": '", ":'"),
+        )
+        below = (Related(trouble.here, "this stands below it"),)
+        return NOT_YAML.at(step, message, label="put a colon here", help=help_text, related=below, fix=fix)
     message = "this key cannot stand here: the line above already holds a value"
-    return NOT_YAML.at(trouble.here, message, help="begin it in the same column as the key that it belongs beside")
+    begin = _indent(trouble.line_text)
+    span = Span(trouble.file, trouble.line + 1, begin + 1, trouble.line + 1, max(begin, trouble.column) + 1)
+    return NOT_YAML.at(span, message, help="begin it in the same column as the key that it belongs beside")
+
+
+def _step_above(trouble: _Trouble) -> tuple[Span, str] | None:
+    """Return the step without a colon right above a line that stands below it: the place of its word, and its value."""
+    line = trouble.line - 1
+    above = trouble.lines[line] if line >= 0 else ""
+    step = re.fullmatch(r"(?P<before> *(- +)*)(?P<word>[a-z][a-z0-9_]*)(?P<value> +[^\s:#][^:#]*)? *", above)
+    if not step or _indent(trouble.line_text) < len(step["before"]):
+        return None
+    start = len(step["before"])
+    place = Span(trouble.file, line + 1, start + 1, line + 1, start + len(step["word"]) + 1)
+    return place, (step["value"] or "").strip()
 
 
 def _first_character(trouble: _Trouble) -> Finding:
     character = trouble.line_text[trouble.column : trouble.column + 1]
     message = f"text that begins with '{plain(character)}' needs quotes"
-    return QUOTES_NEEDED.at(trouble.to_line_end(trouble.column), message, label=QUOTE_HELP)
+    span = trouble.to_line_end(trouble.column)
+    fix = trouble.quoting(span) if character in _NO_SIGIL else None
+    return QUOTES_NEEDED.at(span, message, label=QUOTE_HELP, fix=fix)
 
 
 def _sigil(trouble: _Trouble) -> Finding:
@@ -129,6 +183,10 @@ def _unclosed_quote(trouble: _Trouble) -> Finding:
 def _unclosed_bracket(trouble: _Trouble) -> Finding:
     what, opening, closing = _CLOSES["mapping" if "mapping" in trouble.context else "sequence"]
     begun = (Related(trouble.opening, f"the {what} begins here"),)
+    is_key = re.fullmatch(r"\s*[\w.-]+", trouble.line_text[: trouble.column])
+    if is_key and _indent(trouble.line_text) <= _indent(trouble.lines[trouble.opening.line - 1]):
+        here = (Related(trouble.here, "a new key begins here"),)
+        return NOT_YAML.at(trouble.opening, f"the closing '{closing}' of this {what} is missing", related=here)
     message = f"a ',' or the closing '{closing}' of this {what} is missing before this place"
     help_text = f"text with brackets, commas or quotes inside '{opening}{closing}' needs quotes"
     return NOT_YAML.at(trouble.here, message, help=help_text, related=begun)
@@ -140,7 +198,8 @@ def _after_value(trouble: _Trouble) -> Finding:
         begin = re.match(r"\s*(- +)*([^\s:'\"][^:]*: +)?", before)
         span = trouble.to_line_end(begin.end() if begin else 0)
         help_text = "put quotes of the other kind round the whole text"
-        return QUOTES_NEEDED.at(span, "text goes on after its closing quote", label=QUOTE_HELP, help=help_text)
+        message, fix = "text goes on after its closing quote", trouble.quoting(span)
+        return QUOTES_NEEDED.at(span, message, label=QUOTE_HELP, help=help_text, fix=fix)
     message = "this line does not fit the lines above it"
     begun = (Related(trouble.opening, "what it would belong to begins here"),)
     return NOT_YAML.at(
@@ -156,6 +215,11 @@ def _missing_dash(trouble: _Trouble) -> Finding:
 def _missing_colon(trouble: _Trouble) -> Finding:
     trouble.line = trouble.opening.line - 1
     span = trouble.to_line_end(trouble.opening.column - 1)
+    tight = re.match(r"[a-z][a-z0-9_]*:(?!//)(?=\S)", trouble.line_text[span.column - 1 :])
+    if tight:
+        colon = replace(span, end_column=span.column + tight.end())
+        fix = replacement(colon, tight[0], f"{tight[0]} ")
+        return NOT_YAML.at(colon, "a space is missing behind this colon", help="write 'key: value'", fix=fix)
     return NOT_YAML.at(span, "a colon is missing after this key", help="write 'key: value'")
 
 

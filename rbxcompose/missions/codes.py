@@ -29,6 +29,7 @@ do:
   do: recharge
 ```
 """,
+    is_fixable=True,
 )
 UNKNOWN_SKILL = kind(
     "RBX4102",
@@ -50,6 +51,7 @@ do:
   go_to: dock
 ```
 """,
+    is_fixable=True,
 )
 UNKNOWN_PLACE = kind(
     "RBX4103",
@@ -71,6 +73,7 @@ do:
   go_to: dock
 ```
 """,
+    is_fixable=True,
 )
 UNKNOWN_NAME = kind(
     "RBX4104",
@@ -93,6 +96,7 @@ do:
   wait_for: $battery > 90 %
 ```
 """,
+    is_fixable=True,
 )
 WRONG_ARGUMENT = kind(
     "RBX4105",
@@ -116,6 +120,7 @@ do:
     pose: dock
 ```
 """,
+    is_fixable=True,
 )
 WRONG_TYPE = kind(
     "RBX4106",
@@ -188,6 +193,7 @@ do:
   - recharge
 ```
 """,
+    is_fixable=True,
 )
 MISSING = kind(
     "RBX4109",
@@ -234,6 +240,7 @@ do:
     timeout: 30 s
 ```
 """,
+    is_fixable=True,
 )
 NO_EXPRESSION = kind(
     "RBX4111",
@@ -304,6 +311,7 @@ missions:
       rounds: 3
 ```
 """,
+    is_fixable=True,
 )
 NOT_A_CHOICE = kind(
     "RBX4114",
@@ -331,6 +339,7 @@ do:
     go_to: $corner
 ```
 """,
+    is_fixable=True,
 )
 TOO_DEEP = kind(
     "RBX4115",

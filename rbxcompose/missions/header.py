@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rbxcompose.expressions.types import TYPES, Type, choice_of
-from rbxcompose.findings import Report, suggest
+from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
 from rbxcompose.missions.literals import WrongValue, literal, typed
@@ -65,9 +65,10 @@ def _input(name: str, entry: Entry, report: Report) -> Input | None:
         return None
     for key, unknown in value.entries.items():
         if key not in INPUT_KEYS:
-            help_text = suggest(key, INPUT_KEYS, "keys of an input")
-            message = f"unknown key '{key}' in the input '{name}'"
-            report.add(codes.UNKNOWN_KEY.at(unknown.key.span, message, help=help_text))
+            message, taken = f"unknown key '{key}' in the input '{name}'", value.entries
+            report.add(
+                codes.UNKNOWN_KEY.misspelt(unknown.key.span, message, key, INPUT_KEYS, "keys of an input", taken=taken)
+            )
     if (wanted := _type(name, value, entry, report)) is None:
         return None
     default, least, most = (_value(value.get(key), wanted, f"'{key}'", report) for key in ("default", "min", "max"))
@@ -89,8 +90,8 @@ def _type(name: str, value: Mapping, entry: Entry, report: Report) -> Type | Non
         report.add(codes.MISSING.at(entry.key.span, f"the input '{name}' needs 'choices': a list of words"))
         return None
     if word.text not in TYPES:
-        help_text = suggest(word.text, (*TYPES, CHOICE), "types")
-        report.add(codes.NOT_A_CHOICE.at(word.span, f"unknown type '{word.text}'", help=help_text))
+        message = f"unknown type '{word.text}'"
+        report.add(codes.NOT_A_CHOICE.misspelt(word.span, message, word.text, (*TYPES, CHOICE), "types"))
         return None
     return TYPES[word.text]
 

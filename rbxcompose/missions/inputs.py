@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from rbxcompose.config import Place
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.expressions.values import Value
-from rbxcompose.findings import Finding, Span, suggest
+from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.tree import Entry
 from rbxcompose.missions import codes
 from rbxcompose.missions.header import range_trouble
@@ -26,8 +26,9 @@ def bind_inputs(
     for name, entry in given.items():
         if name not in program.inputs:
             message = f"the mission '{program.name}' has no input '{name}'"
-            help_text = suggest(name, program.inputs, "its inputs")
-            findings.append(codes.WRONG_INPUT.at(entry.key.span, message, help=help_text))
+            findings.append(
+                codes.WRONG_INPUT.misspelt(entry.key.span, message, name, program.inputs, "its inputs", taken=given)
+            )
     values = {}
     for name, declared in program.inputs.items():
         datum = _given(declared, given[name], findings) if name in given else declared.default
@@ -58,7 +59,7 @@ def _placed(datum: Datum, places: Mapping[str, Place], findings: list[Finding]) 
         return datum.value
     name = str(datum.value)
     if name not in places:
-        help_text = suggest(name, places, "places of this robot")
-        findings.append(codes.UNKNOWN_PLACE.at(datum.span, f"there is no place '{name}'", help=help_text))
+        message = f"there is no place '{name}'"
+        findings.append(codes.UNKNOWN_PLACE.misspelt(datum.span, message, name, places, "places of this robot"))
         return name
     return places[name]

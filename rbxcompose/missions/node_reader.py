@@ -8,7 +8,7 @@ from typing import Protocol
 from rbxcompose.expressions.text import Slot, Template, parse_template
 from rbxcompose.expressions.tree import Expression, ExpressionError, Number
 from rbxcompose.expressions.types import COUNT, FLAG, UNKNOWN, Type, quantity_of
-from rbxcompose.findings import Finding, Span, suggest
+from rbxcompose.findings import Finding, Span, replacement
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
@@ -17,6 +17,7 @@ from rbxcompose.missions.spans import expression_of, inner_span
 from rbxcompose.units import NUMBER, TIME
 
 FOREVER = "forever"
+WORDS = "it can be"
 NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
 
 # Stands for an expression that could not be read, so that the rest is read all the same.
@@ -119,7 +120,7 @@ class NodeReader:
         scalar = self.scalar(key, " or ".join(f"'{choice}'" for choice in choices))
         if scalar and scalar.text not in choices:
             message = f"'{key}' cannot be '{scalar.text}'"
-            self.nodes.add(codes.NOT_A_CHOICE.at(scalar.span, message, help=suggest(scalar.text, choices, "words")))
+            self.nodes.add(codes.NOT_A_CHOICE.misspelt(scalar.span, message, scalar.text, choices, WORDS))
         return scalar.text if scalar else choices[0]
 
     def template(self, key: str) -> Template:
@@ -162,8 +163,11 @@ class NodeReader:
         """Read the name that the nodes below give to a loop's item."""
         scalar = self.scalar(self.key, "a name for the item")
         if scalar and not NAME.fullmatch(scalar.text):
-            help_text = f"write '{scalar.text[1:]}' without '$'" if NAME.fullmatch(scalar.text[1:]) else NAME_HELP
-            self.nodes.add(codes.WRONG_SHAPE.at(scalar.span, f"'{scalar.text}' is no name", help=help_text))
+            bare = scalar.text[1:] if scalar.text.startswith("$") and NAME.fullmatch(scalar.text[1:]) else ""
+            help_text = f"write '{bare}' without '$'" if bare else NAME_HELP
+            fix = replacement(scalar.span, scalar.text, bare) if bare else None
+            self.nodes.add(codes.WRONG_SHAPE.at(scalar.span, f"'{scalar.text}' is no name", help=help_text, fix=fix))
+            self.item = scalar.text[1:] if NAME.fullmatch(scalar.text[1:]) else ""
         elif scalar:
             self.item = scalar.text
 

@@ -11,6 +11,7 @@ from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import Type
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Span
+from rbxcompose.manifest.tree import Mapping as LocatedMapping
 from rbxcompose.manifest.tree import Node as Located
 from rbxcompose.manifest.tree import Scalar
 
@@ -134,7 +135,10 @@ class Interrupt:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """A mission: the node under `do` has the number 0; those of the interrupts follow."""
+    """A mission: the node under `do` has the number 0; those of the interrupts follow.
+
+    `root` is what it was read from; the rest follows from it.
+    """
 
     name: str
     about: str
@@ -144,6 +148,7 @@ class Program:
     data: Mapping[str, Datum] = field(default_factory=dict)
     interrupts: tuple[Interrupt, ...] = ()
     rate: float = RATE
+    root: LocatedMapping = field(default_factory=LocatedMapping, repr=False)
 
     def asked(self) -> Iterator[tuple[Node | None, Asked]]:
         """Yield all expressions, with the node that asks; None for an interrupt."""

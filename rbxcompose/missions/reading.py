@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rbxcompose.findings import Finding, Related, Report, Span, suggest
+from rbxcompose.findings import Finding, Related, Report, Span
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes, program
 from rbxcompose.missions.header import read_data, read_inputs, read_rate
@@ -27,8 +27,10 @@ def read_program(root: Mapping, report: Report) -> Program | None:
     """
     for name, entry in root.entries.items():
         if name not in KEYS:
-            help_text = suggest(name, KEYS, "keys of a mission")
-            report.add(codes.UNKNOWN_KEY.at(entry.key.span, f"unknown key '{name}' in a mission", help=help_text))
+            message = f"unknown key '{name}' in a mission"
+            report.add(
+                codes.UNKNOWN_KEY.misspelt(entry.key.span, message, name, KEYS, "keys of a mission", taken=root.entries)
+            )
     reader = _Reader(report)
     inputs, data = read_inputs(root.get("inputs"), report), read_data(root.get("data"), report)
     task = root.get("do")
@@ -48,6 +50,7 @@ def read_program(root: Mapping, report: Report) -> Program | None:
         data,
         interrupts,
         read_rate(root.get("rate"), report),
+        root,
     )
 
 
@@ -161,9 +164,9 @@ class _Reader:
             return None
         for key, unknown in value.entries.items():
             if key not in INTERRUPT_KEYS:
-                help_text = suggest(key, INTERRUPT_KEYS, "keys of an interrupt")
-                message = f"unknown key '{key}' in the interrupt '{name}'"
-                self.add(codes.UNKNOWN_KEY.at(unknown.key.span, message, help=help_text))
+                message, what = f"unknown key '{key}' in the interrupt '{name}'", "keys of an interrupt"
+                taken = value.entries
+                self.add(codes.UNKNOWN_KEY.misspelt(unknown.key.span, message, key, INTERRUPT_KEYS, what, taken=taken))
         reader = NodeReader(value, "when", len(self.nodes), self)
         if "when" not in value:
             self.add(codes.MISSING.at(entry.key.span, f"the interrupt '{name}' needs 'when': a condition"))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from rbxcompose.missions import kinds as package
@@ -46,10 +47,10 @@ class KindTask(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of mission node: its word, the keys that belong to it, and its task class."""
+    """A kind of mission node: its word, the keys that belong to it with what each is for, and its task class."""
 
     name: str
-    options: frozenset[str]
+    options: Mapping[str, str]
     task: KindTask
 
 
@@ -57,11 +58,11 @@ K = TypeVar("K", bound=KindTask)
 _KINDS: dict[str, Kind] = {}
 
 
-def kind(name: str, *options: str) -> Callable[[K], K]:
-    """Register a task class under the word of its kind."""
+def kind(name: str, options: Mapping[str, str] = MappingProxyType({})) -> Callable[[K], K]:
+    """Register a task class under the word of its kind; `options` tells in a sentence what each of its keys is for."""
 
     def register(task: K) -> K:
-        _KINDS[name] = Kind(name, frozenset(options), task)
+        _KINDS[name] = Kind(name, options, task)
         return task
 
     return register

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator
 
 from rbxcompose.expressions.text import Slot, parse_template
 from rbxcompose.expressions.tree import ExpressionError
 from rbxcompose.expressions.types import UNKNOWN, Type, TypeKind
-from rbxcompose.findings import SIMILAR, Finding, Related, suggest
+from rbxcompose.findings import Finding, Related, nearest
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions import codes
 from rbxcompose.missions.modifiers import MODIFIERS
@@ -71,9 +70,10 @@ def _skill(view: View) -> Iterator[Finding]:
     node, skills = view.node, view.robot.skills
     if node.skill not in skills:
         message = f"mission '{view.program.name}' uses a skill that nobody provides: '{node.skill}'"
-        close = difflib.get_close_matches(node.skill, (*skills, *kinds()), n=1, cutoff=SIMILAR)
+        close = nearest(node.skill, (*skills, *kinds()))
         if close or view.robot.is_complete:
-            yield codes.UNKNOWN_SKILL.at(node.span, message, help=suggest(node.skill, close or skills, "skills"))
+            known = (*skills, *kinds()) if close else skills
+            yield codes.UNKNOWN_SKILL.misspelt(node.span, message, node.skill, known, "skills of this robot")
         return
     skill = skills[node.skill]
     given = {argument.name or skill.main for argument in node.arguments}
@@ -93,7 +93,9 @@ def _argument(view: View, skill: Skill, argument: Argument) -> Iterator[Finding]
         yield codes.WRONG_ARGUMENT.at(argument.span, f"the skill '{skill.name}' takes no single value")
     elif name not in skill.arguments:
         message = f"the skill '{skill.name}' has no argument '{name}'"
-        yield codes.WRONG_ARGUMENT.at(argument.span, message, help=suggest(name, skill.arguments, "its arguments"))
+        taken = {one.name for one in view.node.arguments}
+        arguments = skill.arguments
+        yield codes.WRONG_ARGUMENT.misspelt(argument.span, message, name, arguments, "its arguments", taken=taken)
     elif isinstance(argument.value, Scalar):
         if argument.value.plain and not argument.value.text:
             yield codes.WRONG_ARGUMENT.at(argument.span, f"the argument '{name}' of '{skill.name}' has no value")

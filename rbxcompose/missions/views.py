@@ -6,15 +6,17 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from rbxcompose.expressions.check import Problem, check_value
-from rbxcompose.expressions.tree import Expression
-from rbxcompose.expressions.types import PLACE, POSE, Type
-from rbxcompose.findings import Finding, Kind
+from rbxcompose.expressions.tree import Expression, Word
+from rbxcompose.expressions.types import PLACE, POSE, Type, TypeKind
+from rbxcompose.findings import Finding, Kind, replacement
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions import codes
 from rbxcompose.missions.program import Node, Program, RobotNames
 from rbxcompose.missions.registry import kinds
 from rbxcompose.missions.spans import inner_span
 from rbxcompose.missions.watching import POSE as POSE_NAME
+
+_MEASURED = (TypeKind.QUANTITY, TypeKind.COUNT, TypeKind.FLAG)  # what no place can be
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,16 +97,23 @@ def findings_of(
     """Yield what is wrong with an expression; what is neither a name nor a place is of the given kind."""
     for problem in check_value(expression, scope, wanted):
         span = inner_span(scalar, problem.start, problem.end)
+        written = expression.text[problem.start : problem.end]
+        fix = replacement(span, written, problem.meant) if problem.meant else None
         unknown_word = _at(problem, ((word.name, word.start) for word in expression.words))
-        if unknown_word and scope.word(unknown_word) is None:
+        if unknown_word and scope.word(unknown_word) is None and problem.meant.startswith("$"):
+            yield codes.UNKNOWN_NAME.at(span, problem.message, help=problem.help, fix=fix)
+        elif unknown_word and wanted.kind in _MEASURED and isinstance(expression.tree, Word):
+            message = f"this must be {wanted.phrase}; nothing is named '{unknown_word}'"
+            yield kind.at(span, message, fix=fix)
+        elif unknown_word and scope.word(unknown_word) is None:
             unquoted = f"there is no place '{unknown_word}'"
-            yield codes.UNKNOWN_PLACE.at(span, unquoted, help=problem.help)
+            yield codes.UNKNOWN_PLACE.at(span, unquoted, help=problem.help, fix=fix)
         elif (name := _at(problem, ((name.name, name.start) for name in expression.names))) and not scope.variable(
             name
         ):
-            yield codes.UNKNOWN_NAME.at(span, problem.message, help=problem.help)
+            yield codes.UNKNOWN_NAME.at(span, problem.message, help=problem.help, fix=fix)
         else:
-            yield kind.at(span, problem.message, help=problem.help)
+            yield kind.at(span, problem.message, help=problem.help, fix=fix)
 
 
 def _at(problem: Problem, names: Iterable[tuple[str, int]]) -> str:

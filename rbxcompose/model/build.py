@@ -6,11 +6,10 @@ What does not fit together is left out here; the checks say it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from rbxcompose.config import Config
 from rbxcompose.findings import Report
-from rbxcompose.manifest.models import RobotManifest
+from rbxcompose.manifest.models import ComponentEntry, RobotManifest
 from rbxcompose.missions.goals import skill_of
 from rbxcompose.missions.sources import SkillSource, ValueSource
 from rbxcompose.model.missions import read_missions
@@ -109,17 +108,18 @@ def _mux_sources(manifest: RobotManifest) -> dict[str, dict[str, str]]:
             component, _, port = (source.source or "").partition(".")
             written = manifest.components.get(component)
             if written is not None and written.config is not None:
-                for output in _outputs(component_type(written.type), written.config, mux, port):
+                for output in _outputs(written, written.config, mux, port):
                     remaps.setdefault(component, {})[output] = f"{mux}/{name}"
     return remaps
 
 
-def _outputs(cls: type[Any], config: Config, topic: str, port: str) -> list[str]:
+def _outputs(entry: ComponentEntry, config: Config, topic: str, port: str) -> list[str]:
     """Return the output that a mux takes: the one that is named, else the one on the mux's topic, else the only one."""
-    outputs = {name: end for name, end in cls.ports(config).items() if isinstance(end, Out)}
+    ports = component_type(entry.type).ports(config)
+    outputs = {name: end.topic for name, end in ports.items() if isinstance(end, Out)}
     if port:
         return [port] if port in outputs else []
-    on_topic = [name for name, end in outputs.items() if end.topic == topic]
+    on_topic = [name for name, own in outputs.items() if topic in (own, entry.options.connect.get(name))]
     return on_topic or (list(outputs) if len(outputs) == 1 else [])
 
 

@@ -166,6 +166,8 @@ class Group:
     def _shutdown(self) -> None:
         self._watch(LONGEST_CLOSE)  # nothing moves any more: what hangs now is cut off
         if self._host is not None:
+            if self._rest_deadline is None:
+                self._host.brake()  # the order to brake came together with this one
             self._channel.send(say.Summary(self._clock.now(), self._host.summary()))
             self._host.shutdown()
         self.is_over = True

@@ -12,6 +12,7 @@ from rbxcompose.config import (
     Place,
     PlaceName,
     Ratio,
+    Secret,
     Speed,
     Time,
 )
@@ -49,6 +50,7 @@ __all__ = [
     "Ratio",
     "Refused",
     "Reply",
+    "Secret",
     "SentGoal",
     "ServedGoal",
     "Serves",

@@ -2,7 +2,7 @@
 
 from rbxcompose.testing.bench import Bench, instance
 from rbxcompose.testing.golden import Golden
-from rbxcompose.testing.manifests import Checked, check_text
+from rbxcompose.testing.manifests import Checked, check_file, check_text
 from rbxcompose.testing.robots import Ran, run_robot
 
-__all__ = ["Bench", "Checked", "Golden", "Ran", "check_text", "instance", "run_robot"]
+__all__ = ["Bench", "Checked", "Golden", "Ran", "check_file", "check_text", "instance", "run_robot"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.plan.model import Plan
-from rbxcompose.rendering import render_text
+from rbxcompose.rendering.text import render_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +45,7 @@ def check_text(
     *,
     others: Mapping[str, str] | None = None,
     profiles: Sequence[str] = (),
+    overlays: Sequence[str] = (),
     sets: Sequence[str] = (),
     real: bool = False,
     environment: Mapping[str, str] | None = None,
@@ -54,5 +55,27 @@ def check_text(
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(other, encoding="utf-8")
-    robot = str(folder / "robot.yaml")
-    return Checked(compile_robot(robot, profiles=profiles, sets=sets, real=real, environment=environment or {}))
+    file = folder / "robot.yaml"
+    return check_file(file, profiles=profiles, overlays=overlays, sets=sets, real=real, environment=environment)
+
+
+def check_file(
+    path: Path,
+    *,
+    profiles: Sequence[str] = (),
+    overlays: Sequence[str] = (),
+    sets: Sequence[str] = (),
+    real: bool = False,
+    environment: Mapping[str, str] | None = None,
+) -> Checked:
+    """Compile the robot of a file."""
+    return Checked(
+        compile_robot(
+            str(path),
+            profiles=profiles,
+            overlays=overlays,
+            sets=sets,
+            real=real,
+            environment=environment or {},
+        )
+    )

@@ -8,7 +8,7 @@ import pytest
 
 from rbxcompose.checking import Check, all_checks
 from rbxcompose.compiler import compile_robot
-from rbxcompose.rendering import render_text
+from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
 
 FOLDER = Path(__file__).parent / "golden"
@@ -25,4 +25,4 @@ def test_what_a_check_says_is_its_golden_text(check: Check, golden: Golden, monk
 
 
 def test_every_golden_robot_belongs_to_a_check() -> None:
-    assert {path.stem for path in FOLDER.iterdir()} == {check.code for check in all_checks()}
+    assert {path.stem for path in FOLDER.glob("*.*")} == {check.code for check in all_checks()}

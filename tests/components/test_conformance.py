@@ -12,7 +12,7 @@ import pytest
 
 from rbxcompose.compiler import compile_robot
 from rbxcompose.plan.model import Instance
-from rbxcompose.rendering import render_text
+from rbxcompose.rendering.text import render_text
 from rbxcompose.sdk.ports import In, Serves
 from rbxcompose.sdk.registry import component_names, component_type
 from rbxcompose.testing import Bench

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.findings import Finding, Related, Report, Severity, Span
+from rbxcompose.findings import Finding, Related, Report, Severity, Span, replacement
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.robot_file import load_robot
-from rbxcompose.rendering import render_json, render_text
+from rbxcompose.rendering.json_ import render_json
+from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
 
 ROOT = Path(__file__).parents[2]
@@ -120,8 +121,9 @@ def test_nothing_from_a_manifest_reaches_the_terminal_raw() -> None:
 
 def test_json_holds_everything() -> None:
     related = (Related(span("g", 2, 3), "the first"),)
-    found = report(Finding("RBX1104", "twice", span("f", 1, 2, 3), "the second", "remove one", related))
-    assert json.loads(render_json(found)) == [
+    fix = replacement(span("f", 1, 2, 3), "two", "one")
+    found = report(Finding("RBX1104", "twice", span("f", 1, 2, 3), "the second", "remove one", related, fix=fix))
+    assert json.loads(render_json(found, {"f": " two"})) == [
         {
             "code": "RBX1104",
             "severity": "error",
@@ -134,6 +136,40 @@ def test_json_holds_everything() -> None:
             "label": "the second",
             "help": "remove one",
             "related": [{"file": "g", "line": 2, "column": 3, "end_line": 2, "end_column": 4, "message": "the first"}],
+            "fix": {
+                "title": "'two' -> 'one'",
+                "is_safe": True,
+                "edits": [
+                    {
+                        "file": "f",
+                        "line": 1,
+                        "column": 2,
+                        "end_line": 1,
+                        "end_column": 5,
+                        "old": "two",
+                        "text": "one",
+                    }
+                ],
+            },
         }
     ]
-    assert json.loads(render_json(report(Finding("RBX1301", "x"))))[0]["file"] is None
+    assert json.loads(render_json(report(Finding("RBX1301", "x")), {}))[0]["file"] is None
+
+
+def test_a_fix_that_does_not_fit_the_text_is_not_told() -> None:
+    found = report(Finding("RBX1104", "x", span("f", 1, 1, 3), fix=replacement(span("f", 1, 1, 3), "two", "one")))
+    assert json.loads(render_json(found, {"f": "tow"}))[0]["fix"] is None
+    assert render_text(found, {"f": "tow"}).endswith("1 error\n")
+    assert render_text(found, {"f": "two"}).endswith("1 error; it can be fixed with 'check --fix'\n")
+
+
+def test_several_further_places_stand_in_one_column_once_each(golden: Golden) -> None:
+    chain = [Related(span("robots/tug/robot.yaml", 12, 5), "included by this")]
+    places = [Related(span("parts/b.yaml", 3, 5), "the first"), *chain, *chain]
+    finding = Finding("RBX1104", "the key 'a' is written twice", span("f", 1, 1), related=tuple(places))
+    golden.check("places.txt", render_text(report(finding), {"f": "a: 1"}))
+
+
+def test_of_many_further_places_the_rest_is_counted() -> None:
+    places = tuple(Related(span("f", n, 1), "here") for n in range(1, 30))
+    assert "::: and 21 more places" in render_text(report(Finding("RBX1104", "x", span("f", 1, 1), related=places)), {})

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.findings import Report, Span
+from rbxcompose.manifest.history import History, Step
 from rbxcompose.manifest.overlay import compose, read_sets
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, at, value_span
-from rbxcompose.manifest.validate import to_plain
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, at, children, value_span
+from rbxcompose.manifest.validate import BROKEN, to_plain
 
 HERE = Span("f", 1, 1, 1, 2)
 
@@ -76,6 +79,40 @@ def test_the_later_value_wins(base: object, overlay: dict[str, object]) -> None:
     assert {name: result[name] for name in overlay if name in "pqr"} == {n: v for n, v in overlay.items() if n in "pqr"}
 
 
+def renamed(data: object, ending: str) -> object:
+    """Return a map whose names have an ending of their own, so that it has none in common with another."""
+    return (
+        {f"{name}{ending}": renamed(below, ending) for name, below in data.items()} if isinstance(data, dict) else data
+    )
+
+
+@given(MAPS, MAPS, MAPS)
+def test_overlays_that_have_no_name_in_common_may_come_in_any_order(base: object, one: object, other: object) -> None:
+    first, second = renamed(one, "1"), renamed(other, "2")
+    assert to_plain(merged(base, first, second)) == to_plain(merged(base, second, first))
+
+
+@given(MAPS, st.lists(MAPS, max_size=3))
+def test_the_history_of_a_value_ends_with_the_one_that_holds(base: object, layers: list[object]) -> None:
+    history = History()
+    tree = a_map(base)
+    history.write((), Step("base", tree, tree.span))
+    for number, layer in enumerate(layers):
+        tree = compose(tree, [(a_map(layer), f"layer {number}")], Report(), history)
+    for path, node in below(tree):
+        if isinstance(node, Scalar):
+            steps = history.of(path)
+            wrote = ["base"] if at(a_map(base), path) is not None else []
+            wrote += [f"layer {n}" for n, layer in enumerate(layers) if at(a_map(layer), path) is not None]
+            assert ([step.layer for step in steps], steps[-1].node) == (wrote, node)
+
+
+def below(node: Node, path: Path = ()) -> Iterator[tuple[Path, Node]]:
+    for key, child in children(node):
+        yield (*path, key), child
+        yield from below(child, (*path, key))
+
+
 def test_maps_merge_by_key_and_lists_replace() -> None:
     data, report = composed("a: {k: 1, l: [1, 2]}\nb: 1\n", "a: {l: [3]}\n")
     assert data == {"a": {"k": 1, "l": [3]}, "b": 1}
@@ -112,7 +149,7 @@ def test_changing_a_component_that_is_not_there_is_a_finding_and_adding_one_is_n
 
 def test_remove_outside_of_an_overlay_is_a_finding() -> None:
     data, report = composed("a: {b: !remove }\n")
-    assert data == {"a": {}}
+    assert data == {"a": {"b": BROKEN}}, "it is there, so that nothing misses it"
     assert [finding.code for finding in report] == ["RBX1305"]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.compiler import compile_robot
-from rbxcompose.rendering import render_text
+from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
 
 ROBOT, MISSION = "robots/turtlebot/robot.yaml", "missions/patrol.yaml"

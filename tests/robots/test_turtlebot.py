@@ -9,7 +9,7 @@ import pytest
 
 from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.geometry import Pose2
-from rbxcompose.rendering import render_text
+from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.bench import Bench
 from rbxcompose.testing.robots import Ran, run_robot
 

@@ -7,7 +7,7 @@ import sys
 from typing import TextIO
 
 from rbxcompose.findings import Finding, Report, Sources
-from rbxcompose.rendering import render_text
+from rbxcompose.rendering.text import render_text
 
 FINDINGS = 1  # exit code
 

@@ -33,7 +33,15 @@ class ForOptions:
     goes_on: bool
 
 
-@kind("for", "in", "do", "order", "if_one_fails")
+@kind(
+    "for",
+    {
+        "in": "The items: a list, or a map, whose keys they are; read once, at the start.",
+        "do": "What is done with each item.",
+        "order": "In which order.",
+        "if_one_fails": "Whether the loop ends there and fails, or does the rest and fails at the end.",
+    },
+)
 class For(Task):
     """Do the body with each item in turn; the list is read once, at the start."""
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rbxcompose.missions.node_reader import NodeReader
 
 
-@kind("if", "then", "else")
+@kind("if", {"then": "What is done if the condition holds.", "else": "What is done if it does not."})
 class If(Task):
     """Ask the condition once, then do `then` or `else`; without a match it is skipped."""
 

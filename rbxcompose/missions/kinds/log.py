@@ -25,7 +25,7 @@ class LogOptions:
     level: str
 
 
-@kind("log", "level")
+@kind("log", {"level": "How bad it is."})
 class Log(Task):
     """Write one line; `$name` in it is filled in."""
 

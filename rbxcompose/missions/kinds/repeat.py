@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rbxcompose.expressions.evaluate import holds
-from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.tree import Expression, Number
 from rbxcompose.findings import Finding
 from rbxcompose.missions import codes
 from rbxcompose.missions.registry import kind
@@ -30,7 +30,14 @@ class RepeatOptions:
     every: Expression | None
 
 
-@kind("repeat", "do", "until", "every")
+@kind(
+    "repeat",
+    {
+        "do": "What is done in each round.",
+        "until": "A condition that ends the loop; it is asked after each round and never cuts one.",
+        "every": "Time from the start of one round to the start of the next.",
+    },
+)
 class Repeat(Task):
     """Do the body again and again; a round that fails fails it, a number that is used up succeeds."""
 
@@ -57,7 +64,8 @@ class Repeat(Task):
     @staticmethod
     def waits(node: Node) -> bool:
         """It waits between its rounds if they have a period."""
-        return isinstance(node.options, RepeatOptions) and node.options.every is not None
+        every = node.options.every if isinstance(node.options, RepeatOptions) else None
+        return every is not None and not (isinstance(every.tree, Number) and every.tree.value == 0)
 
     @staticmethod
     def check(view: View) -> Iterator[Finding]:

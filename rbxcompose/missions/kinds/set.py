@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.types import COUNT, quantity_of
-from rbxcompose.findings import Finding, suggest
+from rbxcompose.findings import Finding, correction, suggest
 from rbxcompose.missions import codes
 from rbxcompose.missions.program import Assignment
 from rbxcompose.missions.registry import kind
@@ -44,7 +44,9 @@ class Set(Task):
             if name not in data:
                 message = f"only data can be set; the mission has no datum '{name}'"
                 help_text = suggest(name, data, "its data") or f"write '{name}: ...' under 'data'"
-                yield codes.UNKNOWN_NAME.at(assignment.span, message, help=help_text)
+                taken = [one.name for one in assignments]
+                fix = correction(name, data, assignment.span, taken=taken)
+                yield codes.UNKNOWN_NAME.at(assignment.span, message, help=help_text, fix=fix)
             else:
                 wanted = quantity_of(NUMBER) if data[name].type == COUNT else data[name].type
                 yield from view.typed(asked.expression, wanted, asked.scalar, codes.WRONG_TYPE)

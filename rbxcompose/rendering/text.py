@@ -1,18 +1,20 @@
-"""Findings -> text for a person or JSON for a program. Pure: nothing is printed here."""
+"""Findings as a person reads them: the words, the place, the line with a caret, what to do."""
 
 from __future__ import annotations
 
-import json
 import unicodedata
 from collections.abc import Iterator
 
-from rbxcompose.findings import Finding, Report, Severity, Sources, Span
+from rbxcompose.edits import safe_fixes
+from rbxcompose.findings import Finding, Related, Report, Severity, Sources, Span
+from rbxcompose.formats import output_format
 from rbxcompose.plain import plain
 
 MOST_SHOWN = 20
 _LINE_CELLS = 160  # of a source line; of a longer one only what surrounds the caret is shown
 _BEFORE_CARET = 60
 _WORDS = 400  # characters of a message, label or help
+_MOST_PLACES = 8  # beside a finding's own
 _RESET = "\x1b[0m"
 _COLOURS = {"error": "\x1b[1;31m", "warning": "\x1b[1;33m", "gutter": "\x1b[1;34m", "bold": "\x1b[1m"}
 
@@ -27,6 +29,7 @@ class _Painter:
         return f"{_COLOURS[style]}{text}{_RESET}" if self.colour and text else text
 
 
+@output_format("text")
 def render_text(report: Report, sources: Sources, colour: bool = False) -> str:
     """Return all findings, sorted by place, at most 20 of them in full, and a line that counts them; "" if none."""
     findings = list(report)
@@ -36,14 +39,19 @@ def render_text(report: Report, sources: Sources, colour: bool = False) -> str:
     lines = [line for finding in findings[:MOST_SHOWN] for line in _finding(finding, sources, paint)]
     if len(findings) > MOST_SHOWN:
         lines.append(f"... and {len(findings) - MOST_SHOWN} more")
-    lines.append(summary(findings))
+    lines.append(summary(findings, len(safe_fixes(findings, sources))))
     return "\n".join(lines) + "\n"
 
 
-def summary(findings: list[Finding]) -> str:
-    """Return how many there are of each severity: "3 errors, 1 warning"."""
+def summary(findings: list[Finding], fixes: int) -> str:
+    """Return how many there are of each severity, and how many fixes: "3 errors, 1 warning"."""
     counts = {severity: sum(finding.severity is severity for finding in findings) for severity in Severity}
-    return ", ".join(f"{count} {severity}{'' if count == 1 else 's'}" for severity, count in counts.items() if count)
+    counted = ", ".join(f"{count} {severity}{'' if count == 1 else 's'}" for severity, count in counts.items() if count)
+    if not fixes:
+        return counted
+    count = "all" if fixes == len(findings) else str(fixes)
+    which = f"{count} of them" if len(findings) > 1 else "it"
+    return f"{counted}; {which} can be fixed with 'check --fix'"
 
 
 def _finding(finding: Finding, sources: Sources, paint: _Painter) -> Iterator[str]:
@@ -60,10 +68,21 @@ def _finding(finding: Finding, sources: Sources, paint: _Painter) -> Iterator[st
             label = ""
     if label:
         yield f"{' ' * width} {paint('gutter', '=')} {label}"
-    for related in finding.related:
-        yield f"{paint('gutter', '  :::')} {plain(str(related.span), _WORDS)}   {plain(related.message, _WORDS)}"
+    for line in _related(finding.related):
+        yield f"{paint('gutter', '  :::')} {line}"
     if finding.help:
         yield f"{' ' * width} {paint('gutter', '=')} help: {plain(finding.help, _WORDS)}"
+
+
+def _related(related: tuple[Related, ...]) -> Iterator[str]:
+    """Yield further places once each, with their words in one column."""
+    places = list(dict.fromkeys((plain(str(one.span), _WORDS), plain(one.message, _WORDS)) for one in related))
+    shown = places[:_MOST_PLACES]
+    width = max((len(place) for place, _ in shown), default=0)
+    for place, words in shown:
+        yield f"{place:<{width}}   {words}".rstrip()
+    if len(places) > len(shown):
+        yield f"and {len(places) - len(shown)} more places"
 
 
 def _source_line(span: Span, sources: Sources) -> str | None:
@@ -101,32 +120,3 @@ def _columns(character: str) -> int:
     if unicodedata.combining(character) or unicodedata.category(character) in ("Mn", "Me", "Cf"):
         return 0
     return 2 if unicodedata.east_asian_width(character) in ("W", "F") else 1
-
-
-def render_json(report: Report) -> str:
-    """Return all findings as a JSON list, sorted by place."""
-    return json.dumps([_as_data(finding) for finding in report], indent=2, ensure_ascii=False)
-
-
-def _as_data(finding: Finding) -> dict[str, object]:
-    return {
-        "code": finding.code,
-        "severity": finding.severity,
-        "message": finding.message,
-        **_place(finding.span),
-        "label": finding.label,
-        "help": finding.help,
-        "related": [{**_place(related.span), "message": related.message} for related in finding.related],
-    }
-
-
-def _place(span: Span | None) -> dict[str, object]:
-    if span is None:
-        return dict.fromkeys(("file", "line", "column", "end_line", "end_column"))
-    return {
-        "file": span.file,
-        "line": span.line,
-        "column": span.column,
-        "end_line": span.end_line,
-        "end_column": span.end_column,
-    }

@@ -1,0 +1,45 @@
+"""A group that is stale between two reports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding
+from rbxcompose.model.robot import Robot
+from rbxcompose.units import TIME, format_quantity
+
+REPORTS = 1.0  # [s] between two reports of a component's status
+
+
+@check("RBX5005")
+def analyzer_timeout(robot: Robot) -> Iterator[Finding]:
+    """An analyzer gives its components up between two reports
+
+    Components report once a second. With a shorter `timeout` they are STALE between each report and the next.
+
+    Bad:
+    ```yaml
+    diagnostics:
+      analyzers:
+        power:
+          match: [battery, charger]
+          timeout: 500 ms
+    ```
+    Good:
+    ```yaml
+    diagnostics:
+      analyzers:
+        power:
+          match: [battery, charger]
+          timeout: 5 s
+    ```
+    """
+    for name, analyzer in robot.manifest.diagnostics.analyzers.items():
+        if analyzer.timeout is not None and analyzer.timeout <= REPORTS:
+            yield analyzer_timeout.at(
+                robot.value("diagnostics", "analyzers", name, "timeout"),
+                f"analyzer '{name}' takes its components for stale before they report again",
+                label=f"they report every {format_quantity(REPORTS, TIME)}",
+                help="make it several seconds, or leave it out for 5 s",
+            )

@@ -1,0 +1,53 @@
+"""A charge that ends below the level that calls for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding
+from rbxcompose.model.blame import blamed
+from rbxcompose.model.charging import calls
+from rbxcompose.model.robot import Robot
+from rbxcompose.units import RATIO, format_quantity
+
+CHARGED = 0.99  # a charge ends at or above this level
+
+
+@check("RBX4121")
+def charge_and_call(robot: Robot) -> Iterator[Finding]:
+    """A charge ends below the level that calls for it
+
+    The charger is done at 99 %. An interrupt that still holds then has done nothing for its cause, and cannot act
+    again.
+
+    Bad:
+    ```yaml
+    interrupts:
+      battery_low:
+        when: $battery < 100 %
+        do: recharge
+    do:
+      go_to: corner_1
+    ```
+    Good:
+    ```yaml
+    interrupts:
+      battery_low:
+        when: $battery < 50 %
+        do: recharge
+    do:
+      go_to: corner_1
+    ```
+    """
+    for mission in robot.missions.values():
+        for call in calls(robot, mission):
+            if CHARGED < call.level <= 1.0:
+                span, related = blamed(robot, mission, call.interrupt.when)
+                yield charge_and_call.at(
+                    span,
+                    f"the interrupt '{call.interrupt.name}' charges below {format_quantity(call.level, RATIO)}, "
+                    f"but a charge may end at {format_quantity(CHARGED, RATIO)}",
+                    help="charge at a lower level",
+                    related=related,
+                )

@@ -1,0 +1,76 @@
+"""A battery that is empty before the dock is reached."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.missions.facts import goal_place
+from rbxcompose.missions.ways import distance, too_short
+from rbxcompose.model.blame import blamed
+from rbxcompose.model.charging import calls, constants, ways_of
+from rbxcompose.model.flow import setting, setting_span
+from rbxcompose.model.robot import Robot
+from rbxcompose.units import RATIO, TIME, format_quantity
+
+
+@check("RBX4124", Severity.WARNING)
+def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
+    """The battery may be empty before the robot is at its dock
+
+    At the level at which the mission breaks off, the charge must last for the way from the farthest place to the dock.
+
+    Bad:
+    ```yaml
+    interrupts:
+      battery_low:
+        when: $battery < 3 %
+        do:
+          - go_to: dock
+          - recharge
+    do:
+      go_to: corner_1
+    ```
+    Good:
+    ```yaml
+    interrupts:
+      battery_low:
+        when: $battery < 30 %
+        do:
+          - go_to: dock
+          - recharge
+    do:
+      go_to: corner_1
+    ```
+    """
+    for mission in robot.missions.values():
+        ways, known = ways_of(robot, mission), constants(mission)
+        if ways is None:
+            continue
+        list(too_short(ways, known))  # goes through all of the mission
+        for call in calls(robot, mission):
+            goals = (
+                goal_place(node, ways.driving.main, known, ways.places)
+                for node in call.reaction
+                if node.skill == ways.driving.skill
+            )
+            dock = next((place for place in goals if place), None)
+            lasts = call.level * (setting(call.battery, "runtime") or 0.0)
+            if dock is None or not ways.visited:
+                continue
+            far = max(ways.visited.values(), key=partial(distance, dock))
+            needs = ways.between(far, dock)
+            if 0 <= lasts < needs:
+                span, related = blamed(robot, mission, call.interrupt.when)
+                yield empty_on_the_way.at(
+                    span,
+                    f"{format_quantity(call.level, RATIO)} last for {format_quantity(round(lasts, 1), TIME)}, but the "
+                    f"way from '{far.name}' to '{dock.name}' takes {format_quantity(round(needs, 1), TIME)}",
+                    help="break off earlier",
+                    related=[
+                        *related,
+                        Related(setting_span(robot, (call.battery, "runtime")), "how long a full battery lasts"),
+                    ],
+                )

@@ -1,0 +1,45 @@
+"""An expected name that is not there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX5003", is_fixable=True)
+def expected_component(robot: Robot) -> Iterator[Finding]:
+    """An analyzer expects a component that the robot does not have
+
+    What is expected and never reports is STALE for ever, and so is its group. `expected` takes names, no patterns.
+
+    Bad:
+    ```yaml
+    diagnostics:
+      analyzers:
+        power:
+          match: [battery]
+          expected: [chargr]
+    ```
+    Good:
+    ```yaml
+    diagnostics:
+      analyzers:
+        power:
+          match: [battery]
+          expected: [charger]
+    ```
+    """
+    known = {*robot.parts, *robot.written}
+    for name, analyzer in robot.manifest.diagnostics.analyzers.items():
+        for index, expected in enumerate(analyzer.expected):
+            if expected.partition(": ")[0] not in known:
+                yield expected_component.misspelt(
+                    robot.value("diagnostics", "analyzers", name, "expected", index),
+                    f"analyzer '{name}' expects '{expected}', which the robot does not have",
+                    expected,
+                    known,
+                    "components of this robot",
+                )

@@ -1,0 +1,58 @@
+"""A lock that holds nothing back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX3105")
+def idle_lock(robot: Robot) -> Iterator[Finding]:
+    """A lock of a mux holds back no input
+
+    While it is silent, a lock holds back the inputs of a lower priority than its own. If there is none, the robot
+    drives on as if the lock were not there.
+
+    Bad:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+        locks:
+          door:
+            priority: 5
+            timeout: 0.3 s
+    ```
+    Good:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+        locks:
+          door:
+            priority: 200
+            timeout: 0.3 s
+    ```
+    """
+    for mux, entry in robot.manifest.muxes.items():
+        lowest = min(entry.inputs, key=lambda name: entry.inputs[name].priority)
+        least = entry.inputs[lowest].priority
+        for name, lock in entry.locks.items():
+            if lock.priority <= least:
+                yield idle_lock.at(
+                    robot.value("muxes", mux, "locks", name, "priority"),
+                    f"lock '{name}' of mux '{mux}' holds back no input: none has a priority below {lock.priority}",
+                    help="give it a larger priority than the inputs that it should hold back",
+                    related=[Related(robot.value("muxes", mux, "inputs", lowest, "priority"), "the lowest input")],
+                )

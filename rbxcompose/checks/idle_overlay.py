@@ -1,0 +1,56 @@
+"""A layer that changes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.manifest.history import Step
+from rbxcompose.manifest.overlay import SET
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX7001", Severity.WARNING)
+def idle_overlay(robot: Robot) -> Iterator[Finding]:
+    """A profile or an overlay sets a value to what it is already
+
+    It changes nothing. Perhaps another value was meant, or the robot has been changed since.
+
+    Bad:
+    ```yaml
+    profiles:
+      tired:
+        components:
+          battery:
+            runtime: 45 s
+    ```
+    Good:
+    ```yaml
+    profiles:
+      tired:
+        components:
+          battery:
+            runtime: 30 s
+    ```
+    """
+    for before, after, path in changes(robot):
+        match before.node, after.node:
+            case Scalar(text=old, plain=was_plain), Scalar(text=new, plain=is_plain):
+                if (old, was_plain) == (new, is_plain):
+                    yield idle_overlay.at(
+                        after.span,
+                        f"{after.layer} sets '{path}' to what it is already",
+                        help="take it out, or write another value",
+                        related=[Related(before.span, f"the same in {before.layer}")],
+                    )
+
+
+def changes(robot: Robot) -> Iterator[tuple[Step, Step, str]]:
+    """Yield what one layer wrote in the place of what a layer before it wrote, with its path; `--set` may repeat."""
+    for path in robot.manifest.history.paths:
+        for before, after in pairwise(robot.manifest.history.of(path)):
+            if after.span.file != SET:
+                yield before, after, ".".join(map(str, path))

@@ -1,0 +1,57 @@
+"""Two instances of one part that speak on one topic."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.checks.two_writers import is_command
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.robot import Robot
+from rbxcompose.sdk.ports import Out
+
+
+@check("RBX3023")
+def instance_topics(robot: Robot) -> Iterator[Finding]:
+    """Two instances of a part publish on the same topic
+
+    Who listens would hear both and could not tell them apart. Names of instances do not enter topics: `connect:` gives
+    the topics of one instance other names. Absolute topics such as `/tf` are shared on purpose.
+
+    Bad:
+    ```yaml
+    include:
+      front: rbx:parts/base.yaml
+      rear:
+        part: rbx:parts/base.yaml
+        connect:
+          cmd_vel: rear_cmd_vel
+    ```
+    Good:
+    ```yaml
+    include:
+      front: rbx:parts/base.yaml
+      rear:
+        part: rbx:parts/base.yaml
+        connect:
+          cmd_vel: rear_cmd_vel
+          odom: rear/odom
+    ```
+    """
+    first: dict[tuple[str, str], str] = {}  # file and topic -> instance
+    for part in robot.manifest.parts.values():
+        told = {
+            end.topic: end.port.topic
+            for name in part.components & robot.parts.keys()
+            for end in robot.parts[name].ends
+            if isinstance(end.port, Out) and not is_command(end)
+        }
+        for topic, short in sorted(told.items()):
+            other = robot.manifest.parts[first.setdefault((part.file, topic), part.name)]
+            if other is not part and not short.startswith("/"):
+                yield instance_topics.at(
+                    part.span,
+                    f"the instances '{part.name}' and '{other.name}' of one part both publish on '{topic}'",
+                    help=f"give one of them another topic: 'connect: {{{short}: {part.name}/{short}}}'",
+                    related=[Related(other.span, f"the instance '{other.name}'")],
+                )

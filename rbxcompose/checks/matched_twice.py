@@ -1,0 +1,49 @@
+"""One component in two groups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX5004", Severity.WARNING)
+def matched_twice(robot: Robot) -> Iterator[Finding]:
+    """Two entries of analyzers name the same component
+
+    It would be shown in both groups, and a fault of it would be counted twice.
+
+    Bad:
+    ```yaml
+    diagnostics:
+      analyzers:
+        power:
+          match: [battery, charger]
+        motion:
+          match: [base, go_to, cmd_vel, battery]
+    ```
+    Good:
+    ```yaml
+    diagnostics:
+      analyzers:
+        power:
+          match: [battery, charger]
+        motion:
+          match: [base, go_to, cmd_vel]
+    ```
+    """
+    first: dict[str, tuple[str, int]] = {}
+    for name, analyzer in robot.manifest.diagnostics.analyzers.items():
+        for index, pattern in enumerate(analyzer.match):
+            other = first.setdefault(pattern, (name, index))
+            if other != (name, index):
+                yield matched_twice.at(
+                    robot.value("diagnostics", "analyzers", name, "match", index),
+                    f"'{pattern}' is matched twice, by analyzer '{other[0]}' and by analyzer '{name}'",
+                    help="leave one of them out",
+                    related=[
+                        Related(robot.value("diagnostics", "analyzers", other[0], "match", other[1]), "the first")
+                    ],
+                )

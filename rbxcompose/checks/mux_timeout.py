@@ -1,0 +1,53 @@
+"""A mux input that is given up between two messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.flow import period_of
+from rbxcompose.model.robot import Robot
+from rbxcompose.units import TIME, format_quantity
+
+
+@check("RBX3101")
+def mux_timeout(robot: Robot) -> Iterator[Finding]:
+    """A mux gives up an input between two of its messages
+
+    An input is live until its `timeout` has passed since its last message. Where the source sends less often than that,
+    the mux lets go of it after each message: the robot jerks, or a source of a lower priority drives in between.
+
+    Bad:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 20 ms
+    ```
+    Good:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+    ```
+    """
+    for mux, entry in robot.manifest.muxes.items():
+        for name, source in entry.inputs.items():
+            part = robot.parts.get((source.source or "").partition(".")[0])
+            period = period_of(part) if part else None
+            if part and period is not None and source.timeout <= period:
+                yield mux_timeout.at(
+                    robot.value("muxes", mux, "inputs", name, "timeout"),
+                    f"input '{name}' of mux '{mux}' times out before '{part.name}' sends its next message",
+                    label=f"it sends every {format_quantity(period, TIME)}",
+                    help=f"make it several times as long: '{format_quantity(10 * period, TIME)}'",
+                    related=[Related(robot.part_span(part.name), "the source")],
+                )

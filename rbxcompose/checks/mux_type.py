@@ -1,0 +1,52 @@
+"""A mux input of another type than the mux."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.flow import Flow
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX3107")
+def mux_type(robot: Robot) -> Iterator[Finding]:
+    """A mux input takes an output of another type
+
+    A mux forwards messages of one type: that of who listens to it.
+
+    Bad:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          power:
+            from: battery
+            priority: 10
+            timeout: 5 s
+    ```
+    Good:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+    ```
+    """
+    flow = Flow.of(robot)
+    for mux, entry in robot.manifest.muxes.items():
+        for name, one in entry.inputs.items():
+            own = robot.parts[mux].end(name)
+            component = (one.source or "").partition(".")[0]
+            for writer in flow.writers.get(own.topic, ()) if own else ():
+                if own and writer.instance == component and writer.type_name != own.type_name:
+                    yield mux_type.at(
+                        robot.value("muxes", mux, "inputs", name, "from"),
+                        f"input '{name}' of mux '{mux}' takes {writer.type_name}, but the mux forwards {own.type_name}",
+                        help=f"take an output of type {own.type_name}",
+                        related=[Related(robot.part_span(component), "the source")],
+                    )

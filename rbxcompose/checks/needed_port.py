@@ -1,0 +1,81 @@
+"""What a component needs and nobody gives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.model.flow import Flow
+from rbxcompose.model.robot import Part, Robot
+from rbxcompose.model.wiring import End
+from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Serves, ServesAction
+
+SERVED_BY = {Calls: Serves, CallsAction: ServesAction, In: Out}
+MISSION = "mission"  # its values may come from outside, and its skills are those that are there
+
+
+@check("RBX3010", Severity.WARNING)
+def needed_port(robot: Robot) -> Iterator[Finding]:
+    """A component needs what nobody in the robot gives
+
+    An input that nobody feeds stays silent, a service that nobody serves never answers. Often the one who would do so
+    stands on another topic, or is missing.
+
+    Bad:
+    ```yaml
+    components:
+      battery:
+        type: battery_sim
+        runtime: 45 s
+        connect:
+          battery_level: power/battery_level
+    values:
+      battery: battery.battery_level
+    ```
+    Good:
+    ```yaml
+    components:
+      battery:
+        type: battery_sim
+        runtime: 45 s
+    ```
+    """
+    flow = Flow.of(robot)
+    given = {(type(end.port), end.topic) for end in robot.ends}
+    lost = {end.type_name for ends in flow.writers.values() for end in ends if is_unheard(flow, end)}
+    for part in robot.parts.values():
+        if part.name == MISSION:
+            continue
+        needed = [end for end in part.ends if type(end.port) in SERVED_BY and not getattr(end.port, "is_open", False)]
+        missing = [end for end in needed if (SERVED_BY[type(end.port)], end.topic) not in given]
+        # A command that goes nowhere is told where it leaves.
+        ends = [end for end in missing if not (_is_command(end) and end.type_name in lost)]
+        if ends:
+            yield _finding(robot, part, ends)
+
+
+def is_unheard(flow: Flow, end: End) -> bool:
+    """Tell whether commands leave at this end and nobody hears them."""
+    return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND and end.topic not in flow.readers
+
+
+def _is_command(end: End) -> bool:
+    return isinstance(end.port, In) and end.port.qos is Qos.COMMAND
+
+
+def _finding(robot: Robot, part: Part, ends: list[End]) -> Finding:
+    names = " and ".join(f"'{end.topic}'" for end in ends)
+    near = [(end, other) for end in ends for other in robot.ends if _fits(end, other)]
+    fix = ", ".join(f"{end.name}: {other.topic.strip('/')}" for end, other in near)
+    return needed_port.at(
+        robot.end_span(ends[0]),
+        f"'{part.name}' needs {names}, which nobody in the robot gives",
+        help=f"connect it: 'connect: {{{fix}}}'" if fix else "add the component that gives it",
+        related=[Related(robot.end_span(other), f"'{other.topic}' is of this type") for _, other in near],
+    )
+
+
+def _fits(end: End, other: End) -> bool:
+    return type(other.port) is SERVED_BY[type(end.port)] and other.type_name == end.type_name

@@ -1,0 +1,42 @@
+"""A condition can never hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding
+from rbxcompose.model.blame import blamed, decided
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX4122")
+def never_holds(robot: Robot) -> Iterator[Finding]:
+    """A condition can never hold
+
+    A battery has 0 % to 100 %, a distance and an age are never below zero. Where a condition asks for more than that,
+    or one half of it rules out the other, what depends on it would never happen.
+
+    Bad:
+    ```yaml
+    do:
+      if: $battery < -10 %
+      then: recharge
+    ```
+    Good:
+    ```yaml
+    do:
+      if: $battery < 50 %
+      then: recharge
+    ```
+    """
+    for mission in robot.missions.values():
+        for asked, holds in decided(robot, mission):
+            if holds is False:
+                span, related = blamed(robot, mission, asked)
+                yield never_holds.at(
+                    span,
+                    f"the condition '{asked.expression.text}' can never hold",
+                    help="compare with a level that can be reached",
+                    related=related,
+                )

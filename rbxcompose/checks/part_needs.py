@@ -1,0 +1,81 @@
+"""A need of a part that the rest of the robot does not meet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related
+from rbxcompose.manifest.models import About, IncludedPart
+from rbxcompose.model.robot import Robot
+from rbxcompose.model.wiring import End, resolve
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Serves, ServesAction
+
+ANSWERS = {Out: In, In: Out, Calls: Serves, Serves: Calls, CallsAction: ServesAction, ServesAction: CallsAction}
+"""What stands at the other end of a wire, by the class of a port."""
+
+
+@check("RBX3021")
+def part_needs(robot: Robot) -> Iterator[Finding]:
+    """A part needs a topic that nobody else has
+
+    `needs:` of a part names topics with their types that something outside of the part must have: whoever listens to
+    what the part writes, writes what it reads, or serves what it calls.
+
+    Bad:
+    ```yaml
+    include:
+      nav:
+        part: rbx:parts/navigation.yaml
+        connect:
+          cmd_vel: wheels_cmd
+    ```
+    Good:
+    ```yaml
+    include:
+      nav: rbx:parts/navigation.yaml
+      wheels: rbx:parts/base.yaml
+    ```
+    """
+    for part in robot.manifest.parts.values():
+        for need in part.claims:
+            if need.about is not About.NEED:
+                continue
+            others = [end for end in _at(robot, need.name) if end.instance not in own_instances(part)]
+            fitting = [end for end in others if is_type(end, need.type)]
+            answers = _answers(end for end in _at(robot, need.name) if end.instance in own_instances(part))
+            if any(not answers or type(end.port) in answers for end in fitting):
+                continue
+            wrong = next((end for end in others if end.type_name and end not in fitting), None)
+            have = f"; '{wrong.instance}' has it as {short(wrong.type_name)}" if wrong else ""
+            yield part_needs.at(
+                part.span,
+                f"part '{part.name}' needs '{need.name}' ({short(need.type)}) outside of it, and nobody has it{have}",
+                help=f"include a part with '{need.name}', or give it the topic that is meant: 'connect:'",
+                related=[Related(need.span, "needed here")],
+            )
+
+
+def own_instances(part: IncludedPart) -> frozenset[str]:
+    """Return all that a part brought; a mux that it has an input of is its own end of the wire."""
+    return part.components | part.muxes
+
+
+def is_type(end: End, written: str) -> bool:
+    """Tell whether an end has the type that a part writes: `geometry_msgs/Twist`."""
+    return short(end.type_name) == short(written)
+
+
+def short(type_name: str) -> str:
+    """Return a type as people write it: without the middle of `geometry_msgs/msg/Twist`."""
+    package, _, name = type_name.partition("/")
+    return f"{package}/{name.rpartition('/')[-1]}"
+
+
+def _at(robot: Robot, topic: str) -> list[End]:
+    absolute = resolve(topic, robot.manifest.bus.namespace or "")
+    return [end for end in robot.ends if end.topic == absolute]
+
+
+def _answers(own: Iterable[End]) -> set[type]:
+    return {ANSWERS[type(end.port)] for end in own if type(end.port) in ANSWERS}

@@ -1,0 +1,68 @@
+"""A promise of a part that it does not keep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.checks.part_needs import is_type, own_instances, short
+from rbxcompose.findings import Finding, Related
+from rbxcompose.manifest.models import About, Claim
+from rbxcompose.manifest.tree import at
+from rbxcompose.model.robot import Robot
+from rbxcompose.model.wiring import End, resolve
+from rbxcompose.sdk.ports import ServesAction
+
+
+@check("RBX3022")
+def part_provides(robot: Robot) -> Iterator[Finding]:
+    """A part does not have what it says that it provides
+
+    `provides:` of a part tells the topics with their types, the skills and the values that it gives to the rest of the
+    robot. Who includes the part counts on them.
+
+    Bad:
+    ```yaml
+    include:
+      spare:
+        part: rbx:parts/battery.yaml
+        with:
+          dock: dock
+          runtime: 45 s
+    components:
+      spare_charger: !remove
+    ```
+    Good:
+    ```yaml
+    include:
+      spare:
+        part: rbx:parts/battery.yaml
+        with:
+          dock: dock
+          runtime: 45 s
+    ```
+    """
+    for part in robot.manifest.parts.values():
+        ends = [end for name in own_instances(part) & robot.parts.keys() for end in robot.parts[name].ends]
+        if (part.components & robot.written) - robot.parts.keys():
+            continue  # one of its components has mistakes, which are said at their own places
+        for claim in part.claims:
+            if claim.about is not About.NEED and (what := _lacking(robot, claim, ends)):
+                message = f"part '{part.name}' does not have {what}, which it says it provides"
+                yield part_provides.at(part.span, message, related=[Related(claim.span, "promised here")])
+
+
+def _lacking(robot: Robot, claim: Claim, ends: list[End]) -> str:
+    """Return what a part promises and does not have, in words; nothing if it keeps its promise."""
+    match claim.about:
+        case About.VALUE if at(robot.manifest.root, ("values", claim.name)) is None:
+            return f"the value '{claim.name}'"
+        case About.SKILL if not any(
+            isinstance(end.port, ServesAction) and end.topic.endswith(f"/{claim.name}") for end in ends
+        ):
+            return f"the skill '{claim.name}'"
+        case About.PORT:
+            topic = resolve(claim.name, robot.manifest.bus.namespace or "")
+            if not any(end.topic == topic and is_type(end, claim.type) for end in ends):
+                return f"the topic '{claim.name}' ({short(claim.type)})"
+    return ""

@@ -1,0 +1,90 @@
+"""A place in the data of a mission that does not exist."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.expressions.tree import ExpressionError, Variable
+from rbxcompose.expressions.types import TypeKind
+from rbxcompose.findings import Finding, Related, suggest
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.facts import Constants
+from rbxcompose.missions.kinds.for_ import ForOptions
+from rbxcompose.missions.program import Node, Program
+from rbxcompose.missions.spans import expression_of
+from rbxcompose.model.charging import constants
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX4131")
+def place_in_data(robot: Robot) -> Iterator[Finding]:
+    """The data of a mission name a place that the robot does not know
+
+    Text in `data:` becomes a place where a skill needs one. Nothing sets these data, so the skill would fail each time.
+
+    Bad:
+    ```yaml
+    data:
+      rooms: [corner_1, corner_9]
+    do:
+      for: room
+      in: $rooms
+      do:
+        go_to: $room
+    ```
+    Good:
+    ```yaml
+    data:
+      rooms: [corner_1, corner_2]
+    do:
+      for: room
+      in: $rooms
+      do:
+        go_to: $room
+    ```
+    """
+    for mission in robot.missions.values():
+        program, known = mission.program, constants(mission)
+        for node, name in _goals(robot, program):
+            for text, datum in _texts(program, node, name, known):
+                if text not in robot.manifest.places and datum in program.data:
+                    yield place_in_data.at(
+                        program.data[datum].span,
+                        f"there is no place '{text}', to which '{node.skill}' is sent with '${name}'",
+                        help=suggest(text, robot.manifest.places, "places of this robot"),
+                        related=[Related(node.span, "used here")],
+                    )
+
+
+def _goals(robot: Robot, program: Program) -> Iterator[tuple[Node, str]]:
+    """Yield each skill that gets a pose by `$name` alone, with that name."""
+    for node in program.nodes:
+        skill = robot.skills[node.skill].skill if node.skill in robot.skills else None
+        for argument in node.arguments if skill else ():
+            wanted = skill.arguments.get(argument.name or skill.main) if skill else None
+            if wanted is None or wanted.kind is not TypeKind.POSE or not isinstance(argument.value, Scalar):
+                continue
+            try:
+                tree = expression_of(argument.value).tree
+            except ExpressionError:
+                continue
+            if isinstance(tree, Variable):
+                yield node, tree.name
+
+
+def _texts(program: Program, node: Node, name: str, known: Constants) -> Iterator[tuple[str, str]]:
+    """Yield the texts that `$name` can be at a node, each with the datum that it stands in."""
+    above = node
+    while above.parent is not None:
+        above = program.nodes[above.parent]
+        if above.item == name:
+            items = above.options.items if isinstance(above.options, ForOptions) else ()
+            listed = items.tree.name if not isinstance(items, tuple) and isinstance(items.tree, Variable) else ""
+            found = known.get(listed)
+            texts = found if isinstance(found, list | tuple | dict) else ()
+            yield from ((text, listed) for text in texts if isinstance(text, str))
+            return
+    found = known.get(name)
+    if isinstance(found, str):
+        yield found, name

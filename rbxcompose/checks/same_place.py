@@ -1,0 +1,40 @@
+"""Two places at one spot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX3506", Severity.WARNING)
+def same_place(robot: Robot) -> Iterator[Finding]:
+    """Two places have the same pose
+
+    One of them was probably copied and not changed.
+
+    Bad:
+    ```yaml
+    places:
+      window: {x: 2 m, y: 1 m}
+      door: {x: 2 m, y: 1 m}
+    ```
+    Good:
+    ```yaml
+    places:
+      window: {x: 2 m, y: 1 m}
+      door: {x: 2 m, y: 3 m}
+    ```
+    """
+    first: dict[tuple[float, float, float], str] = {}
+    for name, place in robot.manifest.places.items():
+        other = first.setdefault((place.x, place.y, place.heading), name)
+        if other != name:
+            yield same_place.at(
+                robot.key("places", name),
+                f"the places '{other}' and '{name}' are at the same spot",
+                help="change one of them, or leave it out",
+                related=[Related(robot.key("places", other), "the other one")],
+            )

@@ -1,0 +1,68 @@
+"""A list that was replaced where it was perhaps to grow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.checks.idle_overlay import changes
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.manifest.tree import Node, Scalar, Sequence
+from rbxcompose.manifest.walk import REPLACE
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX7002", Severity.WARNING)
+def shortened_list(robot: Robot) -> Iterator[Finding]:
+    """A profile or an overlay adds to a list and drops what was in it
+
+    Maps are merged, but a list takes the place of the one below it. One that has something new, and not all that was
+    there, was probably to be added to it. `!replace` before the list says that it is meant so.
+
+    Bad:
+    ```yaml
+    profiles:
+      spare:
+        diagnostics:
+          analyzers:
+            power:
+              match: [base]
+    ```
+    Good:
+    ```yaml
+    profiles:
+      spare:
+        diagnostics:
+          analyzers:
+            power:
+              match: !replace [base]
+            motion:
+              match: [base, go_to, cmd_vel, battery, charger]
+    ```
+    """
+    for before, after, path in changes(robot):
+        if words := lost(before.node, after.node):
+            yield shortened_list.at(
+                after.span,
+                f"{after.layer} replaces the list '{path}' and drops {', '.join(map(repr, words))}",
+                help="write the whole list, or '!replace' before it if this is meant",
+                related=[Related(before.span, f"the list in {before.layer}")],
+            )
+
+
+def dropped(robot: Robot) -> set[str]:
+    """Return all words that lists have lost so."""
+    return {word for before, after, _ in changes(robot) for word in lost(before.node, after.node)}
+
+
+def lost(before: Node | None, after: Node | None) -> list[str]:
+    """Return the words of a list that are in the new one no more, if that has something new and no `!replace`."""
+    if not isinstance(after, Sequence) or after.tag == REPLACE:
+        return []
+    old, new = _words(before), _words(after)
+    return [word for word in old if word not in new] if new.keys() - old.keys() else []
+
+
+def _words(node: Node | None) -> dict[str, None]:
+    items = node.items if isinstance(node, Sequence) else ()
+    return dict.fromkeys(item.text for item in items if isinstance(item, Scalar))

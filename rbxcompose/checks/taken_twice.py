@@ -1,0 +1,55 @@
+"""One output for two inputs of muxes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX3106")
+def taken_twice(robot: Robot) -> Iterator[Finding]:
+    """Two inputs of muxes take the same output
+
+    An output goes to one topic. Only one of the inputs would ever hear of it.
+
+    Bad:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+          docking:
+            from: go_to
+            priority: 20
+            timeout: 0.5 s
+    ```
+    Good:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+    ```
+    """
+    first: dict[str, tuple[str, str]] = {}
+    for mux, entry in robot.manifest.muxes.items():
+        for name, one in entry.inputs.items():
+            if one.source is None:
+                continue
+            other = first.setdefault(one.source, (mux, name))
+            if other != (mux, name):
+                yield taken_twice.at(
+                    robot.value("muxes", mux, "inputs", name, "from"),
+                    f"input '{name}' of mux '{mux}' takes what another input takes already: '{one.source}'",
+                    help="leave one of the two out",
+                    related=[Related(robot.value("muxes", other[0], "inputs", other[1], "from"), "taken here")],
+                )

@@ -1,0 +1,53 @@
+"""A timeout that cannot be met."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.missions.facts import place_in_text
+from rbxcompose.missions.ways import distance, too_short
+from rbxcompose.model.charging import constants, ways_of
+from rbxcompose.model.robot import Robot
+from rbxcompose.units import LENGTH, TIME, format_quantity
+
+
+@check("RBX4120", Severity.WARNING)
+def timeout_and_way(robot: Robot) -> Iterator[Finding]:
+    """A timeout is shorter than what it is for
+
+    The way from one place to the next, straight and at full speed, takes longer than the step may: it would fail each
+    time. The same is said of waits.
+
+    Bad:
+    ```yaml
+    do:
+      - go_to: corner_1
+      - go_to: corner_3
+        timeout: 2 s
+    ```
+    Good:
+    ```yaml
+    do:
+      - go_to: corner_1
+      - go_to: corner_3
+        timeout: 20 s
+    ```
+    """
+    for mission in robot.missions.values():
+        ways = ways_of(robot, mission)
+        for one in too_short(ways, constants(mission)) if ways else ():
+            what, related = "this step", []
+            if one.leg:
+                here, there = one.leg
+                away = format_quantity(round(distance(here, there), 2), LENGTH)
+                what = f"the way from '{here.name}' to '{there.name}' ({away})"
+                related = [Related(robot.key("places", place.name), f"'{place.name}'") for place in one.leg]
+            yield timeout_and_way.at(
+                place_in_text(one.node, one.node.modifiers["timeout"]),
+                f"{what} takes at least {format_quantity(round(one.needs, 1), TIME)}, "
+                f"but has {format_quantity(one.given, TIME)}",
+                help="give it two or three times as long as it needs",
+                related=related,
+            )

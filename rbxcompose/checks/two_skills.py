@@ -1,0 +1,51 @@
+"""Two actions that would be the same skill."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.robot import Robot
+from rbxcompose.model.wiring import End
+from rbxcompose.sdk.ports import ServesAction
+
+
+@check("RBX3024")
+def two_skills(robot: Robot) -> Iterator[Finding]:
+    """Two actions are the same skill
+
+    A skill of missions is named like the last word of its action's topic. Missions could not tell which one is meant.
+
+    Bad:
+    ```yaml
+    components:
+      spare:
+        type: charger
+        dock: dock
+        connect:
+          recharge: spare/recharge
+    ```
+    Good:
+    ```yaml
+    components:
+      spare:
+        type: charger
+        dock: dock
+        connect:
+          recharge: recharge_spare
+    ```
+    """
+    first: dict[str, End] = {}
+    for end in robot.ends:
+        if not isinstance(end.port, ServesAction):
+            continue
+        skill = end.topic.rpartition("/")[-1]
+        other = first.setdefault(skill, end)
+        if other.topic != end.topic:
+            yield two_skills.at(
+                robot.end_span(end),
+                f"'{end.topic}' and '{other.topic}' are both the skill '{skill}'",
+                help=f"give one of them another last word: 'connect: {{{end.name}: {skill}_{end.instance}}}'",
+                related=[Related(robot.end_span(other), f"that of '{other.instance}'")],
+            )

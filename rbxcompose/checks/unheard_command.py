@@ -1,0 +1,47 @@
+"""Commands that nobody hears."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.checks.needed_port import is_unheard
+from rbxcompose.findings import Finding, Related, Severity, suggest
+from rbxcompose.model.flow import Flow
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX3011", Severity.WARNING)
+def unheard_command(robot: Robot) -> Iterator[Finding]:
+    """Commands go to a topic that nobody listens to
+
+    What sends them believes that it drives the robot, and nothing moves. A mux is named after the topic that it
+    writes; a base listens to `cmd_vel`.
+
+    Bad:
+    ```yaml
+    components:
+      base:
+        type: diff_drive_sim
+        connect:
+          cmd_vel: wheels/cmd_vel
+    ```
+    Good:
+    ```yaml
+    components:
+      base:
+        type: diff_drive_sim
+    ```
+    """
+    flow = Flow.of(robot)
+    for end in robot.ends:
+        if is_unheard(flow, end):
+            waiting = [one for ends in flow.readers.values() for one in ends if one.type_name == end.type_name]
+            starving = [one for one in waiting if one.topic not in flow.writers and one.instance != end.instance]
+            topics = [one.topic.strip("/") for one in starving]
+            yield unheard_command.at(
+                robot.end_span(end),
+                f"nobody listens to the commands of '{end.instance}' on '{end.topic}'",
+                help=suggest(end.topic.strip("/"), topics, "topics that wait for such commands"),
+                related=[Related(robot.end_span(one), f"listens to '{one.topic}'") for one in starving],
+            )

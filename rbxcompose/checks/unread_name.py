@@ -1,0 +1,51 @@
+"""Inputs and data that a mission never reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Severity
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX4129", Severity.WARNING)
+def unread_name(robot: Robot) -> Iterator[Finding]:
+    """A mission never reads one of its inputs or data
+
+    Giving it another value would change nothing. It is left over, or a number stands where its name should.
+
+    Bad:
+    ```yaml
+    inputs:
+      low:
+        type: ratio
+        default: 50 %
+    do:
+      wait_for: $battery < 50 %
+    ```
+    Good:
+    ```yaml
+    inputs:
+      low:
+        type: ratio
+        default: 50 %
+    do:
+      wait_for: $battery < $low
+    ```
+    """
+    seen = set()
+    for mission in robot.missions.values():
+        program = mission.program
+        if program.file in seen:
+            continue  # the same file as another mission
+        seen.add(program.file)
+        read = program.reads()
+        for what, names in (("input", program.inputs), ("datum", program.data)):
+            for name in names:
+                if name not in read:
+                    yield unread_name.at(
+                        names[name].span,
+                        f"the mission '{program.name}' never reads its {what} '{name}'",
+                        help=f"take it out, or write '${name}' where it belongs",
+                    )

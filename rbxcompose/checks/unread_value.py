@@ -1,0 +1,38 @@
+"""A value that no mission reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Severity
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX3012", Severity.WARNING)
+def unread_value(robot: Robot) -> Iterator[Finding]:
+    """A value that no mission reads
+
+    `values:` are names for missions. One that none of them reads is left over, or a mission looks at another one by
+    mistake.
+
+    Bad:
+    ```yaml
+    values:
+      battery: battery.battery_level
+      charge: battery.battery_level
+    ```
+    Good:
+    ```yaml
+    values:
+      battery: battery.battery_level
+    ```
+    """
+    read = frozenset[str]().union(*(mission.program.reads() for mission in robot.missions.values()))
+    for name in robot.manifest.values if robot.missions else ():
+        if name not in read:
+            yield unread_value.at(
+                robot.key("values", name),
+                f"no mission reads the value '{name}'",
+                help=f"take it out, or read it in a mission as '${name}'",
+            )

@@ -1,0 +1,43 @@
+"""Simulated and real things in one process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Severity
+from rbxcompose.model.robot import Robot
+
+WORLD = "world"
+
+
+@check("RBX6001", Severity.WARNING)
+def world_group(robot: Robot) -> Iterator[Finding]:
+    """The process group `world` is for simulated truth, and for nothing else
+
+    What is simulated (where the robot is, how much charge it has) lives in the group `world`, so that the end of any
+    other process never changes it. A component of the robot itself does not belong there: `world` may not fail, and the
+    robot goes down with it.
+
+    Bad:
+    ```yaml
+    components:
+      go_to:
+        type: go_to
+        process: world
+    ```
+    Good:
+    ```yaml
+    components:
+      go_to:
+        type: go_to
+    ```
+    """
+    for part in robot.parts.values():
+        if part.process == part.cls.process or WORLD not in (part.process, part.cls.process):
+            continue
+        if part.cls.process == WORLD:
+            message = f"'{part.name}' is simulated and belongs into the group 'world', not into '{part.process}'"
+        else:
+            message = f"'{part.name}' is no part of the simulated world, but runs in its group"
+        yield world_group.at(robot.value(*part.path, "process"), message, help="leave 'process' out")

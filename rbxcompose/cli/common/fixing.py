@@ -1,0 +1,125 @@
+"""Writing safe fixes into the files of a project, until there is nothing left that can be fixed."""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Protocol
+
+from rbxcompose.edits import apply, safe_fixes
+from rbxcompose.findings import Finding, Fix, Report, Sources
+from rbxcompose.plain import plain
+
+ROUNDS = 20  # one fix may let the next mistake be seen
+_WORDS = 200  # characters of a title
+
+Say = Callable[[str], None]
+
+
+class Checked(Protocol):
+    """What a check found, and the texts that it read."""
+
+    @property
+    def report(self) -> Report:
+        """Return the findings."""
+        ...
+
+    @property
+    def sources(self) -> Sources:
+        """Return the texts by the names that findings show."""
+        ...
+
+
+def fix(check: Callable[[], Checked], say: Say) -> None:
+    """Check, apply what can safely be fixed, say it, and begin anew until nothing is left."""
+    for _ in range(ROUNDS):
+        checked = check()
+        fixes = safe_fixes(checked.report, checked.sources)
+        if not fixes or not _apply(fixes, checked.sources, say):
+            return
+    say(f"stopped after {ROUNDS} rounds: each fix makes room for another")
+
+
+def only_ours(findings: Iterable[Finding], projects: Collection[Path]) -> Iterator[Finding]:
+    """Yield findings, without the fixes of those that would change a file that lies in none of `projects`."""
+    for finding in findings:
+        is_ours = finding.fix is None or _is_ours(finding.fix, projects)
+        yield finding if is_ours else replace(finding, fix=None)
+
+
+def _is_ours(one: Fix, projects: Collection[Path]) -> bool:
+    paths = {Path(edit.span.file).resolve() for edit in one.edits}
+    return all(any(path.is_relative_to(project) for project in projects) for path in paths)
+
+
+def _apply(fixes: list[Fix], sources: Sources, say: Say) -> bool:
+    """Write fixes, and return whether any file has changed."""
+    texts = {}
+    for file in dict.fromkeys(edit.span.file for one in fixes for edit in one.edits):
+        text = _unchanged_text(file, sources[file])
+        if text is None:
+            say(f"left {plain(file)} as it is: it was changed since it was read, or cannot be read any more")
+        else:
+            texts[file] = text
+    out = apply(fixes, texts)
+    written = {file for file, text in out.texts.items() if text != texts[file] and _write(file, text, say)}
+    for one in out.done:
+        if all(edit.span.file in written for edit in one.edits):
+            say(f"fixed {_told(one)}")
+    for one in out.postponed:
+        say(f"not yet {_told(one)}: it meets another fix")
+    return bool(written)
+
+
+def _told(one: Fix) -> str:
+    first = next(edit for edit in one.edits if edit.text != edit.old)
+    return f"{plain(str(first.span))}: {plain(one.title, _WORDS)}"
+
+
+def _unchanged_text(file: str, read: str) -> str | None:
+    """Return the text of a file with its byte order mark and ends of lines, None if it is not what was read."""
+    try:
+        text = Path(file).read_bytes().decode("utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+    return text if text.removeprefix("\ufeff").replace("\r\n", "\n") == read else None
+
+
+def _write(file: str, text: str, say: Say) -> bool:
+    try:
+        replace_file(Path(file).resolve(), text.encode("utf-8"))
+    except OSError as error:
+        say(f"left {plain(file)} as it is: {error.strerror}")
+        return False
+    return True
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Replace a file whole or not at all, whatever happens meanwhile; its mode stays.
+
+    Raises:
+        OSError: if it cannot be written; it is as before then.
+    """
+    mode = stat.S_IMODE(path.stat().st_mode)
+    if not os.access(path, os.W_OK):
+        raise PermissionError(13, "it may not be written")
+    descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with open(descriptor, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fchmod(descriptor, mode)
+            os.fsync(descriptor)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)

@@ -1,0 +1,97 @@
+"""One more mission for a robot that is there: what `new mission` reads from the robot's file, and adds to it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from rbxcompose.cli.common.fixing import replace_file
+from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.manifest.files import find, project_of, shown_name
+from rbxcompose.manifest.library import PREFIX
+from rbxcompose.model.charging import GO_TO, server
+from rbxcompose.model.flow import Flow, setting
+from rbxcompose.model.robot import Robot
+from rbxcompose.scaffold.answers import ANSWER, AnswerError
+from rbxcompose.scaffold.mission import MissionAnswers, with_entry
+
+
+class MistakenRobotError(Exception):
+    """Raised when a robot has mistakes of its own, with what the compiler made of it."""
+
+    def __init__(self, compilation: Compilation) -> None:
+        super().__init__("the robot has mistakes")
+        self.compilation = compilation
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """The robot that gets a mission, its file, and the project that both lie in."""
+
+    robot: Robot
+    file: Path
+    project: Path
+
+    def usual(self, name: str) -> MissionAnswers:
+        """Return what is to be known of a mission of this robot."""
+        file = PurePosixPath(self.file.relative_to(self.project))
+        places = tuple(self.robot.manifest.places.values())
+        for skill in sorted(self.robot.skills) if places else ():
+            if driver := server(self.robot, skill, GO_TO):
+                parts = [driver, *(base for one, base in Flow.of(self.robot).drives() if one is driver)]
+                limits = [setting(part, key) for part in parts for key in ("speed", "max_speed")]
+                return MissionAnswers(name, file, places, skill, min(limit for limit in limits if limit))
+        return MissionAnswers(name, file)
+
+    def add(self, answers: MissionAnswers) -> bool:
+        """Write the mission's entry into the robot's file, if that surely does nothing else; tell whether it did."""
+        before = self.file.read_bytes()
+        text = with_entry(before.decode("utf-8"), answers)
+        if text is None:
+            return False
+        unsaved = {self.file: text.removeprefix("\ufeff").replace("\r\n", "\n")}
+        after = compile_robot(str(self.file), environment=os.environ, unsaved=unsaved)
+        if after.plan is None or after.robot is None or answers.name not in after.robot.missions:
+            return False
+        if before != self.file.read_bytes():
+            return False
+        try:
+            replace_file(self.file, text.encode("utf-8"))
+        except OSError:  # the caller tells what to write by hand
+            return False
+        return True
+
+
+def find_home(written: str) -> Home:
+    """Return the robot that gets the mission; if none is written, the only one below `robots/`.
+
+    Raises:
+        AnswerError: if there is no such robot, if there are several, or if it is one of the library.
+        MistakenRobotError: if it has mistakes.
+    """
+    file = _file(written)
+    out = compile_robot(str(file), environment=os.environ)
+    if out.robot is None or out.report.has_errors:
+        raise MistakenRobotError(out)
+    return Home(out.robot, file, project_of(file))
+
+
+def _file(written: str) -> Path:
+    if written.startswith(PREFIX):
+        help_text = "write one of your own by 'rbxcompose new robot NAME'"
+        raise AnswerError(ANSWER.at(None, f"'{written}' is a robot of the library and stays as it is", help=help_text))
+    path = find(written or _only())
+    if isinstance(path, Path):
+        return path
+    raise AnswerError(path)
+
+
+def _only() -> str:
+    files = sorted(Path("robots").glob("*/robot.yaml"))
+    if len(files) == 1:
+        return str(files[0])
+    if files:
+        names = ", ".join(shown_name(file.parent) for file in files)
+        raise AnswerError(ANSWER.at(None, "which robot is the mission for?", help=f"name it by '--robot': {names}"))
+    raise AnswerError(ANSWER.at(None, "there is no robot below 'robots/'", help="name one by '--robot PATH'"))

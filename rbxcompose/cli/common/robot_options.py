@@ -1,0 +1,46 @@
+"""What verbs that compile a robot share: which profiles, overlays and values lie on top of its file."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Mapping, Sequence
+from typing import TypedDict
+
+from rbxcompose.compiler import Compilation, compile_robot
+
+
+class Layers(TypedDict):
+    """What `compile_robot` takes beside the robot's file."""
+
+    profiles: Sequence[str]
+    overlays: Sequence[str]
+    sets: Sequence[str]
+    real: bool
+    environment: Mapping[str, str]
+
+
+def add_layer_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--profile`, `-f`, `--set` and `--real`."""
+    parser.add_argument("--profile", action="append", default=[], metavar="P", help="put this profile on top")
+    parser.add_argument(
+        "-f", "--file", action="append", default=[], dest="overlays", metavar="FILE", help="put this overlay on top"
+    )
+    parser.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="change one value")
+    parser.add_argument("--real", action="store_true", help="for the real devices; without it they are simulated")
+
+
+def layers_of(arguments: argparse.Namespace) -> Layers:
+    """Return all that a command lays over the robot's file."""
+    return {
+        "profiles": arguments.profile,
+        "overlays": arguments.overlays,
+        "sets": arguments.sets,
+        "real": arguments.real,
+        "environment": os.environ,
+    }
+
+
+def compiled(robot: str, arguments: argparse.Namespace) -> Compilation:
+    """Compile a robot with all that a command lays over its file."""
+    return compile_robot(robot, **layers_of(arguments))

@@ -1,0 +1,93 @@
+"""Which robots `check` is asked about: by file, by folder, or because they use a file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rbxcompose.findings import Finding, Severity, Span, kind
+from rbxcompose.manifest.files import ROBOT_FILE, find, project_of, shown_name
+from rbxcompose.manifest.library import PREFIX
+
+UNUSED = kind(
+    "RBX9007",
+    """No robot uses the file
+
+A mission, a part or an overlay is checked together with the robots that use it. No robot of the project does, so that
+there is nothing to check it against.
+
+Bad: `rbxcompose check missions/draft.yaml`, which no robot has in its `missions:`.
+Good: name the mission in a robot, or leave it out of the command.
+""",
+    Severity.WARNING,
+)
+
+_USE = "name it in a robot ('missions:', 'include:'); an overlay is checked by 'check ROBOT -f FILE'"
+_KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
+_HEAD = 4096  # bytes of a file in which its kind stands
+_MANIFESTS = ("*.yaml", "*.yml")
+_ROBOTS = "robots"
+
+
+@dataclass(slots=True)
+class Targets:
+    """The robots to check: `robots` in any case, `users` if they use one of `files`."""
+
+    robots: list[str] = field(default_factory=list)
+    users: list[str] = field(default_factory=list)
+    files: list[str] = field(default_factory=list)
+
+    def unused(self, read: Iterable[str]) -> Iterator[Finding]:
+        """Yield a finding for each of `files` that is not among the names of those that were `read`."""
+        known = set(read)
+        for file in self.files:
+            if file not in known:
+                yield UNUSED.at(Span(file, 1, 1, 1, 2), f"no robot of the project uses '{file}'", help=_USE)
+
+
+def targets(paths: Iterable[str]) -> Targets:
+    """Return the robots that paths of the command line mean.
+
+    A path is a robot's file or folder, `rbx:robots/NAME`, a folder that has robots below it, or any other manifest,
+    which means the robots of its project that use it.
+    """
+    out = Targets()
+    for written in paths:
+        path = Path(written)
+        if written.startswith(PREFIX) or not path.exists():
+            out.robots.append(written)
+        elif path.is_dir():
+            out.robots += [written] if (path / ROBOT_FILE).exists() else robots_below(path) or [written]
+        elif _kind_of(path) in ("Robot", ""):
+            out.robots.append(written)
+        else:
+            out.files.append(shown_name(path.resolve()))
+            out.users += robots_below(project_of(path))
+    out.robots = list(dict.fromkeys(out.robots))
+    out.users = [user for user in dict.fromkeys(out.users) if user not in out.robots]
+    return out
+
+
+def robots_below(folder: Path) -> list[str]:
+    """Return the robots' files of a project, or of a folder of robots; at most two folders deep."""
+    base = folder / _ROBOTS if (folder / _ROBOTS).is_dir() else folder
+    files = (path for depth in ("", "*/", "*/*/") for pattern in _MANIFESTS for path in base.glob(depth + pattern))
+    return sorted(shown_name(path.resolve()) for path in files if _kind_of(path) == "Robot")
+
+
+def projects_of(paths: Iterable[str]) -> list[Path]:
+    """Return the folders of the projects that robots lie in; what ships with the package belongs to nobody's."""
+    files = [find(path) for path in paths if not path.startswith(PREFIX)]
+    return list(dict.fromkeys(project_of(file) for file in files if isinstance(file, Path)))
+
+
+def _kind_of(path: Path) -> str:
+    """Return the kind that a manifest names, nothing if it names none or cannot be read."""
+    try:
+        with path.open("rb") as file:
+            found = _KIND.search(file.read(_HEAD)) if path.is_file() else None
+    except OSError:
+        return ""
+    return found[1].decode() if found else ""

@@ -1,0 +1,66 @@
+"""Tell what the code of a finding means and how it is right; without a code, list all.
+
+Exit codes: 0 fine, 2 there is no such code.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+
+from rbxcompose.cli.common.telling import tell
+from rbxcompose.findings import Kind, suggest
+from rbxcompose.pages import all_kinds, body_of, family_of, text_of, title_of
+
+USAGE = 2
+_PREFIX = "RBX"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("code", nargs="?", metavar="CODE", help="such as RBX1001; without it all codes are listed")
+    parser.add_argument("--json", action="store_true", help="write what is known as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write one page, or the list of all."""
+    kinds = all_kinds()
+    if arguments.code is None:
+        tell(_as_json(list(kinds.values())) if arguments.json else _listed(kinds))
+        return 0
+    code = _PREFIX + arguments.code.upper().removeprefix(_PREFIX)
+    if code not in kinds:
+        family = [one for one in kinds if one.startswith(code[: len(_PREFIX) + 2])]
+        hint = suggest(code, family or kinds, "codes")
+        sys.stderr.write(f"rbxcompose explain: there is no code {arguments.code!r}; {hint}\n")
+        return USAGE
+    tell(_as_json(kinds[code]) if arguments.json else text_of(kinds[code]).rstrip("\n"))
+    return 0
+
+
+def _listed(kinds: dict[str, Kind]) -> str:
+    lines = []
+    family = ""
+    for kind in kinds.values():
+        if family_of(kind) != family:
+            family = family_of(kind)
+            lines += ["", f"{family}:"]
+        lines.append(f"  {kind.code}  {title_of(kind)}")
+    return "\n".join(lines[1:])
+
+
+def _as_json(what: Kind | list[Kind]) -> str:
+    data = [_data(kind) for kind in what] if isinstance(what, list) else _data(what)
+    return json.dumps(data, indent=2, ensure_ascii=False)
+
+
+def _data(kind: Kind) -> dict[str, object]:
+    return {
+        "code": kind.code,
+        "title": title_of(kind),
+        "severity": kind.severity.value,
+        "family": family_of(kind),
+        "is_fixable": kind.is_fixable,
+        "text": body_of(kind),
+    }

@@ -1,0 +1,78 @@
+"""Reading the files of one robot: each once, of the kind that is wanted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from dataclasses import replace as changed
+from pathlib import Path
+
+from rbxcompose.findings import Finding, Related, Report, Span, kind
+from rbxcompose.manifest.files import shown_name
+from rbxcompose.manifest.models import Header
+from rbxcompose.manifest.reader import read_file
+from rbxcompose.manifest.tree import Mapping, Node, Scalar
+from rbxcompose.manifest.validate import validate
+
+OTHER_KIND = kind(
+    "RBX1304",
+    """Another kind of manifest
+
+Every manifest says what it describes: `kind: Robot`, `kind: Mission` and so on. This file is not what is needed here.
+
+Bad:
+```yaml
+missions:
+  patrol: robot.yaml
+```
+Good:
+```yaml
+missions:
+  patrol: ../../missions/patrol.yaml
+```
+""",
+    is_fixable=True,
+)
+
+
+@dataclass(slots=True)
+class Documents:
+    """The files of a robot: their texts for findings, and their paths by the names that findings show."""
+
+    report: Report
+    sources: dict[str, str]
+    files: dict[str, Path] = field(default_factory=dict)
+
+    def read(self, file: Path, wanted: str, span: Span | None = None) -> Mapping | None:
+        """Return the tree of a manifest of the kind that is wanted, or None after findings.
+
+        `span` is the place that names the file, for what is wrong with it as a whole.
+        """
+        shown = shown_name(file)
+        self.files[shown] = file
+        root, findings = read_file(file, shown, self.sources)
+        self.report.extend(changed(one, span=one.span or span) for one in findings)
+        if root is None:
+            return None
+        if finding := _trouble(root, wanted):
+            related = (Related(span, f"this needs a {wanted}"),) if span else ()
+            self.report.add(changed(finding, related=(*finding.related, *related)))
+            return None
+        return root if isinstance(root, Mapping) else None
+
+    def writer(self, span: Span, robot: Path) -> Path:
+        """Return the file that a value was written in; the robot's for one of the command line."""
+        return self.files.get(span.file, robot)
+
+    def check(self, model: type[Header], root: Mapping) -> None:
+        """Add what is wrong with the keys of a whole file."""
+        validate(model, root, (), self.report)
+
+
+def _trouble(root: Node, wanted: str) -> Finding | None:
+    """Return why a document is not of the kind that is wanted."""
+    if not isinstance(root, Mapping):
+        return OTHER_KIND.at(root.span, "a manifest is a map that begins with 'rbx: 1' and 'kind:'")
+    written = root.get("kind")
+    if not isinstance(written, Scalar) or written.text == wanted:
+        return None
+    return OTHER_KIND.misspelt(written.span, f"this is no {wanted}", written.text, [wanted], "what is needed")

@@ -1,0 +1,69 @@
+"""Provenance: which layers gave a value at a path of the composed robot, from the first one to the one that holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from rbxcompose.findings import Span
+from rbxcompose.manifest.tree import Node, Path, at
+
+ROBOT_LAYER = "the robot"
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What one layer wrote: a node with its place, or None where it took the value away."""
+
+    layer: str
+    node: Node | None
+    span: Span
+
+
+@dataclass(slots=True)
+class History:
+    """All that the layers wrote, in order; nodes are as written, with their `${...}` not filled in.
+
+    Only what a layer added, replaced or removed as a whole is kept, so it costs no more than what was changed.
+    """
+
+    _steps: dict[Path, list[tuple[int, Step]]] = field(default_factory=dict)
+    _count: int = 0
+
+    def write(self, path: Path, step: Step) -> None:
+        """Keep what a layer did at `path`."""
+        self._count += 1
+        self._steps.setdefault(path, []).append((self._count, step))
+
+    @property
+    def paths(self) -> Iterable[Path]:
+        """Return every path at which a layer wrote."""
+        return self._steps.keys()
+
+    def of(self, path: Path) -> tuple[Step, ...]:
+        """Return every layer's value at `path`, the one that holds last; empty if no layer ever wrote there.
+
+        A last step without a node tells that the value was taken away.
+        """
+        found: list[Step] = []
+        for step in self._all(path):
+            if step.node is not None or (found and found[-1].node is not None):
+                found.append(step)
+        return tuple(found)
+
+    def layer(self, path: Path) -> str:
+        """Return the layer whose value at `path` holds, of the nearest path above it that has one."""
+        for length in range(len(path), -1, -1):
+            if steps := self.of(path[:length]):
+                return steps[-1].layer
+        return ""
+
+    def _all(self, path: Path) -> Iterator[Step]:
+        reaching = [
+            (order, step, path[length:])
+            for length in range(len(path) + 1)
+            for order, step in self._steps.get(path[:length], ())
+        ]
+        for _, step, rest in sorted(reaching, key=lambda one: one[0]):
+            node = at(step.node, rest) if step.node is not None else None
+            yield step if node is step.node else Step(step.layer, node, node.span if node else step.span)

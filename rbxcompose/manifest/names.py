@@ -1,0 +1,93 @@
+"""What `${...}` may name, and how the check and the evaluation of an expression see it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from rbxcompose.expressions import types
+from rbxcompose.expressions.types import Type
+from rbxcompose.manifest import tree
+from rbxcompose.manifest.secrets import Secrets
+from rbxcompose.manifest.tree import Scalar, Sequence
+from rbxcompose.manifest.validate import to_plain
+from rbxcompose.units import Quantity
+
+Typed = tuple[Type, object]
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """What `${...}` may name: a type and a typed value by dotted name, the environment and the secrets.
+
+    `arguments` are those of each scope: of the robot (the empty one), and of each instance of a part.
+    """
+
+    values: Mapping[str, Typed] = field(default_factory=dict)
+    environment: Mapping[str, str] = field(default_factory=dict)
+    secrets: Secrets | None = None
+    arguments: Mapping[str, Mapping[str, Typed]] = field(default_factory=dict)
+
+    def known(self, scope: str) -> Mapping[str, Typed]:
+        """Return all that a file of this scope may name in an expression."""
+        return {**self.values, **self.arguments.get(scope, {})}
+
+
+def names_of(robot: str, sim: bool, environment: Mapping[str, str], secrets: Secrets | None = None) -> Names:
+    """Return the names that every file of a robot knows."""
+    return Names({"robot.name": (types.TEXT, robot), "sim": (types.FLAG, sim)}, environment, secrets)
+
+
+def with_arguments(names: Names, arguments: Mapping[str, Typed], scope: str = "") -> Names:
+    """Return `names` with `args.NAME` for each argument of a scope; the value of a broken one is `BROKEN`."""
+    known = {f"args.{name}": value for name, value in arguments.items()}
+    return replace(names, arguments={**names.arguments, scope: known})
+
+
+@dataclass(frozen=True, slots=True)
+class NameTypes:
+    """The names as the static check of an expression sees them."""
+
+    names: Mapping[str, Typed]
+
+    def variable(self, name: str) -> Type | None:
+        """Return None: nothing that is known while the robot runs can be filled in."""
+        return None
+
+    def word(self, name: str) -> Type | None:
+        """Return the type of a name."""
+        return self.names[name][0] if name in self.names else None
+
+    def variables(self) -> Iterable[str]:
+        """Return nothing, see `variable`."""
+        return ()
+
+    def words(self) -> Iterable[str]:
+        """Return all names."""
+        return self.names
+
+
+@dataclass(frozen=True, slots=True)
+class NameValues:
+    """The names as the evaluation of an expression sees them: numbers in SI, lists and maps as plain data."""
+
+    names: Mapping[str, Typed]
+
+    def variable(self, name: str) -> object:
+        """Raise, since there is no such value."""
+        raise KeyError(name)
+
+    def word(self, name: str) -> object:
+        """Return the value of a name."""
+        value = self.names[name][1]
+        if isinstance(value, Quantity):
+            return value.value
+        return to_plain(value) if isinstance(value, Scalar | Sequence | tree.Mapping) else value
+
+    def age(self, name: str) -> float:
+        """Raise, since there is no such value."""
+        raise KeyError(name)
+
+    def is_new(self, name: str) -> bool:
+        """Raise, since there is no such value."""
+        raise KeyError(name)

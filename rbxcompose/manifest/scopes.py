@@ -1,0 +1,102 @@
+"""Arguments of the robot and of the instances of parts, and filling in what names them, each in its own scope."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rbxcompose.expressions.types import UNKNOWN
+from rbxcompose.findings import Related, Report, Span, kind
+from rbxcompose.manifest.arguments import Argument, read_argument
+from rbxcompose.manifest.fill import fill
+from rbxcompose.manifest.include import Instance
+from rbxcompose.manifest.layers import Composed, only
+from rbxcompose.manifest.names import Names, Typed, with_arguments
+from rbxcompose.manifest.sections import named_entries
+from rbxcompose.manifest.tree import Mapping
+from rbxcompose.manifest.validate import BROKEN, UNKNOWN_KEY
+
+NO_VALUE = kind(
+    "RBX1206",
+    """An argument without a value
+
+An argument gets its value from `default:`, a profile, or `--set args.NAME=VALUE`; that of a part from `with:`.
+
+Bad:
+```yaml
+args:
+  speed:
+    type: speed
+```
+Good:
+```yaml
+args:
+  speed:
+    type: speed
+    default: 0.3 m/s
+```
+""",
+)
+
+
+def fill_scopes(composed: Composed, names: Names, report: Report) -> tuple[Mapping, Mapping]:
+    """Return the robot's sections and its `include:` with every `${...}` filled in.
+
+    The arguments' own values come first: those of the robot, then those of each instance, which are given in the scope
+    of the file that includes it.
+    """
+    root = composed.root
+    arguments = fill(only(root, "args"), names, report)
+    values = {name: _own_value(name, one, report) for name, one in _declared(arguments, report).items()}
+    names = with_arguments(names, values)
+    include = fill(composed.include, names, report)
+    for instance in reversed(composed.instances):  # what includes stands behind what it includes
+        names = with_arguments(names, _given_values(instance, names, report), instance.name)
+    others = {name: entry for name, entry in root.entries.items() if name != "args"}
+    filled = {**arguments.entries, **fill(replace(root, entries=others), names, report).entries}
+    return replace(root, entries={name: filled[name] for name in root.entries}), include
+
+
+def _declared(section: Mapping, report: Report) -> dict[str, tuple[Argument | None, Span]]:
+    """Return the declarations of `args:` with the places of their names; None for one that has mistakes."""
+    return {
+        name: (read_argument(name, entry.value, ("args", name), report), entry.key.span)
+        for name, entry in named_entries(section, ("args",), report)
+    }
+
+
+def _own_value(name: str, declared: tuple[Argument | None, Span], report: Report) -> Typed:
+    argument, span = declared
+    if argument is None:
+        return UNKNOWN, BROKEN
+    if argument.default is None:
+        message = f"the argument '{name}' has no value"
+        report.add(NO_VALUE.at(span, message, help=f"give it a 'default:', or --set args.{name}=VALUE"))
+        return argument.type, BROKEN
+    return argument.type, argument.read(argument.default, report)
+
+
+def _given_values(instance: Instance, names: Names, report: Report) -> dict[str, Typed]:
+    """Return the values of a part's arguments: given by `with:`, else their defaults."""
+    declared = _declared(fill(instance.arguments, names, report), report)
+    given = fill(instance.given, names, report)
+    for name, entry in given.entries.items():
+        if name not in declared:
+            message = f"part '{instance.name}' has no argument '{name}'"
+            finding = UNKNOWN_KEY.misspelt(
+                entry.key.span, message, name, declared, "its arguments", taken=given.entries
+            )
+            report.add(finding)
+    values: dict[str, Typed] = {}
+    for name, (argument, span) in declared.items():
+        node = given.get(name) or (argument.default if argument else None)
+        if argument is None:
+            values[name] = (UNKNOWN, BROKEN)
+        elif node is None:
+            message = f"part '{instance.name}' needs a value for its argument '{name}'"
+            related = [Related(span, "declared here")]
+            help_text = f"give it one: 'with: {{{name}: ...}}'"
+            report.add(NO_VALUE.at(instance.span, message, help=help_text, related=related))
+            values[name] = (argument.type, BROKEN)
+        else:
+            values[name] = (argument.type, argument.read(node, report))
+    return values

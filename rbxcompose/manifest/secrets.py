@@ -1,0 +1,68 @@
+"""Secrets: text that a manifest names and never holds, `${secret.NAME}`."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from rbxcompose.config import Secret
+from rbxcompose.manifest.limits import SECRET
+
+FOLDER = "secrets"
+VARIABLE = "RBX_SECRET_"
+
+
+class NoSecretError(Exception):
+    """Raised when a secret cannot be had; `help` says what to do."""
+
+    def __init__(self, message: str, help: str) -> None:
+        super().__init__(message)
+        self.message = message
+        self.help = help
+
+
+@dataclass(frozen=True, slots=True)
+class Secrets:
+    """Where secrets are: the environment (`RBX_SECRET_NAME`), else the files `secrets/NAME` of a project."""
+
+    project: Path
+    environment: Mapping[str, str]
+
+    def get(self, name: str) -> Secret:
+        """Return a secret.
+
+        Raises:
+            NoSecretError: if it is not there, or others could read it.
+        """
+        value = self.environment.get(f"{VARIABLE}{name.upper()}")
+        return Secret(value if value is not None else self._read(name), name)
+
+    def _read(self, name: str) -> str:
+        shown = f"{FOLDER}/{name}"
+        try:
+            # O_NOFOLLOW: a link could lead anywhere. O_NONBLOCK: a pipe without a writer must not hold us up.
+            flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+            with open(os.open(self.project / FOLDER / name, flags), "rb") as file:
+                status = os.fstat(file.fileno())
+                if not stat.S_ISREG(status.st_mode):
+                    raise NoSecretError(f"'{shown}' is no regular file", f"put the secret into the file '{shown}'")
+                if stat.S_IMODE(status.st_mode) & 0o077 or status.st_uid != os.getuid():
+                    raise NoSecretError(f"others may read the secret in '{shown}'", f"chmod 600 {shown}")
+                data = file.read(SECRET + 1)
+        except OSError as error:
+            is_missing = error.errno in (errno.ENOENT, errno.ENOTDIR)
+            reason = "does not exist" if is_missing else f"cannot be read: {os.strerror(error.errno or 0)}"
+            message = f"the secret '{name}' is not there: the file '{shown}' {reason}"
+            raise NoSecretError(
+                message, f"put it into '{shown}' with mode 0600, or into the variable {VARIABLE}{name.upper()}"
+            ) from None
+        if len(data) > SECRET:
+            raise NoSecretError(f"'{shown}' is larger than {SECRET:,} bytes", "a secret is one short text")
+        try:
+            return data.decode("utf-8").removesuffix("\n").removesuffix("\r")
+        except UnicodeDecodeError:
+            raise NoSecretError(f"'{shown}' is not UTF-8 text", "write it as text, such as base64") from None

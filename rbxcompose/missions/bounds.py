@@ -1,0 +1,122 @@
+"""What can be known of a condition before it is asked: whether it holds always, never, or now and then."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rbxcompose.expressions.tree import (
+    Arithmetic,
+    Call,
+    Comparison,
+    Flag,
+    Junction,
+    Minus,
+    Node,
+    Not,
+    Number,
+    Variable,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """The least and the most that a value can be, both possible."""
+
+    least: float = -math.inf
+    most: float = math.inf
+
+
+ANYTHING = Bounds()
+NOT_BELOW_ZERO = Bounds(0.0)
+Known = Mapping[str, Bounds]  # what is known of `$names`
+
+_TURNED = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
+_MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+
+
+def truth(node: Node, known: Known) -> bool | None:
+    """Return whether a condition holds whatever happens, never holds (False), or may do either (None)."""
+    match node:
+        case Flag(value=value):
+            return value
+        case Not(operand=operand):
+            inner = truth(operand, known)
+            return None if inner is None else not inner
+        case Comparison(operator=operator, left=left, right=right):
+            return _compared(operator, bounds_of(left, known), bounds_of(right, known))
+        case Junction(operator=operator, operands=operands):
+            return _joined(operands, known, decides=operator == "or")
+    return None
+
+
+def _compared(operator: str, left: Bounds, right: Bounds) -> bool | None:
+    match operator:
+        case "<":
+            return True if left.most < right.least else False if left.least >= right.most else None
+        case "<=":
+            return True if left.most <= right.least else False if left.least > right.most else None
+        case ">" | ">=":
+            return _compared(_MIRRORED[operator], right, left)
+    apart = left.most < right.least or right.most < left.least
+    return None if not apart else operator == "!="
+
+
+def _joined(operands: tuple[Node, ...], known: Known, *, decides: bool) -> bool | None:
+    """Read from the left as it runs: an operand is asked only where those before it have not decided."""
+    is_open = False
+    for operand in operands:
+        found = truth(operand, known)
+        if found is decides:
+            return decides
+        is_open = is_open or found is None
+        known = narrowed(known, operand, holds=not decides)
+    return None if is_open else not decides
+
+
+def narrowed(known: Known, node: Node, *, holds: bool) -> Known:
+    """Return what is known where a comparison of a `$name` holds, or does not."""
+    if not isinstance(node, Comparison) or node.operator not in _TURNED:
+        return known
+    operator, name, limit = node.operator, node.left, bounds_of(node.right, known)
+    if not isinstance(name, Variable):
+        operator, name, limit = _MIRRORED[operator], node.right, bounds_of(node.left, known)
+    if not isinstance(name, Variable):
+        return known
+    operator = operator if holds else _TURNED[operator]
+    before = known.get(name.name, ANYTHING)
+    if operator in ("<", "<="):
+        return {**known, name.name: Bounds(before.least, min(before.most, limit.most))}
+    return {**known, name.name: Bounds(max(before.least, limit.least), before.most)}
+
+
+def bounds_of(node: Node, known: Known) -> Bounds:
+    """Return the bounds of a number; of anything else, that it can be anything."""
+    match node:
+        case Number(value=value):
+            return Bounds(value, value)
+        case Variable(name=name):
+            return known.get(name, ANYTHING)
+        case Minus(operand=operand):
+            inner = bounds_of(operand, known)
+            return Bounds(-inner.most, -inner.least)
+        case Arithmetic(operator=operator, left=left, right=right):
+            return _computed(operator, bounds_of(left, known), bounds_of(right, known))
+        case Call(function="distance" | "age" | "count" | "abs"):
+            return NOT_BELOW_ZERO
+    return ANYTHING
+
+
+def _computed(operator: str, left: Bounds, right: Bounds) -> Bounds:
+    match operator:
+        case "+":
+            return Bounds(left.least + right.least, left.most + right.most)
+        case "-":
+            return Bounds(left.least - right.most, left.most - right.least)
+    ends = (left.least, left.most, right.least, right.most)
+    if not all(map(math.isfinite, ends)) or (operator == "/" and right.least <= 0 <= right.most):
+        return ANYTHING
+    both = [(one, other) for one in ends[:2] for other in ends[2:]]
+    found = [one * other if operator == "*" else one / other for one, other in both]
+    return Bounds(min(found), max(found))

@@ -1,0 +1,55 @@
+"""Conditions of missions that are decided before anything runs, and what of the robot decides them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.expressions.check import check_condition
+from rbxcompose.expressions.types import FLAG
+from rbxcompose.findings import Related, Span
+from rbxcompose.manifest.tree import at
+from rbxcompose.missions.bounds import Bounds, truth
+from rbxcompose.missions.program import Asked
+from rbxcompose.missions.views import NodeScope, base_names, views
+from rbxcompose.missions.watching import POSE
+from rbxcompose.model.charging import batteries, constants
+from rbxcompose.model.robot import Robot, RobotMission
+
+FULL = Bounds(0.0, 1.0)  # what the level of a battery can be
+
+
+def decided(robot: Robot, mission: RobotMission) -> Iterator[tuple[Asked, bool]]:
+    """Yield the conditions about the running robot that always hold, or never do.
+
+    One that only compares what was written down is left out: it chooses between settings.
+    """
+    measured = {*robot.values, POSE}
+    known = {name: Bounds(value, value) for name, value in constants(mission).items() if isinstance(value, float)}
+    known |= dict.fromkeys(batteries(robot), FULL)
+    for asked, scope in _conditions(robot, mission):
+        is_measured = any(name.name in measured for name in asked.expression.names)
+        if is_measured and not check_condition(asked.expression, scope):
+            holds = truth(asked.expression.tree, known)
+            if holds is not None:
+                yield asked, holds
+
+
+def _conditions(robot: Robot, mission: RobotMission) -> Iterator[tuple[Asked, NodeScope]]:
+    program, names = mission.program, robot.names
+    for view in views(program, names):
+        yield from ((asked, view.scope) for asked in view.node.asked if asked.wanted == FLAG)
+    base = NodeScope(base_names(program, names), names.places)
+    yield from ((interrupt.when, base) for interrupt in program.interrupts)
+
+
+def blamed(robot: Robot, mission: RobotMission, asked: Asked) -> tuple[Span, list[Related]]:
+    """Return the place that makes a condition what it is: the one input that it reads, else the condition itself."""
+    inputs = {name.name for name in asked.expression.names} & mission.program.inputs.keys()
+    if len(inputs) != 1:
+        return asked.scalar.span, []
+    [name] = inputs
+    default = mission.program.inputs[name].default
+    path = ("missions", mission.name, "with", name)
+    if at(robot.manifest.root, path) is not None:
+        return robot.value(*path), [Related(asked.scalar.span, "the condition")]
+    return (default.span if default else asked.scalar.span), [Related(asked.scalar.span, "the condition")]

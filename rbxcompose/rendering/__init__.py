@@ -1,0 +1,1 @@
+"""Formats of findings, one file each. Pure: nothing is printed here."""

@@ -1,0 +1,60 @@
+"""The page of the docs about the corpus: each kind of misconfiguration, and whether `check` catches it."""
+
+from __future__ import annotations
+
+from tests.misconfig.corpus import Figures, Outcome, figures, kinds, outcomes
+
+TOP = """# Misconfigurations
+
+What can be wrong with a robot's files, by kind, and whether `rbxcompose check` tells it. Each kind has a folder of
+small robots in `tests/misconfig/wrong/`, each with its mistake marked in a comment. `tests/misconfig/right/` holds
+robots that are unusual and right; none of them may give a finding. This page is generated from what `check` says.
+"""
+HEADER = ("| kind | what is wrong | robots | findings | told |", "| --- | --- | ---: | --- | ---: |")
+CANNOT = (
+    "- Qualities of service that do not fit together: they belong to the type of a port, and both sides have the same.",
+    "- A parameter file for a node of another name, or in another namespace: settings stand with their component.",
+    "- A wrong frame in a goal: places are in `map`, and skills say which frames they look up.",
+    "- Mixed simulated and wall time: all of a robot runs on one clock.",
+    "- Fixed pauses in the place of a start order: a component starts when those in its `starts_after` are active.",
+)
+
+
+def page() -> str:
+    """Return the page as it should be."""
+    found = outcomes()
+    rows = [_row(kind, about, [one for one in found if one.case.kind == kind]) for kind, about in kinds().items()]
+    missed = [f"- `{one.case.name}`: {one.case.misses}" for one in found if one.case.misses]
+    otherwise = [f"- `{one.case.name}`" for one in found if one.is_elsewhere and one.case.kind]
+    sections = {
+        "Figures": _figures(figures()),
+        "Kinds": [*HEADER, *rows],
+        "Told otherwise than a user would want": otherwise,
+        "Not told": missed,
+        "What cannot be written": list(CANNOT),
+    }
+    return TOP + "".join(f"\n## {title}\n\n{chr(10).join(lines)}\n" for title, lines in sections.items())
+
+
+def _figures(count: Figures) -> list[str]:
+    return [
+        "| | |",
+        "| --- | ---: |",
+        f"| wrong robots | {count.wrong} |",
+        f"| told at the line of the mistake | {count.caught} ({count.caught / count.wrong:.0%}) |",
+        f"| told elsewhere, or otherwise than a user would want | {count.elsewhere} |",
+        f"| not told | {count.missed} |",
+        f"| findings that nobody wants, in wrong robots | {count.noise} |",
+        f"| kinds | {count.kinds} |",
+        f"| kinds of which every robot is told at its line | {count.kinds_caught} |",
+        f"| right robots | {count.right} |",
+        f"| right robots with a finding (false alarms) | {count.false_alarms} |",
+    ]
+
+
+def _row(kind: str, about: str, found: list[Outcome]) -> str:
+    codes = sorted({code for one in found for _, _, code in one.case.expected})
+    links = " ".join(f"[{code}](findings/{code}.md)" for code in codes)
+    caught = sum(one.is_caught for one in found)
+    told = "all" if caught == len(found) else f"{caught} of {len(found)}"
+    return f"| `{kind}` | {about} | {len(found)} | {links} | {told} |"

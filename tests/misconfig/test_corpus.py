@@ -1,0 +1,65 @@
+"""What the corpus of misconfigured robots promises: mistakes are told at their line, right robots give nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.checking import all_checks
+from rbxcompose.findings import KINDS
+from tests.misconfig.corpus import Case, cases, figures, kinds, run
+from tests.misconfig.page import page
+
+WRONG = [case for case in cases() if case.kind]
+RIGHT = [case for case in cases() if not case.kind]
+ELSEWHERE = {
+    "wrong_kind_of_node/retry": "any word may be a skill, so that it is taken for a second step",
+}
+"""Cases whose mistake is told, but not with the code or not at the line that a user would want."""
+
+
+@pytest.mark.parametrize("case", WRONG, ids=lambda case: case.name)
+def test_a_mistake_is_told_at_its_line_and_nothing_else_is(case: Case, tmp_path: Path) -> None:
+    outcome = run(case, tmp_path)
+    if case.misses:
+        assert outcome.found == frozenset(), "this is told now: say what is expected instead of '# misses:'"
+    elif case.name in ELSEWHERE:
+        assert outcome.is_elsewhere
+    else:
+        assert outcome.case.expected <= outcome.found
+        assert {code for _, _, code in outcome.noise} == case.known_noise
+
+
+@pytest.mark.parametrize("case", RIGHT, ids=lambda case: case.name)
+def test_an_unusual_robot_that_is_right_gives_no_finding(case: Case, tmp_path: Path) -> None:
+    assert run(case, tmp_path).found == frozenset()
+
+
+def test_the_corpus_is_as_large_as_it_says_and_most_of_it_is_caught() -> None:
+    found = figures()
+    assert found.wrong >= 120
+    assert found.right >= 30
+    assert found.caught >= 0.9 * found.wrong
+    assert found.kinds_caught >= 0.9 * found.kinds >= 45
+    assert found.false_alarms == 0
+
+
+def test_every_kind_is_described_and_has_a_case() -> None:
+    assert kinds().keys() == {case.kind for case in WRONG}
+
+
+def test_every_wrong_case_says_what_is_wrong_with_it() -> None:
+    assert [case.name for case in WRONG if bool(case.expected) == bool(case.misses)] == []
+
+
+def test_every_expected_code_exists_and_every_check_has_a_case() -> None:
+    all_checks()
+    expected = {code for case in WRONG for _, _, code in case.expected}
+    assert expected - KINDS.keys() == set()
+    assert {check.code for check in all_checks()} - expected == set()
+
+
+def test_the_page_of_the_corpus_is_up_to_date() -> None:
+    written = Path(__file__).parents[2] / "docs" / "misconfig.md"
+    assert written.read_text(encoding="utf-8") == page(), "run `make docs`"
