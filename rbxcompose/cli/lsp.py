@@ -1,0 +1,38 @@
+"""Speak the Language Server Protocol with an editor, over stdin and stdout.
+
+It tells mistakes as you type, completes, jumps to definitions and explains. An editor starts it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from importlib.util import find_spec
+
+from rbxcompose.cli.common.telling import refuse
+from rbxcompose.findings import kind
+
+NOT_INSTALLED = kind(
+    "RBX9010",
+    """The language server is not installed
+
+`rbxcompose lsp` needs a package that robots do not need, so that it is an extra of its own:
+`pip install 'rbxcompose[lsp]'`.
+""",
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("--stdio", action="store_true", help="what it does anyway; many editors say it")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve until the editor says that it is enough."""
+    if find_spec("pygls") is None:
+        help_text = "install it with: pip install 'rbxcompose[lsp]'"
+        return refuse(NOT_INSTALLED.at(None, "the language server is not installed", help=help_text))
+    from rbxcompose.lsp.server import make_server
+
+    make_server(os.environ).start_io()
+    return 0

@@ -1,0 +1,112 @@
+"""From what the core says to the types of the protocol."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lsprotocol import types
+from pygls.uris import from_fs_path, to_fs_path
+from pygls.workspace import PositionCodec
+from pygls.workspace.position_codec import ServerTextPosition
+
+from rbxcompose.findings import Finding, Severity, Span
+from rbxcompose.lsp.completion import Item
+from rbxcompose.lsp.fixes import Action, Change
+from rbxcompose.lsp.project import Project
+
+SOURCE = "rbxcompose"
+_SEVERITIES = {
+    Severity.ERROR: types.DiagnosticSeverity.Error,
+    Severity.WARNING: types.DiagnosticSeverity.Warning,
+}
+_SORTS = {
+    "key": types.CompletionItemKind.Property,
+    "name": types.CompletionItemKind.Reference,
+    "word": types.CompletionItemKind.EnumMember,
+    "unit": types.CompletionItemKind.Unit,
+    "variable": types.CompletionItemKind.Variable,
+}
+
+
+class Converter:
+    """Knows the units in which the editor counts, and how it calls its files."""
+
+    def __init__(self, project: Project, codec: PositionCodec) -> None:
+        self.project = project
+        self.codec = codec
+        self._uris: dict[Path, str] = {}
+
+    def path(self, uri: str) -> Path | None:
+        """Return the real path of a document, None if it is no file; its name is kept for the answers."""
+        written = to_fs_path(uri)
+        if not written:
+            return None
+        path = Path(written).resolve()
+        self._uris[path] = uri
+        return path
+
+    def uri(self, path: Path) -> str:
+        """Return how the editor calls a file."""
+        return self._uris.get(path) or from_fs_path(str(path)) or ""
+
+    def position(self, text: str, position: types.Position) -> tuple[int, int]:
+        """Return line and character from 0."""
+        found = self.codec.position_from_client_units(text.split("\n"), position)
+        return found.line, found.character
+
+    def range(self, text: str, start: tuple[int, int], end: tuple[int, int]) -> types.Range:
+        """Return a range of a text between two positions of ours."""
+        lines = text.split("\n")
+        first, last = (self.codec.position_to_client_units(lines, ServerTextPosition(*one)) for one in (start, end))
+        return types.Range(first, last)
+
+    def location(self, span: Span) -> types.Location:
+        """Return a place in a file."""
+        path = Path(span.file).resolve()
+        return types.Location(self.uri(path), self._span(self.project.text(path), span))
+
+    def _span(self, text: str, span: Span) -> types.Range:
+        return self.range(text, (span.line - 1, span.column - 1), (span.end_line - 1, span.end_column - 1))
+
+    def diagnostic(self, path: Path, finding: Finding) -> types.Diagnostic:
+        """Return a finding; what to do about it stands below what is wrong."""
+        words = f"{finding.message} ({finding.label})" if finding.label else finding.message
+        related = [types.DiagnosticRelatedInformation(self.location(one.span), one.message) for one in finding.related]
+        span = finding.span or Span("", 1, 1, 1, 1)
+        return types.Diagnostic(
+            range=self._span(self.project.text(path), span),
+            message=f"{words}\n{finding.help}" if finding.help else words,
+            severity=_SEVERITIES[finding.severity],
+            code=finding.code,
+            source=SOURCE,
+            related_information=related,
+        )
+
+    def item(self, text: str, place: tuple[int, int], number: int, item: Item) -> types.CompletionItem:
+        """Return a proposal at a place of a text; `number` is its turn."""
+        line, column = place
+        edit = types.TextEdit(self.range(text, (line, column - item.replaces), place), item.text)
+        about = types.MarkupContent(types.MarkupKind.Markdown, item.about) if item.about else None
+        return types.CompletionItem(
+            label=item.label,
+            kind=_SORTS[item.sort],
+            detail=item.detail or None,
+            documentation=about,
+            sort_text=f"{number:04}",
+            text_edit=edit,
+        )
+
+    def action(self, action: Action) -> types.CodeAction:
+        """Return a fix."""
+        changes = {self.uri(path): [self._edit(path, change)] for path, change in action.changes.items()}
+        path = Path(action.finding.span.file).resolve() if action.finding.span else None
+        return types.CodeAction(
+            title=action.title,
+            kind=types.CodeActionKind.QuickFix,
+            diagnostics=[self.diagnostic(path, action.finding)] if path else None,
+            is_preferred=action.is_safe,
+            edit=types.WorkspaceEdit(changes=changes),
+        )
+
+    def _edit(self, path: Path, change: Change) -> types.TextEdit:
+        return types.TextEdit(self.range(self.project.text(path), change.start, change.end), change.text)

@@ -1,0 +1,183 @@
+"""Where in a manifest a position is, also while the text around it is being typed and is no YAML yet.
+
+A mark is put into the text at the position, which is then read by the ordinary parser; where that cannot be, the line
+is completed first, and at last what follows is left out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from rbxcompose.lsp.quick import LARGE, near, quick_tree
+from rbxcompose.manifest.collection import paused_collection
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, Sequence, at
+
+MARK = "\ue000"  # a character for private use, so that it stands in no manifest
+_TOKEN_BEHIND = re.compile(r"[^\s:,\[\]{}#]*")
+_BEGINS_NODE = re.compile(r"(\s|- )*[^\s:]*")
+_COMMENT = re.compile(r"(^|\s)#")
+_COLON = re.compile(r"['\"]?\s*:(\s|$)")
+_BRACKETS = {"[": "]", "{": "}"}
+
+
+@dataclass(frozen=True, slots=True)
+class Cursor:
+    """A position in a manifest.
+
+    `path` leads to the map whose key it is in, or to the value that it is in; `before` and `after` are the parts of
+    that key or value on both sides. The tree is that of the text as it was completed, `siblings` are the other keys of
+    the map. `begins_item` tells that the key is the first of a list's item, so that it may become a plain word as well.
+    """
+
+    root: Mapping
+    path: Path
+    before: str
+    after: str
+    is_key: bool
+    has_colon: bool = False
+    begins_item: bool = False
+    siblings: frozenset[str] = frozenset()
+
+    @property
+    def around(self) -> Mapping:
+        """Return the tree without the key that is being written."""
+        tree = _without_key(self.root, self.path, self.text) if self.is_key else self.root
+        return tree if isinstance(tree, Mapping) else self.root
+
+    @property
+    def text(self) -> str:
+        """Return the key or value."""
+        return self.before + self.after
+
+    @property
+    def place(self) -> Path:
+        """Return the path of what is meant: for a key, that of its value."""
+        return (*self.path, self.text) if self.is_key else self.path
+
+
+def locate(text: str, line: int, column: int) -> Cursor | None:
+    """Return where a position (from 0) is, None for a comment or if the text before it cannot be read."""
+    lines = text.split("\n")
+    if line >= len(lines):
+        return None
+    before, after = lines[line][:column], lines[line][column:]
+    if _is_comment(before):
+        return None
+    with paused_collection():
+        # An alias needs its anchor, wherever that is.
+        around = near(lines, line) if len(lines) > LARGE and "&" not in text else lines
+        for candidate in _candidates(around, line, before, after):
+            tree = quick_tree(candidate)
+            if isinstance(tree, Mapping) and (found := _marked(tree, (), set())):
+                return _cursor(tree, *found, before, after)
+    return None
+
+
+def _cursor(tree: Mapping, path: Path, scalar: Scalar, is_key: bool, before: str, after: str) -> Cursor:
+    start, _, end = scalar.text.partition(MARK)
+    above = at(tree, path)
+    others = above.entries if is_key and isinstance(above, Mapping) else {}
+    root = _without_mark(tree, path)
+    begins = before.lstrip(" ").startswith("-") and _BEGINS_NODE.fullmatch(before) is not None
+    return Cursor(
+        root if isinstance(root, Mapping) else tree,
+        path,
+        start,
+        end,
+        is_key,
+        has_colon=_COLON.match(_after_token(after)) is not None,
+        begins_item=is_key and begins,
+        siblings=frozenset(others) - {scalar.text},
+    )
+
+
+def _without_key(node: Node, path: Path, key: str) -> Node:
+    """Return a tree without the key `key` of the map at `path`."""
+    match node:
+        case Sequence(items=items) if path:
+            changed = (_without_key(one, path[1:], key) if index == path[0] else one for index, one in enumerate(items))
+            return replace(node, items=tuple(changed))
+        case Mapping(entries=entries) if path:
+            entry = entries[str(path[0])]
+            inner = replace(entry, value=_without_key(entry.value, path[1:], key))
+            return replace(node, entries={**entries, str(path[0]): inner})
+        case Mapping(entries=entries):
+            return replace(node, entries={name: entry for name, entry in entries.items() if name != key})
+    return node
+
+
+def _without_mark(node: Node, path: Path) -> Node:
+    """Return the tree of the text as if the mark had never been in the scalar; `path` leads towards that."""
+    match node:
+        case Scalar(text=text):
+            return replace(node, text=text.replace(MARK, ""))
+        case Sequence(items=items) if path:
+            cleaned = (_without_mark(item, path[1:]) if index == path[0] else item for index, item in enumerate(items))
+            return replace(node, items=tuple(cleaned))
+        case Mapping(entries=entries) if path:
+            entry = entries[str(path[0])]
+            inner = replace(entry, value=_without_mark(entry.value, path[1:]))
+            return replace(node, entries={**entries, str(path[0]): inner})
+        case Mapping(entries=entries):
+            renamed: dict[str, Entry] = {}
+            for name, entry in entries.items():
+                own = name.replace(MARK, "")
+                renamed.setdefault(own, replace(entry, key=replace(entry.key, text=own)))
+            return replace(node, entries=renamed)
+    return node
+
+
+def _after_token(after: str) -> str:
+    match = _TOKEN_BEHIND.match(after)
+    return after[match.end() :] if match else after
+
+
+def _is_comment(before: str) -> bool:
+    found = _COMMENT.search(before)
+    return found is not None and before[: found.start()].count('"') % 2 == 0
+
+
+def _candidates(lines: list[str], line: int, before: str, after: str) -> Iterator[str]:
+    """Yield texts with the mark in them, the likeliest to be meant first."""
+    above, below = lines[:line], lines[line + 1 :]
+    rest = _after_token(after)
+    as_it_is = f"{before}{MARK}{after}"
+    as_key = f"{before}{MARK}{after[: len(after) - len(rest)]}: {rest}"
+    is_open = _BEGINS_NODE.fullmatch(before) is not None and (not rest.strip() or rest.lstrip().startswith("#"))
+    closed = f"{before}{MARK}{_closing(before)}"
+    ways = [as_key, as_it_is] if is_open else [as_it_is, closed]
+    for written in ways:
+        yield "\n".join([*above, written, *below])
+    for written in (*ways, closed):
+        yield "\n".join([*above, written])
+
+
+def _closing(before: str) -> str:
+    """Return the brackets that a line has opened and not closed."""
+    waiting: list[str] = []
+    for character in before:
+        if character in _BRACKETS:
+            waiting.append(_BRACKETS[character])
+        elif waiting and character == waiting[-1]:
+            waiting.pop()
+    return "".join(reversed(waiting))
+
+
+def _marked(node: Node, path: Path, seen: set[int]) -> tuple[Path, Scalar, bool] | None:
+    """Return the path, the scalar with the mark in it, and whether that is a key; what aliases repeat is seen once."""
+    if isinstance(node, Scalar):
+        return (path, node, False) if MARK in node.text else None
+    if id(node) in seen:
+        return None
+    seen.add(id(node))
+    if isinstance(node, Sequence):
+        found = (_marked(item, (*path, index), seen) for index, item in enumerate(node.items))
+        return next((one for one in found if one), None)
+    for name, entry in node.entries.items():
+        if MARK in name:
+            return path, entry.key, True
+        if below := _marked(entry.value, (*path, name), seen):
+            return below
+    return None

@@ -1,0 +1,90 @@
+"""Where what is named at a position is written: a place, a component, a value, the component of a skill, a file."""
+
+from __future__ import annotations
+
+import re
+
+from rbxcompose.findings import Span
+from rbxcompose.lsp.document import Document, Spot
+from rbxcompose.lsp.names import COMPONENT, PLACE, PORT, SECTIONS, SKILL, below_profile, named_by_key, named_by_value
+from rbxcompose.lsp.variables import variable_span
+from rbxcompose.manifest.files import resolve, shown_name
+from rbxcompose.manifest.tree import Path, at, key_span
+
+_FRONT = re.compile(r"(\$\{?\s*)?[A-Za-z0-9_.]*$")
+_BACK = re.compile(r"[A-Za-z0-9_.]*")
+_FILES = ("file", "part")  # keys whose values are paths
+
+
+def define(document: Document, line: int, column: int) -> Span | None:
+    """Return where what is named at a position (from 0) is written, or None."""
+    spot = document.at(line, column)
+    if spot is None:
+        return None
+    span = _file(spot) or _named(spot, word_at(spot))
+    return _here(spot, span) if span is not None and not span.file else span
+
+
+def word_at(spot: Spot) -> str:
+    """Return the name at a position, with `$` or `${` before it."""
+    front, back = _FRONT.search(spot.cursor.before), _BACK.match(spot.cursor.after)
+    return f"{front[0] if front else ''}{back[0] if back else ''}"
+
+
+def _here(spot: Spot, span: Span) -> Span:
+    """Return a place of the text with its file."""
+    return Span(shown_name(spot.document.path), span.line, span.column, span.end_line, span.end_column)
+
+
+def _file(spot: Spot) -> Span | None:
+    path = below_profile(spot.cursor.path)
+    is_path = path[:1] in (("missions",), ("include",)) and (len(path) == 2 or (len(path) == 3 and path[2] in _FILES))
+    if spot.document.is_mission or spot.cursor.is_key or not is_path:
+        return None
+    place = Span("", 1, 1, 1, 1)
+    found = resolve(spot.cursor.text, spot.document.path, place)
+    return Span(shown_name(found), 1, 1, 1, 1) if not hasattr(found, "code") else None
+
+
+def _named(spot: Spot, word: str) -> Span | None:
+    if word.startswith("${"):
+        name = word.removeprefix("${").strip()
+        return _own(spot, ("args", name.removeprefix("args."))) if name.startswith("args.") else None
+    if word.startswith("$"):
+        return variable_span(spot, word.removeprefix("$").partition(".")[0])
+    cursor = spot.cursor
+    if cursor.is_key:
+        kind = named_by_key(cursor.path, is_overlay=False)
+        return _skill(spot, word) if spot.document.is_mission else _of_kind(spot, kind, word)
+    kind = spot.guide.value(cursor.path).names or named_by_value(cursor.path)
+    if spot.document.is_mission:
+        return _of_kind(spot, PLACE, word) or _skill(spot, word)
+    return _of_kind(spot, kind, word)
+
+
+def _of_kind(spot: Spot, kind: str, word: str) -> Span | None:
+    if kind == SKILL:
+        return _skill(spot, word)
+    name = word.partition(".")[0] if kind == PORT else word
+    sections = SECTIONS.get(COMPONENT if kind == PORT else kind, ())
+    return next((span for section in sections if (span := _own(spot, (section, name)))), None)
+
+
+def _own(spot: Spot, path: Path) -> Span | None:
+    """Return the place of an entry: in the text itself, else in the composed robot."""
+    if not spot.document.is_mission and at(spot.cursor.root, path) is not None:
+        return key_span(spot.cursor.root, path)
+    robot = spot.known.robot
+    if robot is not None and at(robot.manifest.root, path) is not None:
+        return key_span(robot.manifest.root, path)
+    return None
+
+
+def _skill(spot: Spot, word: str) -> Span | None:
+    """Return the place of the component that offers a skill."""
+    robot = spot.known.robot
+    source = robot.skills.get(word) if robot else None
+    if robot is None or source is None:
+        return None
+    ends = (end for end in robot.ends if end.port.kind == "serves_action" and end.topic == source.topic)
+    return next((robot.part_span(end.instance) for end in ends), None)

@@ -1,0 +1,58 @@
+"""One manifest as an editor sees it: its text, its kind, the robot that it belongs to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rbxcompose.lsp.cursor import Cursor, locate
+from rbxcompose.lsp.guide import Guide
+from rbxcompose.lsp.names import Known
+from rbxcompose.lsp.project import MISSION, OVERLAY, kind_of
+from rbxcompose.model.robot import Robot
+from rbxcompose.schema.documents import MAKERS, installed_schema
+
+DEFAULT_KIND = "Robot"  # until the text says another
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A text, its file, and the robot that it is part of (as it was when it could last be read), if there is one."""
+
+    path: Path
+    text: str
+    robot: Robot | None = None
+
+    @property
+    def kind(self) -> str:
+        """Return the kind of manifest that has a schema; one that is not known is taken for a robot."""
+        written = kind_of(self.text)
+        return written if written in MAKERS else DEFAULT_KIND
+
+    @property
+    def is_mission(self) -> bool:
+        """Tell whether names are looked up while the robot runs."""
+        return self.kind == MISSION
+
+    @property
+    def is_overlay(self) -> bool:
+        """Tell whether its sections change those of a robot."""
+        return self.kind == OVERLAY
+
+    def at(self, line: int, column: int) -> Spot | None:
+        """Return what is at a position (from 0), None if nothing can be said of it."""
+        cursor = locate(self.text, line, column)
+        if cursor is None:
+            return None
+        known = Known(self.path, cursor.root, self.robot)
+        return Spot(self, cursor, known, Guide(installed_schema(self.kind), cursor.root, known.types))
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A position in a document, with all that tells what belongs there."""
+
+    document: Document
+    cursor: Cursor
+    known: Known
+    guide: Guide

@@ -1,0 +1,141 @@
+"""What may stand at a place of a manifest, read from its JSON Schema and what is written around the place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from rbxcompose.manifest.tree import Mapping as MappingNode
+from rbxcompose.manifest.tree import Node, Path, Scalar, at
+from rbxcompose.schema.scalars import DIMENSION, Schema
+from rbxcompose.schema.settle import DEFINITIONS
+from rbxcompose.units import DIMENSIONS, Dimension
+
+_DEEPEST = 12  # references and choices inside each other
+
+
+class Guide:
+    """The schema of one kind of manifest.
+
+    `types` are the types of the robot's components by name: an overlay does not repeat them.
+    """
+
+    def __init__(self, schema: Schema, root: MappingNode, types: Mapping[str, str]) -> None:
+        self.schema = schema
+        self.root = root
+        self.types = types
+
+    def keys(self, path: Path) -> dict[str, Schema]:
+        """Return what the map at `path` may have, by key; names that the user gives are not among them."""
+        shapes = [one for one in self._shapes(path) if "properties" in one]
+        closed = [one for one in shapes if one.get("additionalProperties") is False]
+        return {name: schema for one in closed or shapes for name, schema in one["properties"].items()}
+
+    def describe(self, path: Path) -> str:
+        """Return what the value at `path` is for."""
+        return next((one["description"] for one in self._last(path) if one.get("description")), "")
+
+    def value(self, path: Path) -> Value:
+        """Return what may stand at `path`."""
+        return Value([*self._shapes(path)])
+
+    def _shapes(self, path: Path) -> Iterator[Schema]:
+        node = at(self.root, path)
+        for schema in self._last(path):
+            yield from self._opened(schema, node, path)
+
+    def _last(self, path: Path) -> list[Schema]:
+        """Return the schemas of the place itself, before references and choices in them are opened."""
+        found = [self.schema]
+        for length, key in enumerate(path):
+            above = path[:length]
+            node = at(self.root, above)
+            opened = [one for schema in found for one in self._opened(schema, node, above)]
+            found = [inner for one in opened for inner in _below(one, key)]
+        return found
+
+    def _opened(self, schema: Schema, node: Node | None, path: Path, depth: int = 0) -> Iterator[Schema]:
+        """Yield a schema, and all that it stands for or that holds beside it."""
+        if depth > _DEEPEST:
+            return
+        yield schema
+        inner = [*schema.get("allOf", ()), *schema.get("anyOf", ())]
+        if "$ref" in schema:
+            inner.append(self.schema["definitions"][schema["$ref"].removeprefix(DEFINITIONS)])
+        if "if" in schema:
+            branch = "then" if self._holds(schema["if"], node, path) else "else"
+            inner.extend([schema[branch]] if branch in schema else [])
+        for one in inner:
+            yield from self._opened(one, node, path, depth + 1)
+
+    def _holds(self, condition: Schema, node: Node | None, path: Path) -> bool:
+        if "not" in condition:
+            return not any(self._holds(one, node, path) for one in condition["not"]["anyOf"])
+        wanted = {name: one.get("const") for name, one in condition.get("properties", {}).items()}
+        if not isinstance(node, MappingNode):
+            return False
+        if any(name not in node and name not in wanted for name in condition.get("required", ())):
+            return False
+        return all(self._word(node, name, path) == const for name, const in wanted.items())
+
+    def _word(self, node: MappingNode, name: str, path: Path) -> str:
+        value = node.get(name)
+        if value is None and name == "type" and path:
+            return self.types.get(str(path[-1]), "")
+        return value.text if isinstance(value, Scalar) else ""
+
+
+def _below(schema: Schema, key: str | int) -> Iterator[Schema]:
+    items, others = schema.get("items"), schema.get("additionalProperties")
+    if isinstance(key, int):
+        if isinstance(items, dict):
+            yield items
+    elif key in schema.get("properties", {}):
+        yield schema["properties"][key]
+    elif isinstance(others, dict):
+        yield others
+
+
+class Value:
+    """What may stand at one place."""
+
+    def __init__(self, shapes: list[Schema]) -> None:
+        self.shapes = shapes
+
+    def _first(self, key: str) -> Any:
+        return next((one[key] for one in self.shapes if key in one), None)
+
+    @property
+    def dimension(self) -> Dimension | None:
+        """Return what a quantity here measures."""
+        name = self._first(DIMENSION)
+        return DIMENSIONS[name] if name else None
+
+    @property
+    def names(self) -> str:
+        """Return of what the name of something stands here: `place`; else nothing."""
+        return str(self._first("x-names") or "")
+
+    @property
+    def default(self) -> object:
+        """Return what holds if nothing is written."""
+        return self._first("default")
+
+    @property
+    def examples(self) -> list[str]:
+        """Return examples that are one word or number."""
+        found = [sample for one in self.shapes for sample in one.get("examples", ())]
+        return list(dict.fromkeys(str(sample) for sample in found if isinstance(sample, str | int | float)))
+
+    @property
+    def words(self) -> dict[str, str]:
+        """Return the words that may stand here, each with what it means."""
+        found: dict[str, str] = {}
+        for one in self.shapes:
+            about = one.get("enumDescriptions") or [""] * len(one.get("enum", ()))
+            found |= {str(word): text for word, text in zip(one.get("enum", ()), about, strict=True) if word}
+            if "const" in one:
+                found.setdefault(str(one["const"]), one.get("description", ""))
+            if "boolean" in one.get("type", ()) and "number" not in one.get("type", ()):
+                found |= {"true": "", "false": ""} if "minLength" not in one else {}
+        return found

@@ -1,0 +1,148 @@
+"""The robots that an editor has to do with: compiled with the texts as they are being typed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.findings import Finding, Report
+from rbxcompose.manifest.files import ROBOT_FILE, project_of, shown_name
+from rbxcompose.manifest.reader import Texts, read_file
+from rbxcompose.manifest.robot_file import read_mission
+from rbxcompose.missions.reading import read_program
+from rbxcompose.model.robot import Robot
+
+ROBOT, MISSION, OVERLAY = "Robot", "Mission", "Overlay"
+_KIND = re.compile(r"^kind:[ ]*[\"']?(\w+)", re.MULTILINE)
+_HEADER = re.compile(r"^rbx:", re.MULTILINE)
+_MOST_ROBOTS = 200  # of one project, that are looked at
+_BEGINNING = 4_000  # characters in which the header of a manifest stands
+
+Found = dict[Path, list[Finding]]
+
+
+def kind_of(text: str) -> str:
+    """Return what a manifest says that it describes, or nothing."""
+    match = _KIND.search(text[:_BEGINNING])
+    return match[1] if match else ""
+
+
+@dataclass(slots=True)
+class _Watched:
+    """A robot: its newest compilation, the files of that, and the newest one from which a robot came."""
+
+    compilation: Compilation
+    files: frozenset[Path]
+    robot: Robot | None
+
+
+@dataclass(slots=True)
+class Project:
+    """All open texts, and the robots that they are part of."""
+
+    environment: Mapping[str, str]
+    unsaved: dict[Path, str] = field(default_factory=dict)
+    _watched: dict[Path, _Watched] = field(default_factory=dict)
+    _alone: Found = field(default_factory=dict)  # findings in files that belong to no robot
+
+    def has(self, path: Path, text: str) -> bool:
+        """Tell whether a text is one of ours: editors send every YAML file."""
+        return _HEADER.search(text[:_BEGINNING]) is not None or bool(self._concerned(path))
+
+    def text(self, path: Path) -> str:
+        """Return the text of a file as the editor has it, else as it is saved; nothing if it cannot be read."""
+        if path in self.unsaved:
+            return self.unsaved[path]
+        sources: dict[str, str] = {}
+        read_file(path, str(path), sources)
+        return sources.get(str(path), "")
+
+    def change(self, path: Path, text: str | None) -> Found:
+        """Take a new text (None: the saved one counts again) and return the findings of all files concerned.
+
+        A file without findings has an empty list, so that what was shown of it can be taken away.
+        """
+        if text is None:
+            self.unsaved.pop(path, None)
+        else:
+            self.unsaved[path] = text
+        before = {file for robot in self._concerned(path) for file in self._watched[robot].files}
+        self._alone.pop(path, None)
+        robots = self._robots_of(path)
+        for robot in robots:
+            self._compile(robot)
+        if not robots:
+            self._alone[path] = self._lone_findings(path)
+        after = {file for robot in robots for file in self._watched[robot].files}
+        return {file: self.findings(file) for file in sorted({path} | before | after)}
+
+    def findings(self, path: Path) -> list[Finding]:
+        """Return what is known to be wrong in a file, whichever robot it was found in."""
+        found = [finding for robot in self._watched for finding in self._of(robot, path)]
+        return list(dict.fromkeys([*found, *self._alone.get(path, ())]))
+
+    def robot_of(self, path: Path) -> Robot | None:
+        """Return a robot that a file belongs to, as it was when it could last be read."""
+        robots = self._concerned(path) or self._robots_of(path)
+        if not robots and (base := _beside(path)) and kind_of(self.text(path)) == OVERLAY:
+            robots = self._robots_of(base)
+        return next((robot for one in robots if one in self._watched and (robot := self._watched[one].robot)), None)
+
+    def _of(self, robot: Path, path: Path) -> Iterator[Finding]:
+        for finding in self._watched[robot].compilation.report:
+            place = Path(finding.span.file).resolve() if finding.span else robot
+            if place == path:
+                yield finding
+
+    def _concerned(self, path: Path) -> list[Path]:
+        return [robot for robot, watched in self._watched.items() if path in watched.files]
+
+    def _robots_of(self, path: Path) -> list[Path]:
+        """Return the robots that a file is part of: itself, or those of its project that use it."""
+        kind = kind_of(self.text(path))
+        if kind == ROBOT or path in self._watched:
+            return [path]
+        for robot in _robot_files(path):
+            if robot not in self._watched and kind_of(self.text(robot)) == ROBOT:
+                self._compile(robot)
+        return self._concerned(path)
+
+    def _compile(self, path: Path) -> None:
+        made = compile_robot(str(path), environment=self.environment, unsaved=self.unsaved)
+        before = self._watched.get(path)
+        files = frozenset({path, *(Path(shown).resolve() for shown in made.sources)})
+        # While a text cannot be read, names of the robot as it was serve best.
+        robot = made.robot or (before.robot if before else None)
+        self._watched[path] = _Watched(made, files, robot)
+
+    def _lone_findings(self, path: Path) -> list[Finding]:
+        report, sources = Report(), Texts(self.unsaved)
+        if kind_of(self.text(path)) == MISSION:
+            root = read_mission(path, robot="", report=report, sources=sources, environment=self.environment)
+            if root is not None:
+                read_program(root, report)
+        elif kind_of(self.text(path)) == OVERLAY and (base := _beside(path)):
+            return self._overlay_findings(path, base)
+        else:
+            report.extend(read_file(path, shown_name(path), sources)[1])
+        return list(report)
+
+    def _overlay_findings(self, path: Path, base: Path) -> list[Finding]:
+        """Return what is wrong in an overlay when it is laid over the robot beside it."""
+        made = compile_robot(str(base), overlays=[str(path)], environment=self.environment, unsaved=self.unsaved)
+        return [one for one in made.report if one.span and Path(one.span.file).resolve() == path]
+
+
+def _beside(path: Path) -> Path | None:
+    """Return the robot beside an overlay, which is taken for the one that it is for."""
+    robot = path.parent / ROBOT_FILE
+    return robot if robot.is_file() else None
+
+
+def _robot_files(path: Path) -> list[Path]:
+    folder = project_of(path) / "robots"
+    found = sorted(folder.rglob("*.yaml"))[:_MOST_ROBOTS] if folder.is_dir() else []
+    return [robot.resolve() for robot in found]

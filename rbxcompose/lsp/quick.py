@@ -1,0 +1,82 @@
+"""A manifest's tree in a hurry: without any check, since a person waits for each key stroke."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from itertools import pairwise
+
+import yaml
+
+from rbxcompose.findings import Span
+from rbxcompose.manifest.composing import compose
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+
+LARGE = 300  # lines; of longer manifests only what is near the position is read
+SMALL = 100  # lines; a section of that size is always read
+_MERGE = "<<"
+_SECTION = re.compile(r"[A-Za-z_\"']")
+_ENTRY = re.compile(r"( +)[^\s#]")
+
+
+def quick_tree(text: str) -> Node | None:
+    """Return the tree of a text, None if it is no YAML; spans have no file, a key that is written twice counts last.
+
+    What an alias repeats is the same object again; one that leads back to what it lies in is an empty map.
+    """
+    root, _ = compose(text, "")
+    return None if root is None else _node(root, {})
+
+
+def _node(node: yaml.Node, done: dict[int, Node]) -> Node:
+    start, end = node.start_mark, node.end_mark
+    span = Span("", start.line + 1, start.column + 1, end.line + 1, end.column + 1)
+    if isinstance(node, yaml.ScalarNode):
+        return Scalar(node.value, span, not node.style)
+    if id(node) in done:
+        return done[id(node)]
+    done[id(node)] = Mapping({}, span)
+    if isinstance(node, yaml.SequenceNode):
+        made: Node = Sequence(tuple(_node(item, done) for item in node.value), span)
+    else:
+        made = Mapping(_entries(node.value, done), span)
+    done[id(node)] = made
+    return made
+
+
+def _entries(pairs: list[tuple[yaml.Node, yaml.Node]], done: dict[int, Node]) -> dict[str, Entry]:
+    own: dict[str, Entry] = {}
+    merged: dict[str, Entry] = {}
+    for key_node, value_node in pairs:
+        key, value = _node(key_node, done), _node(value_node, done)
+        if isinstance(key, Scalar) and key.text == _MERGE and key.plain and isinstance(value, Mapping):
+            merged |= value.entries
+        elif isinstance(key, Scalar):
+            own[key.text] = Entry(key, value)
+    return {**merged, **own}
+
+
+def near(lines: list[str], line: int) -> list[str]:
+    """Return the lines of a manifest with those left empty that are not needed to know what is at `line` (from 0).
+
+    Kept are small sections, and of a large one the entry that the line is in: other names are those of the robot.
+    """
+    starts = [number for number, text in enumerate(lines) if _SECTION.match(text)]
+    kept = set(range(starts[0] if starts else 0))
+    for start, end in pairwise([*starts, len(lines)]):
+        if end - start <= SMALL:
+            kept.update(range(start, end))
+        elif start <= line < end:
+            kept.update(_entry(lines, start, end, line))
+    return [text if number in kept else "" for number, text in enumerate(lines)]
+
+
+def _entry(lines: list[str], start: int, end: int, line: int) -> Iterator[int]:
+    """Yield the lines of the entry of a section that `line` is in, and that of the section's name."""
+    yield start
+    first = next((match for text in lines[start + 1 : end] if (match := _ENTRY.match(text))), None)
+    indent = first[1] if first else ""
+    entries = [n for n in range(start + 1, end) if (match := _ENTRY.match(lines[n])) and match[1] == indent]
+    for begin, after in pairwise([start + 1, *entries, end]):
+        if begin <= line < after:
+            yield from range(begin, after)

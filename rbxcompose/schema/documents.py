@@ -1,0 +1,53 @@
+"""The JSON Schema of each kind of manifest, and the files in `schemas/` that editors read.
+
+`python -m rbxcompose.schema.documents FOLDER` writes them; a test fails when one is out of date.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from pathlib import Path
+
+from rbxcompose.schema.mission import mission_schema
+from rbxcompose.schema.robot import overlay_schema, part_schema, robot_schema
+from rbxcompose.schema.scalars import Schema
+from rbxcompose.sdk import registry
+
+MAKERS: Mapping[str, Callable[[Iterable[str]], Schema]] = {
+    "Robot": robot_schema,
+    "Part": part_schema,
+    "Overlay": overlay_schema,
+    "Mission": mission_schema,
+}
+"""How the schema of a kind is made from the names of component types."""
+
+
+@cache
+def installed_schema(kind: str) -> Schema:
+    """Return the schema of a kind of manifest with all component types that are installed; not to be changed."""
+    return MAKERS[kind](registry.component_names())
+
+
+def as_text(schema: Schema) -> str:
+    """Return a schema as the text of its file."""
+    return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
+
+
+def files() -> dict[str, str]:
+    """Return file name -> text of all schemas, with the component types that ship with the package."""
+    shipped = sorted(registry.PLUGINS.shipped)
+    return {f"{kind.lower()}.schema.json": as_text(make(shipped)) for kind, make in MAKERS.items()}
+
+
+def main(folder: Path) -> None:
+    """Write all schemas into `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in files().items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

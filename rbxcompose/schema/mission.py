@@ -1,0 +1,133 @@
+"""Schema of a mission's file: nodes by kind, modifiers, the skills of the component types that are known."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from rbxcompose.config import Name
+from rbxcompose.expressions.types import FLAG, TYPES
+from rbxcompose.manifest.arguments import ArgumentModel
+from rbxcompose.manifest.models import Header
+from rbxcompose.missions.goals import skill_of
+from rbxcompose.missions.program import Skill
+from rbxcompose.missions.reading import AFTERWARDS, INTERRUPT_KEYS, KEYS
+from rbxcompose.missions.registry import kinds
+from rbxcompose.schema.asking import (
+    ITEM_NAME,
+    NODE,
+    argument_schema,
+    first_line,
+    kind_schema,
+    modifier_schemas,
+)
+from rbxcompose.schema.robot import document
+from rbxcompose.schema.scalars import Schema, computed
+from rbxcompose.schema.settle import schemas_of
+from rbxcompose.sdk.ports import ServesAction
+from rbxcompose.sdk.registry import component_type
+
+ANY_NODE = "What is done: a skill, a kind of node with its settings, or a list of nodes, which is a sequence."
+NODE_NAME: Schema = {
+    **ITEM_NAME,
+    "description": "Names the node for viewers, tests and logs; a name belongs to one node only.",
+}
+_ABOUT = {
+    "inputs": "What is given to the mission when it starts: typed values by name.",
+    "data": "Values of the mission's own by name, with what they are at the start; `set` changes them.",
+    "interrupts": "Conditions that cut the mission short, by name; the first one that holds wins.",
+    "rate": "How often conditions are asked that nothing announces.",
+    "do": "What the mission does.",
+    "when": "The condition that cuts the mission short.",
+    "reaction": "What is done then.",
+    "afterwards": "What comes after the reaction: `continue` starts again what was cut short.",
+}
+
+
+class MissionFile(Header):
+    """A mission: what the robot does, as a tree of nodes."""
+
+
+def mission_schema(types: Iterable[str]) -> Schema:
+    """Return the schema of a mission's file for robots that may use these types of components."""
+    schemas, definitions = schemas_of({"inputs": dict[Name, ArgumentModel]})
+    properties: dict[str, Schema] = {
+        "inputs": {**schemas["inputs"], "type": ["object", "null"]},
+        "data": {"type": ["object", "null"], "propertyNames": ITEM_NAME},
+        "interrupts": {"type": ["object", "null"], "propertyNames": ITEM_NAME, "additionalProperties": _interrupt()},
+        "rate": computed(TYPES["frequency"]),
+        "do": {"allOf": [NODE]},
+    }
+    made = {key: {**properties[key], "description": _ABOUT[key]} for key in KEYS if key in properties}
+    schema = document("Mission", MissionFile, made, definitions | _nodes(types))
+    return {**schema, "required": [*schema["required"], "do"]}
+
+
+def _interrupt() -> Schema:
+    properties = {
+        "when": {**computed(FLAG), "description": _ABOUT["when"]},
+        "do": {"allOf": [NODE], "description": _ABOUT["reaction"]},
+        "afterwards": {"enum": list(AFTERWARDS), "default": AFTERWARDS[0], "description": _ABOUT["afterwards"]},
+    }
+    return {
+        "type": "object",
+        "description": "One condition, and what is done when it holds.",
+        "properties": {key: properties[key] for key in INTERRUPT_KEYS},
+        "required": ["when"],
+        "additionalProperties": False,
+    }
+
+
+def _nodes(types: Iterable[str]) -> dict[str, Schema]:
+    """Return the definitions of a node and of a list of nodes."""
+    anywhere = {"name": NODE_NAME, **modifier_schemas()}
+    known = {name: _skill(skill, about) for name, (skill, about) in skills_of(types).items()}
+    words: dict[str, Schema] = {}
+    chosen = []
+    for name, kind in kinds().items():
+        keys, needed = kind_schema(kind)
+        words[name] = keys[name]
+        closed = {"properties": {**keys, **anywhere}, "required": needed, "additionalProperties": False}
+        chosen.append({"if": {"required": [name]}, "then": closed})
+    # What may be chosen stands apart, so that editors do not propose a second step beside the one that is there.
+    is_open = {"not": {"anyOf": [one["if"] for one in chosen]}}
+    chosen.append({"if": is_open, "then": {"properties": {**words, **known}}})
+    word: Schema = {"type": "string", "minLength": 1, "examples": list(known)}
+    steps: Schema = {"type": "array", "minItems": 1, "items": NODE}
+    mapping = {"type": "object", "minProperties": 1, "properties": anywhere, "allOf": chosen}
+    # One schema with several types, not a choice of schemas: editors then tell the mistake of the type that is there.
+    node = {**word, **steps, **mapping, "type": ["string", "array", "object"], "description": ANY_NODE}
+    return {"node": node, "steps": {**steps, "description": "Nodes, one after the other."}}
+
+
+def _skill(skill: Skill, about: str) -> Schema:
+    """Return the schema of what stands behind the name of a skill: its main argument, or a map of several."""
+    arguments = {
+        name: {**argument_schema(wanted), "description": f"Argument of `{skill.name}`: {wanted.phrase}."}
+        for name, wanted in skill.arguments.items()
+    }
+    single = argument_schema(skill.arguments[skill.main]) if skill.main else {}
+    several = {"type": "object", "properties": arguments, "additionalProperties": False}
+    notes = {key: single[key] for key in ("x-names",) if key in single}
+    empty = [] if skill.required else [{"type": "null"}]
+    word = {**single, "type": [name for name in single.get("type", ()) if name != "object"]}
+    return {"anyOf": [*([word] if single else []), several, *empty], "description": about, **notes}
+
+
+def skills_of(types: Iterable[str]) -> dict[str, tuple[Skill, str]]:
+    """Return the skills that components of these types offer, each with what it does."""
+    found = {}
+    for name in sorted(types):
+        cls = component_type(name)
+        for port in _actions(cls):
+            if port.interface is not None:
+                skill = skill_of(port.interface, port.topic.rsplit("/", 1)[-1], port.claims, port.restartable)
+                found[skill.name] = (skill, f"Skill of `{name}`: {first_line(cls.__doc__)}")
+    return found
+
+
+def _actions(cls: type[Any]) -> Iterator[ServesAction[Any, Any, Any]]:
+    for _, port in inspect.getmembers(cls):
+        if isinstance(port, ServesAction):
+            yield port

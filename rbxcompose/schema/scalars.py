@@ -1,0 +1,83 @@
+"""Schemas of what stands in one scalar: quantities with units, expressions, names, and `${...}` in place of any."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from rbxcompose.expressions.types import Type, TypeKind
+from rbxcompose.units import NUMBER_TEXT, UNITS, Dimension, bare_number_help, example
+
+Schema = dict[str, Any]
+
+DIMENSION = "x-dimension"  # a keyword of ours: what a value measures
+FILLED = r"\$\{"  # text with this in it gets its value when the files are put together
+FILL: Schema = {"type": "string", "pattern": FILLED}
+COMPUTED = r"[$(*/+]|\s-\s"  # text with this in it is computed while the robot runs
+_PLAIN = {"integer": "a whole number", "number": "a number", "boolean": "true or false"}
+_NOTES = ("description", "default", "examples", "x-names")
+
+
+def quantity(dimension: Dimension) -> Schema:
+    """Return the schema of a number with a unit of `dimension`, or a bare number where that means SI."""
+    return {
+        "type": _types(dimension),
+        "pattern": f"{_number_with_unit(dimension)}|{FILLED}",
+        **_told(dimension),
+    }
+
+
+def computed(wanted: Type, what: str = "") -> Schema:
+    """Return the schema of an expression whose value must be of the type `wanted`."""
+    if wanted.kind is TypeKind.FLAG:
+        return {"type": ["string", "boolean"], "minLength": 1}
+    if wanted.kind is TypeKind.COUNT:
+        message = f"must be {what}" if what else "must be a whole number"
+        return {"type": ["integer", "string"], "pattern": COMPUTED, **_complaint(message), "minimum": 0}
+    if wanted.kind is TypeKind.QUANTITY and wanted.dimension:
+        dimension = wanted.dimension
+        pattern = f"{_number_with_unit(dimension)}|{COMPUTED}"
+        return {"type": _types(dimension), "pattern": pattern, **_told(dimension)}
+    return {"type": ["string", "number", "boolean"]}
+
+
+def units_of(dimension: Dimension) -> list[str]:
+    """Return the units of a dimension, the base unit first."""
+    return [name for name, unit in UNITS.items() if unit.dimension == dimension]
+
+
+def _types(dimension: Dimension) -> list[str]:
+    return ["string"] if bare_number_help(dimension) else ["string", "number"]
+
+
+def _told(dimension: Dimension) -> Schema:
+    sample = example(dimension)
+    message = f"must be {dimension.phrase}, such as '{sample}'"
+    return {**_complaint(message), "examples": [sample], DIMENSION: dimension.name}
+
+
+def _complaint(message: str) -> Schema:
+    """Return what editors say of a value of another type or form."""
+    return {"errorMessage": message, "patternErrorMessage": message}
+
+
+def _number_with_unit(dimension: Dimension) -> str:
+    units = "|".join(re.escape(unit) for unit in units_of(dimension))
+    unit = f"({units}){'' if bare_number_help(dimension) else '?'}" if units else ""
+    return rf"^\s*[+-]?{NUMBER_TEXT}\s*{unit}\s*$"
+
+
+def or_filled(schema: Schema) -> Schema:
+    """Return the schema of what `schema` takes, or of a `${...}` that stands for it."""
+    notes = {key: schema[key] for key in _NOTES if key in schema}
+    rest = {key: value for key, value in schema.items() if key not in _NOTES}
+    types = rest.get("type")
+    if "enum" in rest or "const" in rest or types in ("array", "object"):
+        return {"anyOf": [rest, FILL], **notes}
+    if types == "string":
+        if "pattern" in rest:
+            return {**rest, "pattern": f"({rest['pattern']})|{FILLED}", **notes}
+        return {**rest, "type": ["string", "number", "boolean"], **notes}  # a text takes its scalar as written
+    if types not in _PLAIN:
+        return schema
+    return {**rest, "type": [types, "string"], "pattern": FILLED, **_complaint(f"must be {_PLAIN[types]}"), **notes}

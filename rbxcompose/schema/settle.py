@@ -1,0 +1,96 @@
+"""From pydantic's JSON Schema to that of a manifest: draft 7, quantities with units, `${...}` where a scalar is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import TypeAdapter
+
+from rbxcompose.schema.scalars import DIMENSION, Schema, or_filled, quantity
+from rbxcompose.units import DIMENSIONS, format_quantity
+
+DEFINITIONS = "#/definitions/"
+_SIDE: Literal["validation"] = "validation"
+_NOTHING: tuple[Any, ...] = (None, {}, [], "")
+
+
+def schemas_of(types: Mapping[str, Any]) -> tuple[dict[str, Schema], dict[str, Schema]]:
+    """Return the schema of each type by its key, and the definitions that they share."""
+    adapters = [(key, _SIDE, TypeAdapter(type_)) for key, type_ in types.items()]
+    raw, shared = TypeAdapter.json_schemas(adapters, ref_template=DEFINITIONS + "{model}")
+    definitions = {name: settled(one) for name, one in shared.get("$defs", {}).items()}
+    return {key: settled(raw[key, _SIDE]) for key in types}, definitions
+
+
+def opened(schema: Schema, definitions: Mapping[str, Schema]) -> Schema:
+    """Return the definition that a schema refers to, or the schema itself."""
+    name = schema.get("$ref", "").removeprefix(DEFINITIONS)
+    return definitions[name] if name else schema
+
+
+def settled(raw: Schema) -> Schema:
+    """Return one of pydantic's schemas as that of a manifest."""
+    raw = {key: value for key, value in raw.items() if key != "title"}
+    if raw.get("default", 0) in _NOTHING:
+        del raw["default"]
+    if DIMENSION in raw:
+        return _quantity(raw)
+    if "anyOf" in raw:
+        return _any_of(raw)
+    if "$ref" in raw:  # draft 7 sees nothing of what stands beside a reference
+        notes = {key: value for key, value in raw.items() if key != "$ref"}
+        return {"allOf": [{"$ref": raw["$ref"]}], **notes} if notes else raw
+    match raw.get("type"):
+        case "object" if "properties" in raw:
+            return {**raw, "properties": {name: settled(one) for name, one in raw["properties"].items()}}
+        case "object":
+            return _map(raw)
+        case "array":
+            return or_filled(_list(raw))
+        case None:
+            return raw
+    return or_filled(raw)
+
+
+def _quantity(raw: Schema) -> Schema:
+    dimension = DIMENSIONS[raw[DIMENSION]]
+    made = quantity(dimension)
+    made |= {key: raw[key] for key in ("description",) if key in raw}
+    if "default" in raw:
+        made["default"] = format_quantity(raw["default"], dimension)
+    return made
+
+
+def _any_of(raw: Schema) -> Schema:
+    """Return a choice between schemas; one that may be empty is a single schema with one more type."""
+    members = [settled(one) for one in raw["anyOf"] if one != {"type": "null"}]
+    rest = {key: value for key, value in raw.items() if key != "anyOf"}
+    is_optional = len(members) < len(raw["anyOf"])
+    if is_optional and len(members) == 1 and "type" in members[0]:
+        return {**members[0], "type": [*_listed(members[0]["type"]), "null"], **rest}
+    return {"anyOf": [*members, *([{"type": "null"}] if is_optional else [])], **rest}
+
+
+def _listed(types: str | list[str]) -> list[str]:
+    return [types] if isinstance(types, str) else types
+
+
+def _map(raw: Schema) -> Schema:
+    """Return a map from names: the pattern of the names applies to the keys, so that a wrong one is told as such."""
+    made = {key: value for key, value in raw.items() if key != "patternProperties"}
+    for pattern, entry in raw.get("patternProperties", {}).items():
+        made["additionalProperties"] = entry
+        made["propertyNames"] = {"pattern": pattern, **raw.get("propertyNames", {})}
+    if isinstance(made.get("additionalProperties"), dict):
+        made["additionalProperties"] = settled(made["additionalProperties"])
+    return made
+
+
+def _list(raw: Schema) -> Schema:
+    made = {key: value for key, value in raw.items() if key != "prefixItems"}
+    if "prefixItems" in raw:
+        made["items"] = [settled(one) for one in raw["prefixItems"]]
+    elif "items" in raw:
+        made["items"] = settled(raw["items"])
+    return made

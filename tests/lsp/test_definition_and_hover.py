@@ -1,0 +1,83 @@
+"""Jumps lead to where something is written; hovers tell what it is and where its value is from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ROOT
+from tests.lsp.places import BATTERY, PATROL, ROBOT, TWINS, Editor, line_of
+
+
+@pytest.fixture(scope="module")
+def editor() -> Editor:
+    return Editor()
+
+
+@pytest.mark.parametrize(
+    ("path", "words", "offset", "target", "there"),
+    [
+        (ROBOT, "dock: dock", 7, ROBOT, "  dock: {"),
+        (ROBOT, "from: go_to", 8, ROBOT, "  go_to:\n"),
+        (ROBOT, "battery.battery_level", 3, ROBOT, "  battery:\n    type"),
+        (ROBOT, "${args.speed}", 9, ROBOT, "  speed:\n"),
+        (ROBOT, "../../missions/patrol.yaml", 8, PATROL, "# yaml-language-server"),
+        (ROBOT, "start: patrol", 9, ROBOT, "  patrol: ../.."),
+        (ROBOT, "go_to, cmd_vel]", 9, ROBOT, "  cmd_vel:\n"),
+        (PATROL, "go_to: dock", 8, ROBOT, "  dock: {"),
+        (PATROL, "go_to: dock", 2, ROBOT, "  go_to:\n"),
+        (PATROL, "- recharge", 5, ROBOT, "  charger:\n"),
+        (PATROL, "$battery", 3, ROBOT, "  battery: battery."),
+        (PATROL, "$low", 2, PATROL, "  low:\n"),
+        (PATROL, "$corner", 3, PATROL, "for: corner"),
+        (PATROL, "corner_2", 3, ROBOT, "  corner_2: {"),
+        (TWINS, "part: rbx:parts/battery.yaml", 20, BATTERY, "# yaml-language-server"),
+        (BATTERY, "level: battery.battery_level", 9, BATTERY, "  battery:\n    type"),
+    ],
+)
+def test_a_name_leads_to_where_it_is_written(
+    editor: Editor, repository: Path, path: Path, words: str, offset: int, target: Path, there: str
+) -> None:
+    found = editor.define(path, words, offset)
+    assert found.startswith(f"{target.relative_to(ROOT)}:{line_of(target, there)}:")
+
+
+def test_what_names_nothing_leads_nowhere(editor: Editor) -> None:
+    assert editor.define(ROBOT, "warn: 50 %", 8) == "None"
+    assert editor.define(ROBOT, "rbx: 1", 5) == "None"
+
+
+@pytest.mark.parametrize(
+    ("path", "words", "offset", "told"),
+    [
+        (
+            ROBOT,
+            "runtime: 45 s",
+            2,
+            ["Time from full to empty.", "Takes a time.", "`45 s` from robots/turtlebot/robot.yaml:27"],
+        ),
+        (
+            ROBOT,
+            "speed: ${args.speed}",
+            2,
+            ["Largest speed forwards.", "Default: `0.3 m/s`", "`${args.speed}` = `0.3 m/s`"],
+        ),
+        (ROBOT, "type: battery_sim", 8, ["A battery that drains evenly"]),
+        (ROBOT, "  base:\n", 3, ["A base with two driven wheels"]),
+        (ROBOT, "muxes:", 2, ["Who may command what"]),
+        (ROBOT, "dock: dock", 7, ["`dock`: (0.5 m, 0.5 m)"]),
+        (PATROL, "$battery", 3, ["`$battery`: a ratio, a value of the robot from /battery_level"]),
+        (PATROL, "$low", 2, ["`$low`: a ratio, an input"]),
+        (PATROL, "$corner", 3, ["`$corner`: a place, the item of a loop"]),
+        (PATROL, "repeat: ", 3, ["Do the body again and again"]),
+        (PATROL, "timeout: 10 s", 3, ["Fail when the node takes longer", "Takes a time."]),
+        (PATROL, "- recharge", 5, ["`recharge`: skill"]),
+        (TWINS, "warn: 45 %", 2, ["`45 %` from robots/twins/robot.yaml", "had `${args.warn}` (parts/battery.yaml"]),
+    ],
+)
+def test_a_hover_tells_what_something_is(
+    editor: Editor, repository: Path, path: Path, words: str, offset: int, told: list[str]
+) -> None:
+    found = editor.hover(path, words, offset)
+    assert [text for text in told if text not in found] == [], found

@@ -1,0 +1,113 @@
+"""Findings as one types: in the context of the robots that a file belongs to."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rbxcompose.lsp.fixes import actions, change_of
+from rbxcompose.lsp.project import Project
+from tests.conftest import ROOT
+
+OVERLAY = "rbx: 1\nkind: Overlay\nname: slow\ncomponents:\n  base:\n    max_speed: 0.1 m/s\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name in ("robots", "missions", "parts"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    return tmp_path
+
+
+def codes(project: Project, path: Path, text: str | None) -> dict[str, list[str]]:
+    """Change a text and return the codes of all files that have findings."""
+    found = project.change(path, text)
+    return {file.name: [finding.code for finding in findings] for file, findings in found.items() if findings}
+
+
+def test_a_robot_is_compiled_with_the_text_of_the_editor_until_that_is_closed(folder: Path) -> None:
+    project, path = Project({}), folder / "robots/turtlebot/robot.yaml"
+    text = path.read_text(encoding="utf-8")
+    assert codes(project, path, text) == {}
+    assert codes(project, path, text.replace("dock: dock", "dock: dok")) == {"robot.yaml": ["RBX1004"]}
+    assert codes(project, path, None) == {}
+
+
+def test_a_mistake_in_one_file_is_told_in_the_other_and_taken_back(folder: Path) -> None:
+    project = Project({})
+    robot, mission = folder / "robots/turtlebot/robot.yaml", folder / "missions/patrol.yaml"
+    text = robot.read_text(encoding="utf-8")
+    assert codes(project, robot, text) == {}
+    assert "patrol.yaml" in codes(project, robot, text.replace("  corner_2: {", "  corner_9: {"))
+    assert project.findings(mission)
+    assert mission in project.change(robot, text)
+    assert project.findings(mission) == []
+
+
+def test_a_mission_is_checked_with_the_robots_of_the_project_that_have_it(folder: Path) -> None:
+    project, path = Project({}), folder / "missions/patrol.yaml"
+    text = path.read_text(encoding="utf-8")
+    assert codes(project, path, text.replace("go_to: dock", "go_to: dok")) == {"patrol.yaml": ["RBX4103"]}
+    robot = project.robot_of(path)
+    assert robot is not None
+    assert robot.manifest.name == "turtlebot"
+
+
+def test_a_mission_that_no_robot_has_is_still_read(folder: Path) -> None:
+    project, path = Project({}), folder / "missions/new.yaml"
+    text = "rbx: 1\nkind: Mission\nname: new\ndo:\n  wait: $somewhere\n  timeut: 3 s\n"
+    path.write_text(text, encoding="utf-8")
+    assert codes(project, path, text) == {"new.yaml": ["RBX4101"]}
+
+
+def test_a_part_is_checked_with_the_robots_that_include_it(folder: Path) -> None:
+    robot = folder / "robots/twins/robot.yaml"
+    local = robot.read_text(encoding="utf-8").replace("rbx:parts/", "../../parts/")
+    robot.write_text(local, encoding="utf-8")
+    project, path = Project({}), folder / "parts/battery.yaml"
+    text = path.read_text(encoding="utf-8")
+    assert "battery.yaml" in codes(project, path, text.replace("    runtime: $", "    runtme: $"))
+    assert codes(project, path, text) == {}
+
+
+def test_an_overlay_is_checked_with_the_robot_beside_it(folder: Path) -> None:
+    project, path = Project({}), folder / "robots/turtlebot/slow.yaml"
+    path.write_text(OVERLAY, encoding="utf-8")
+    assert codes(project, path, OVERLAY.replace("  base:", "  bas:")) == {"slow.yaml": ["RBX1302"]}
+    assert project.robot_of(path) is not None
+
+
+def test_while_a_robot_cannot_be_read_its_names_are_still_known(folder: Path) -> None:
+    project, path = Project({}), folder / "robots/turtlebot/robot.yaml"
+    project.change(path, path.read_text(encoding="utf-8"))
+    assert codes(project, path, "components: [")
+    robot = project.robot_of(path)
+    assert robot is not None
+    assert "corner_1" in robot.manifest.places
+
+
+def test_the_fix_of_a_finding_is_the_smallest_change(folder: Path) -> None:
+    project, path = Project({}), folder / "robots/turtlebot/robot.yaml"
+    text = path.read_text(encoding="utf-8").replace("max_speed", "max_sped")
+    project.change(path, text)
+    (finding,) = project.findings(path)
+    assert finding.span is not None
+    (action,) = actions(project, [finding], finding.span.line - 1, finding.span.line - 1)
+    change = action.changes[path]
+    assert change.text == "e"
+    assert list(actions(project, [finding], 0, 1)) == []  # another line
+
+
+@given(st.text("ab\n", max_size=8), st.text("ab\n", max_size=8))
+def test_a_change_makes_the_one_text_of_the_other(before: str, after: str) -> None:
+    change = change_of(before, after)
+    lines = before.split("\n")
+
+    def offset(place: tuple[int, int]) -> int:
+        return sum(len(line) + 1 for line in lines[: place[0]]) + place[1]
+
+    assert before[: offset(change.start)] + change.text + before[offset(change.end) :] == after

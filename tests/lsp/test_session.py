@@ -1,0 +1,111 @@
+"""A whole session of an editor with the real server, over stdin and stdout."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.conftest import ROOT
+from tests.lsp.client import Client
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    shutil.copytree(ROOT / "robots/turtlebot", tmp_path / "robots/turtlebot")
+    shutil.copytree(ROOT / "missions", tmp_path / "missions")
+    return tmp_path
+
+
+def opened(client: Client, path: Path, text: str | None = None) -> dict[str, str]:
+    document = {"uri": path.as_uri(), "languageId": "yaml", "version": 1, "text": text or path.read_text("utf-8")}
+    client.tell("textDocument/didOpen", textDocument=document)
+    return {"uri": path.as_uri()}
+
+
+def place(text: str, word: str, offset: int = 0) -> dict[str, int]:
+    """Return the position of a word in UTF-16 units."""
+    before = text[: text.index(word) + offset]
+    line = before.rpartition("\n")[2]
+    return {"line": before.count("\n"), "character": len(line.encode("utf-16-le")) // 2}
+
+
+def change(text: str, old: str, new: str) -> dict[str, Any]:
+    return {"range": {"start": place(text, old), "end": place(text, old, len(old))}, "text": new}
+
+
+def test_an_editor_opens_a_robot_types_completes_jumps_hovers_and_leaves(project: Path) -> None:
+    path = project / "robots/turtlebot/robot.yaml"
+    text = path.read_text("utf-8")
+    with Client(project) as client:
+        document = opened(client, path)
+        assert client.diagnostics(path.as_uri()) == []
+
+        versioned = {**document, "version": 2}
+        client.tell(
+            "textDocument/didChange", textDocument=versioned, contentChanges=[change(text, "runtime: 45", "runtme: 45")]
+        )
+        (finding,) = client.diagnostics(path.as_uri())
+        assert finding["code"] == "RBX1001"
+        assert finding["message"] == "unknown key 'runtme' in component 'battery'\ndid you mean 'runtime'?"
+        assert finding["range"]["start"] == place(text, "runtime: 45")
+
+        (action,) = client.ask(
+            "textDocument/codeAction", textDocument=document, range=finding["range"], context={"diagnostics": [finding]}
+        )
+        ((edit,),) = action["edit"]["changes"].values()
+        typed = text.replace("runtime: 45", "runtme: 45")
+        lines = typed.split("\n")
+        line, start, end = (
+            edit["range"]["start"]["line"],
+            *(edit["range"][one]["character"] for one in ("start", "end")),
+        )
+        lines[line] = lines[line][:start] + edit["newText"] + lines[line][end:]
+        assert "\n".join(lines) == text
+
+        found = client.ask("textDocument/completion", textDocument=document, position=place(typed, "dock: dock", 6))
+        assert "corner_1" in [item["label"] for item in found["items"]]
+        target = client.ask("textDocument/definition", textDocument=document, position=place(typed, "dock: dock", 7))
+        assert target["uri"] == path.as_uri()
+        assert target["range"]["start"] == place(typed, "dock: {x")
+        shown = client.ask("textDocument/hover", textDocument=document, position=place(typed, "max_speed: 0.5", 2))
+        assert "Largest speed, forwards and backwards." in shown["contents"]["value"]
+    assert client.process.returncode == 0
+    assert client.errors == b""
+
+
+def test_a_mistake_in_a_mission_is_told_where_it_was_made_although_the_robot_is_not_open(project: Path) -> None:
+    path = project / "missions/patrol.yaml"
+    text = path.read_text("utf-8")
+    with Client(project) as client:
+        document = opened(client, path, text.replace("go_to: dock", "go_to: dok"))
+        (finding,) = client.diagnostics(path.as_uri())
+        assert "no place 'dok'" in finding["message"]
+        target = client.ask("textDocument/definition", textDocument=document, position=place(text, "$battery", 3))
+        assert target["uri"] == (project / "robots/turtlebot/robot.yaml").as_uri()
+        client.tell("textDocument/didClose", textDocument=document)
+        assert client.diagnostics(path.as_uri()) == []  # what was saved is right
+    assert client.process.returncode == 0
+
+
+def test_columns_count_in_utf_16_units(project: Path) -> None:
+    path = project / "robots/turtlebot/robot.yaml"
+    text = path.read_text("utf-8").replace("colour: yellow}", 'colour: "🟡🟡", heigt: 3 m}')
+    with Client(project) as client:
+        document = opened(client, path, text)
+        (finding,) = client.diagnostics(path.as_uri())
+        assert finding["range"]["start"] == place(text, "heigt")
+        assert finding["range"]["end"] == place(text, "heigt", 5)
+        found = client.ask("textDocument/completion", textDocument=document, position=place(text, "heigt", 2))
+        assert [item["label"] for item in found["items"]] == []  # all four keys are there
+
+
+def test_yaml_that_is_none_of_ours_is_left_alone(project: Path) -> None:
+    path = project / "compose.yaml"
+    with Client(project) as client:
+        document = opened(client, path, "services:\n  web: [\n")
+        found = client.ask("textDocument/completion", textDocument=document, position={"line": 1, "character": 2})
+        assert found["items"] == []
+        assert client.told == type(client.told)()
