@@ -1,0 +1,257 @@
+"""`check`: which robots it looks at, what counts, how it is written, and what `--fix` does to the files."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import stat
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rbxcompose.cli import main as command
+from rbxcompose.cli.common import fixing
+from rbxcompose.cli.common.fixing import replace_file
+from rbxcompose.edits import safe_fixes
+from rbxcompose.findings import Finding, Fix, Sources
+
+ROOT = Path(__file__).parents[2]
+ROBOT, MISSION = Path("robots/bot/robot.yaml"), Path("missions/patrol.yaml")
+SLIPS = {
+    "type: charger": "type: chargr",
+    "reach: 20 cm": "rech: 20 cm",
+    "dock: dock": "dock: dok",
+    "start: patrol": 'start: "patrl"',
+    "battery.battery_level": "batery.battery_level",
+    "${args.speed}": "${args.sped}",
+    "match: [battery, ": "match: [batery, ",
+}
+HEAD = "rbx: 1\nkind: Mission\nname: patrol\n"
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A project with one robot and its mission, as the current folder."""
+    for source, target in ((ROOT / "robots/turtlebot/robot.yaml", ROBOT), (ROOT / MISSION, MISSION)):
+        (tmp_path / target).parent.mkdir(parents=True)
+        shutil.copy(source, tmp_path / target)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def slip(text: str) -> str:
+    for right, wrong in SLIPS.items():
+        assert right in text
+        text = text.replace(right, wrong)
+    return text
+
+
+def change(path: Path, right: str, wrong: str) -> str:
+    text = path.read_text(encoding="utf-8")
+    assert right in text
+    path.write_text(text.replace(right, wrong), encoding="utf-8")
+    return text
+
+
+def output(capsys: pytest.CaptureFixture[str], *words: str, code: int) -> str:
+    assert command.main(["check", *words]) == code
+    return capsys.readouterr().out
+
+
+def test_without_a_path_all_robots_here_are_checked(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    second = project / "robots/other.yaml"
+    second.write_text((project / ROBOT).read_text().replace("name: turtlebot", "name: other").replace("../../", "../"))
+    lines = output(capsys, code=0).splitlines()
+    assert [line.split()[0] for line in lines] == ["turtlebot", "other"]
+    assert output(capsys, "robots", code=0).splitlines() == lines
+
+
+def test_a_mission_is_checked_with_the_robots_that_use_it(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change(project / MISSION, "go_to: dock", "go_to: harbour")
+    assert f"{MISSION}:" in output(capsys, str(MISSION), code=1)
+    (project / "missions/draft.yaml").write_text(HEAD + "do: nothing\n")
+    told = output(capsys, "missions/draft.yaml", code=0)
+    assert "warning[RBX9007]: no robot of the project uses 'missions/draft.yaml'" in told
+
+
+def test_a_robot_that_is_named_twice_is_told_once(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change(project / MISSION, "go_to: dock", "go_to: harbour")
+    assert "1 error\n" in output(capsys, str(ROBOT), str(ROBOT), str(MISSION), code=1)
+
+
+def test_what_is_not_there_is_a_finding(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "error[RBX1301]" in output(capsys, "robots/nobody", code=1)
+    (project / "empty").mkdir()
+    assert "error[RBX1301]" in output(capsys, "empty", code=1)
+
+
+def test_warnings_count_only_under_strict(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change(project / ROBOT, "about: Patrols a square", "about: Room #3")
+    assert "1 warning" in output(capsys, str(ROBOT), code=0)
+    assert "1 warning" in output(capsys, str(ROBOT), "--strict", code=1)
+
+
+@pytest.mark.parametrize("form", ["json", "sarif"])
+def test_a_format_for_programs_is_whole_also_without_findings(
+    form: str, project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    json.loads(output(capsys, "--format", form, code=0))
+
+
+def test_fix_cures_what_is_certain_and_leaves_the_rest_of_the_text_alone(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    right = (project / ROBOT).read_text(encoding="utf-8").replace("start: patrol", 'start: "patrol"')
+    raw = ("\ufeff" + slip(right.replace('"patrol"', "patrol"))).replace("\n", "\r\n")
+    (project / ROBOT).write_bytes(raw.encode())
+    told = output(capsys, "--fix", str(ROBOT), code=0)
+    assert (project / ROBOT).read_bytes().decode() == ("\ufeff" + right).replace("\n", "\r\n")
+    fixed = [line for line in told.splitlines() if line.startswith("fixed ")]
+    assert f"fixed {ROBOT}:39:11: 'chargr' -> 'charger'" in fixed
+    assert len(fixed) == len(SLIPS)
+    assert told.endswith("turtlebot is fine: 8 components in 3 processes\n")
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(wrong=st.sets(st.sampled_from(sorted(SLIPS))), where=st.integers(0, 10**6), comment=st.text("#x ", max_size=5))
+def test_fix_changes_only_the_lines_that_are_told(project: Path, wrong: set[str], where: int, comment: str) -> None:
+    right = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8").splitlines()
+    right.insert(where % len(right), f"# {comment}")
+    text = "\n".join(right) + "\n"
+    for one in sorted(wrong - {"start: patrol"}):
+        text = text.replace(one, SLIPS[one])
+    (project / ROBOT).write_text(text, encoding="utf-8")
+    assert command.main(["check", "--fix", str(ROBOT)]) == 0
+    assert (project / ROBOT).read_text(encoding="utf-8") == "\n".join(right) + "\n"
+
+
+MISSIONS = {
+    "a step without its colon": ("do:\n  - recharge\n    timeout: 9 s\n", "do:\n  - recharge:\n    timeout: 9 s\n"),
+    "two steps in one": ("do:\n  - go_to: dock\n    recharge:\n", "do:\n  - go_to: dock\n  - recharge:\n"),
+    "three steps in one": (
+        "do:\n  - go_to: dock\n    timeout: 9 s\n    recharge:\n    wait: 1 s\n",
+        "do:\n  - go_to: dock\n    timeout: 9 s\n  - recharge:\n  - wait: 1 s\n",
+    ),
+    "tabs": ("do:\n\t- go_to: dock\n\t- recharge\n", "do:\n  - go_to: dock\n  - recharge\n"),
+    "a colon in a text": ("about: So: it goes\ndo: recharge\n", 'about: "So: it goes"\ndo: recharge\n'),
+    "a kind": ("do:\n  repeet: 2\n  do: recharge\n", "do:\n  repeat: 2\n  do: recharge\n"),
+    "a skill": ("do: rechrge\n", "do: recharge\n"),
+    "a place in an expression": ("do:\n  - go_to: dok\n", "do:\n  - go_to: dock\n"),
+    "a name": ("do:\n  - wait_for: $batery > 9 %\n", "do:\n  - wait_for: $battery > 9 %\n"),
+    "a name without its dollar": ("do:\n  - wait_for: battery > 9 %\n", "do:\n  - wait_for: $battery > 9 %\n"),
+    "a place with a dollar": ("do:\n  - go_to: $dock\n", "do:\n  - go_to: dock\n"),
+    "an item with a dollar": (
+        "do:\n  for: $place\n  in: [dock]\n  do:\n    go_to: $place\n",
+        "do:\n  for: place\n  in: [dock]\n  do:\n    go_to: $place\n",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_fix_cures_missions(name: str, project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wrong, right = MISSIONS[name]
+    (project / MISSION).write_text(HEAD + wrong, encoding="utf-8")
+    told = output(capsys, "--fix", str(ROBOT), code=0)
+    assert (project / MISSION).read_text(encoding="utf-8") == HEAD + right, told
+
+
+LEFT_ALONE = {
+    "a key that is written twice": "do: recharge\ndo: recharge\n",
+    "a setting that may belong to either step": "do:\n  - go_to: dock\n    recharge:\n    timeout: 9 s\n",
+    "tabs beside spaces": "do:\n  - go_to: dock\n\t- recharge\n",
+    "a text that goes on": "about: So: it\n  goes\ndo: recharge\n",
+    "a place of another number": "do:\n  - go_to: corner_7\n",
+}
+
+
+@pytest.mark.parametrize("name", LEFT_ALONE)
+def test_fix_never_guesses(name: str, project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = HEAD + LEFT_ALONE[name]
+    (project / MISSION).write_text(text, encoding="utf-8")
+    told = output(capsys, "--fix", str(ROBOT), code=1)
+    assert (project / MISSION).read_text(encoding="utf-8") == text
+    assert "fixed" not in told
+
+
+def test_fix_never_writes_what_comes_from_the_command_line(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (project / "--set").write_text("start=patrl")
+    assert "error" in output(capsys, "--fix", str(ROBOT), "--set", "start=patrl", "--profile", "tird", code=1)
+    assert (project / "--set").read_text() == "start=patrl"
+
+
+def test_fix_never_writes_outside_of_the_project(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change(project / ROBOT, "../../missions/patrol.yaml", "rbx:missions/patrol.yaml")
+    change(project / ROBOT, "  corner_3:", "  corner3:")
+    library = ROOT / MISSION
+    before = library.read_bytes()
+    told = output(capsys, "--fix", str(ROBOT), code=1)
+    assert "did you mean 'corner3'?" in told
+    assert "fix" not in told
+    assert library.read_bytes() == before
+
+
+def test_fix_never_writes_what_ships_with_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    before = (ROOT / "robots/turtlebot/robot.yaml").read_bytes()
+    output(capsys, "--fix", "rbx:robots/turtlebot", code=0)
+    assert (ROOT / "robots/turtlebot/robot.yaml").read_bytes() == before
+
+
+def test_a_file_that_changed_meanwhile_is_left_as_it_is(
+    project: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    change(project / ROBOT, "type: charger", "type: chargr")
+
+    def meanwhile(found: Iterable[Finding], sources: Sources) -> list[Fix]:
+        with (project / ROBOT).open("a") as file:
+            file.write("# saved by an editor\n")
+        return safe_fixes(found, sources)
+
+    monkeypatch.setattr(fixing, "safe_fixes", meanwhile)
+    told = output(capsys, "--fix", str(ROBOT), code=1)
+    assert f"left {ROBOT} as it is: it was changed since it was read" in told
+    assert "type: chargr" in (project / ROBOT).read_text()
+
+
+def test_a_file_that_may_not_be_written_is_left_as_it_is(
+    project: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    change(project / ROBOT, "type: charger", "type: chargr")
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert f"left {ROBOT} as it is: it may not be written" in output(capsys, "--fix", str(ROBOT), code=1)
+
+
+def test_what_was_fixed_does_not_stand_in_output_for_programs(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change(project / ROBOT, "type: charger", "type: chargr")
+    assert command.main(["check", "--fix", "--format", "json", str(ROBOT)]) == 0
+    told = capsys.readouterr()
+    assert json.loads(told.out) == []
+    assert told.err == f"fixed {ROBOT}:39:11: 'chargr' -> 'charger'\n"
+
+
+def test_a_file_is_replaced_whole_with_its_mode_and_nothing_is_left_beside_it(tmp_path: Path) -> None:
+    file = tmp_path / "robot.yaml"
+    file.write_text("old")
+    file.chmod(0o640)
+    replace_file(file, b"new")
+    assert (file.read_text(), stat.S_IMODE(file.stat().st_mode)) == ("new", 0o640)
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_replacement_that_fails_leaves_everything_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "robot.yaml"
+    file.write_text("old")
+
+    def refuse(*_: object) -> None:
+        raise OSError(28, "no space")
+
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(OSError):
+        replace_file(file, b"new")
+    assert file.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [file]
