@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from rbxcompose.lsp.document import Document, Spot
-from rbxcompose.lsp.guide import Guide, Value
 from rbxcompose.lsp.names import PLACE, SKILL, named_by_key, named_by_value
 from rbxcompose.lsp.variables import fills, variables
 from rbxcompose.missions.keys import ANYWHERE
+from rbxcompose.schema.guide import Guide, Value
 from rbxcompose.schema.scalars import Schema, units_of
 from rbxcompose.units import NUMBER_TEXT, Dimension
 

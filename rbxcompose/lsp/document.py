@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rbxcompose.lsp.cursor import Cursor, locate
-from rbxcompose.lsp.guide import Guide
 from rbxcompose.lsp.names import Known
 from rbxcompose.lsp.project import MISSION, OVERLAY, kind_of
 from rbxcompose.model.robot import Robot
 from rbxcompose.schema.documents import MAKERS, installed_schema
+from rbxcompose.schema.guide import Guide
 
 DEFAULT_KIND = "Robot"  # until the text says another
 

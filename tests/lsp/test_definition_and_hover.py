@@ -65,7 +65,7 @@ def test_what_names_nothing_leads_nowhere(editor: Editor) -> None:
         ),
         (ROBOT, "type: battery_sim", 8, ["A battery that drains evenly"]),
         (ROBOT, "  base:\n", 3, ["A base with two driven wheels"]),
-        (ROBOT, "muxes:", 2, ["Who may command what"]),
+        (ROBOT, "muxes:", 2, ["Who may command"]),
         (ROBOT, "dock: dock", 7, ["`dock`: (0.5 m, 0.5 m)"]),
         (PATROL, "$battery", 3, ["`$battery`: a ratio, a value of the robot from /battery_level"]),
         (PATROL, "$low", 2, ["`$low`: a ratio, an input"]),

@@ -1,0 +1,36 @@
+"""Write the composed robot, parts, profiles and overlays put together, with the origin of each value.
+
+What it writes is a manifest itself, for the folder of the robot's file.
+Exit codes: 0 fine, 1 errors found, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from rbxcompose.cli.common.robot_options import add_layer_options, layers_of
+from rbxcompose.cli.common.telling import FINDINGS, tell, tell_report
+from rbxcompose.compiler import compile_robot
+from rbxcompose.seeing.expand import expand, expand_data
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
+    add_layer_options(parser)
+    parser.add_argument("--no-origins", action="store_true", help="leave out where each value comes from")
+    parser.add_argument("--json", action="store_true", help="write values and origins as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the robot to stdout and its findings to stderr; with mistakes it is written as far as it could be read."""
+    compilation = compile_robot(arguments.path, **layers_of(arguments))
+    tell_report(compilation.report, compilation.sources)
+    if compilation.robot is not None:
+        manifest = compilation.robot.manifest
+        if arguments.json:
+            tell(json.dumps(expand_data(manifest), indent=2, ensure_ascii=False))
+        else:
+            tell(expand(manifest, has_origins=not arguments.no_origins).rstrip("\n"))
+    return FINDINGS if compilation.report.has_errors else 0

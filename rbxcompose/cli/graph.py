@@ -1,0 +1,52 @@
+"""Draw a robot: components, wires, processes and missions, as Mermaid, DOT or one HTML page.
+
+Exit codes: 0 fine, 1 errors found, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from rbxcompose.cli.common.robot_options import add_layer_options, layers_of
+from rbxcompose.cli.common.telling import FINDINGS, tell, tell_report
+from rbxcompose.compiler import compile_robot
+from rbxcompose.seeing.diagram import diagram_of
+from rbxcompose.seeing.graph_dot import dot
+from rbxcompose.seeing.graph_html import html
+from rbxcompose.seeing.graph_mermaid import mermaid
+
+USAGE = 2
+FORMATS = {"mermaid": mermaid, "dot": dot, "html": html}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
+    add_layer_options(parser)
+    parser.add_argument("--format", choices=list(FORMATS), default="mermaid", help="how it is written")
+    parser.add_argument("--out", metavar="FILE", help="write it to this file")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the graph; a robot with mistakes is drawn as far as it could be read, and its findings go to stderr."""
+    compilation = compile_robot(arguments.path, **layers_of(arguments))
+    tell_report(compilation.report, compilation.sources)
+    if compilation.robot is not None:
+        text = FORMATS[arguments.format](diagram_of(compilation.robot))
+        if arguments.out is None:
+            tell(text.rstrip("\n"))
+        elif problem := _write(Path(arguments.out), text):
+            sys.stderr.write(f"rbxcompose graph: {problem}\n")
+            return USAGE
+    return FINDINGS if compilation.report.has_errors else 0
+
+
+def _write(file: Path, text: str) -> str:
+    """Write a file; return what kept it from being written, or nothing."""
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        return f"'{file}' cannot be written: {error.strerror}"
+    return ""

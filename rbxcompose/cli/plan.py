@@ -1,0 +1,82 @@
+"""Show what would run: processes, components in start order, keys on the wire; or the changes to a plan.
+
+Exit codes: 0 fine, 1 errors found, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from rbxcompose.cli.common.robot_options import add_layer_options, layers_of
+from rbxcompose.cli.common.telling import FINDINGS, refuse, tell, tell_report
+from rbxcompose.compiler import compile_robot
+from rbxcompose.findings import Finding, kind
+from rbxcompose.manifest.limits import ALL_BYTES
+from rbxcompose.plan.dump import PlanTextError, dump, load
+from rbxcompose.plan.model import Plan
+from rbxcompose.seeing.diff import difference
+from rbxcompose.seeing.plan_text import plan_text
+
+NO_PLAN = kind(
+    "RBX9012",
+    """A file that is no plan
+
+`plan --diff FILE` compares with a plan that was written by `plan --json`, or with the plan of another manifest.
+
+Bad: `rbxcompose plan robots/turtlebot --diff notes.json`
+Good: `rbxcompose plan robots/turtlebot --json > before.json`, and later
+`rbxcompose plan robots/turtlebot --diff before.json`
+""",
+)
+SAVED = ".json"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
+    add_layer_options(parser)
+    parser.add_argument("--json", action="store_true", help="write the plan, or the difference, as JSON")
+    parser.add_argument("--diff", metavar="FILE", help="a plan that --json wrote, or a robot: what has changed since")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the plan of a robot without errors, or what is other than in another one."""
+    after = _compiled(arguments.path, arguments, is_layered=True)
+    if after is None:
+        return FINDINGS
+    if arguments.diff is None:
+        tell(dump(after).rstrip("\n") if arguments.json else plan_text(after))
+        return 0
+    before = _other(arguments.diff, arguments)
+    if before is None or isinstance(before, Finding):
+        return refuse(before) if before else FINDINGS
+    found = difference(before, after)
+    tell(json.dumps(found.data(), indent=2, ensure_ascii=False) if arguments.json else found.text())
+    return 0
+
+
+def _compiled(path: str, arguments: argparse.Namespace, *, is_layered: bool) -> Plan | None:
+    """Return the plan of a robot; None after its errors."""
+    layers = layers_of(arguments)
+    if not is_layered:
+        layers = {**layers, "profiles": (), "overlays": (), "sets": ()}
+    compilation = compile_robot(path, **layers)
+    tell_report(compilation.report, compilation.sources)
+    return None if compilation.report.has_errors else compilation.plan
+
+
+def _other(written: str, arguments: argparse.Namespace) -> Plan | Finding | None:
+    """Return the plan to compare with: one that was saved, or that of a robot as its file alone has it."""
+    if not written.endswith(SAVED):
+        return _compiled(written, arguments, is_layered=False)
+    try:
+        with Path(written).open("rb") as file:
+            text = file.read(ALL_BYTES + 1)
+        if len(text) > ALL_BYTES:
+            return NO_PLAN.at(None, f"'{written}' is larger than {ALL_BYTES:,} bytes")
+        return load(text.decode("utf-8"))
+    except (OSError, UnicodeDecodeError, PlanTextError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        return NO_PLAN.at(None, f"'{written}' cannot be read as a plan: {reason}")

@@ -1,0 +1,37 @@
+"""Tell where a value of a robot comes from: its file and line, the layers below it, what it is for.
+
+VALUE is a path as for --set (battery.runtime, missions.patrol.with.rounds), or a port (go_to.cmd_vel).
+Exit codes: 0 fine, 1 the robot cannot be read or has no such path, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from rbxcompose.cli.common.robot_options import add_layer_options, layers_of
+from rbxcompose.cli.common.telling import FINDINGS, refuse, tell, tell_report
+from rbxcompose.compiler import compile_robot
+from rbxcompose.findings import Finding
+from rbxcompose.seeing.why import why
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", metavar="VALUE", help="its path: battery.runtime, muxes.cmd_vel, go_to.cmd_vel")
+    parser.add_argument("robot", metavar="ROBOT", help="the robot's file, its folder, or rbx:robots/NAME")
+    add_layer_options(parser)
+    parser.add_argument("--json", action="store_true", help="write the answer as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write what is known of a path; a robot with mistakes is explained as far as it could be read."""
+    compilation = compile_robot(arguments.robot, **layers_of(arguments))
+    if compilation.robot is None:
+        tell_report(compilation.report, compilation.sources)
+        return FINDINGS
+    answer = why(compilation.robot, arguments.path)
+    if isinstance(answer, Finding):
+        return refuse(answer)
+    tell(json.dumps(answer.data(), indent=2, ensure_ascii=False) if arguments.json else answer.text())
+    return 0

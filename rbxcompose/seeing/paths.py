@@ -1,0 +1,76 @@
+"""Paths of a robot as people write them: `battery.runtime`, `missions.patrol.with.rounds`, `go_to.cmd_vel`."""
+
+from __future__ import annotations
+
+from rbxcompose.findings import Finding, kind
+from rbxcompose.manifest.models import RobotFile, RobotManifest
+from rbxcompose.manifest.overlay import INCLUDE
+from rbxcompose.manifest.tree import Mapping, Node, Path, Sequence, at
+from rbxcompose.model.robot import Robot
+from rbxcompose.plain import plain
+from rbxcompose.schema.guide import Guide
+
+NO_SUCH_PATH = kind(
+    "RBX9011",
+    """`why` asks for what the robot does not have
+
+A path begins with a component, a mux or a section, as for `--set`; then come the keys, with dots between them. A
+component is also followed by one of its ports.
+
+Bad: `rbxcompose why battery.runtme robots/turtlebot`
+Good: `rbxcompose why battery.runtime robots/turtlebot`
+""",
+)
+
+
+def path_of(robot: Robot, text: str) -> Path:
+    """Return the path from the root that a text means; an item of a list is counted from 0."""
+    names: list[str | int] = list(text.strip().split("."))
+    manifest = robot.manifest
+    if names[0] not in RobotFile.model_fields:
+        muxes = manifest.root.get("muxes")
+        names.insert(0, "muxes" if isinstance(muxes, Mapping) and str(names[0]) in muxes else "components")
+    for index, name in enumerate(names):
+        above = found_at(manifest, tuple(names[:index]))
+        if isinstance(above, Sequence) and str(name).isdecimal():
+            names[index] = int(name)
+    return tuple(names)
+
+
+def short(path: Path) -> str:
+    """Return a path as people write it."""
+    return ".".join(map(str, path[1:] if path[0] == "components" and len(path) > 1 else path))
+
+
+def tree_of(manifest: RobotManifest, path: Path) -> Mapping:
+    """Return the tree that a path leads into: what is included is read before the rest, and kept beside it."""
+    return manifest.include if path[:1] == (INCLUDE,) else manifest.root
+
+
+def found_at(manifest: RobotManifest, path: Path) -> Node | None:
+    """Return what stands at a path of the composed robot, or None."""
+    return at(tree_of(manifest, path), path)
+
+
+def no_such_path(robot: Robot, path: Path, guide: Guide) -> Finding:
+    """Return the finding for a path that leads nowhere, with what was probably meant at the first wrong name."""
+    if path[0] == "profiles":
+        return NO_SUCH_PATH.at(None, "profiles have no value of their own", help="'--profile NAME' lays one on top")
+    length = next(n for n in range(1, len(path) + 1) if not is_known(robot.manifest, guide, path[:n]))
+    above, name = path[: length - 1], str(path[length - 1])
+    node = found_at(robot.manifest, above)
+    valid = {*guide.keys(above), *(node.entries if isinstance(node, Mapping) else ())}
+    place = f"'{short(above)}'" if above else ""
+    if above in ((), ("components",)):
+        place = f"robot '{robot.manifest.name}'"
+        valid |= {*robot.parts, *(key for key in RobotFile.model_fields if key in robot.manifest.root)}
+    elif len(above) == 2 and str(above[1]) in robot.parts:
+        valid |= {end.name for end in robot.parts[str(above[1])].ends}
+    if isinstance(node, Sequence):
+        valid = {str(index) for index in range(len(node.items))}
+    return NO_SUCH_PATH.misspelt(None, f"{place} has no '{plain(name, 60)}'", name, sorted(valid), "what it has")
+
+
+def is_known(manifest: RobotManifest, guide: Guide, path: Path) -> bool:
+    """Tell whether a path leads to something, or is a key that could be written where it stands."""
+    return found_at(manifest, path) is not None or str(path[-1]) in guide.keys(path[:-1])

@@ -1,0 +1,111 @@
+"""Graphs: everything is in them, they are the same each time, and what reads them can."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from rbxcompose.compiler import compile_robot
+from rbxcompose.seeing.diagram import Diagram, Line, Shape, diagram_of
+from rbxcompose.seeing.graph_dot import dot
+from rbxcompose.seeing.graph_html import html
+from rbxcompose.seeing.graph_mermaid import mermaid
+from rbxcompose.testing import Golden, check_text
+from tests.conftest import ROOT
+
+ROBOTS = ("turtlebot", "twins")
+NAMESPACE = {"svg": "http://www.w3.org/2000/svg"}
+
+
+@cache
+def diagram(name: str) -> Diagram:
+    robot = compile_robot(str(ROOT / "robots" / name), environment={}).robot
+    assert robot
+    return diagram_of(robot)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_mermaid_and_dot_stand_as_they_were_read(name: str, golden: Golden) -> None:
+    golden.check(f"{name}.mmd", mermaid(diagram(name)))
+    golden.check(f"{name}.dot", dot(diagram(name)))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_graphviz_draws_it(name: str) -> None:
+    program = shutil.which("dot")
+    if program is None:
+        pytest.skip("graphviz is not installed")
+    drawn = subprocess.run([program, "-Tsvg"], input=dot(diagram(name)), capture_output=True, text=True, check=True)
+    assert drawn.stderr == ""
+    assert all(group in drawn.stdout for group in diagram(name).groups)
+
+
+def test_a_mission_leads_to_its_skills_and_those_to_who_serves_them() -> None:
+    wires = {(wire.kind, wire.name): wire for wire in diagram("turtlebot").wires}
+    go_to = wires[Line.ACTION, "/go_to"]
+    assert ([tip.box for tip in go_to.sources], [tip.box for tip in go_to.targets]) == (["mission:patrol"], ["go_to"])
+    assert "mission:patrol" in [tip.box for tip in wires[Line.TOPIC, "/battery_level"].targets]
+    assert diagram("turtlebot").runs == (("mission", "mission:patrol"),)
+    assert diagram("turtlebot").start == "mission:patrol"
+
+
+def test_a_mux_shows_the_priorities_of_its_inputs() -> None:
+    wires = {wire.name: wire for wire in diagram("turtlebot").wires}
+    assert (wires["/cmd_vel/navigation"].note, wires["/cmd_vel/teleop"].note) == ("priority 10", "priority 100")
+    assert [box.name for box in diagram("turtlebot").boxes if box.shape is Shape.MUX] == ["cmd_vel"]
+
+
+def picture(text: str) -> ElementTree.Element:
+    [drawn] = re.findall(r'<svg class="graph".*?</svg>', text, re.DOTALL)
+    return ElementTree.fromstring(drawn.replace("<svg ", f'<svg xmlns="{NAMESPACE["svg"]}" ', 1))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_page_shows_every_box_and_every_wire(name: str) -> None:
+    drawn = picture(html(diagram(name)))
+    boxes = [group.get("data-box") for group in drawn.findall(".//svg:g[@data-box]", NAMESPACE)]
+    wires = [text.text for text in drawn.findall(".//svg:text[@class='topic']", NAMESPACE)]
+    assert sorted(map(str, boxes)) == sorted(box.key for box in diagram(name).boxes)
+    assert wires == [wire.name for wire in diagram(name).wires]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_page_needs_no_other_file_and_no_network(name: str) -> None:
+    page = html(diagram(name))
+    assert not re.search(r"https?:|@import|<link|\ssrc=|\bfetch\(|import\(", page)
+    assert set(re.findall(r"url\(([^)]*)\)", page)) == {"#arrow"}
+    assert "prefers-color-scheme:dark" in page
+
+
+def test_the_same_robot_gives_the_same_page() -> None:
+    robot = compile_robot(str(ROOT / "robots/twins"), environment={}).robot
+    assert robot
+    assert html(diagram_of(robot)) == html(diagram("twins"))
+
+
+def test_what_a_person_wrote_stays_text(tmp_path: Path) -> None:
+    text = "rbx: 1\nkind: Robot\nname: one\nabout: '<script>alert(1)</script> & \"more\"'\n"
+    robot = check_text(text, tmp_path).compilation.robot
+    assert robot
+    page = html(diagram_of(robot))
+    assert "<script>alert" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;more&quot;" in page
+
+
+CORPUS = sorted((ROOT / "tests/misconfig/wrong").rglob("*.yaml"))
+
+
+def test_robots_with_mistakes_are_drawn_as_far_as_they_could_be_read() -> None:
+    drawn = 0
+    for file in CORPUS[::4]:
+        robot = compile_robot(str(file), environment={}).robot
+        if robot is not None:
+            found = diagram_of(robot)
+            drawn += all(found.robot in write(found) for write in (dot, html)) and bool(mermaid(found))
+    assert drawn > 10
