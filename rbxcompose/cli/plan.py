@@ -1,4 +1,4 @@
-"""Show what would run: processes, components in start order, keys on the wire; or the changes to a plan.
+"""Show what would run: processes, components in start order, wire keys; or the changes to a plan.
 
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
