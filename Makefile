@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ROBOT ?= robots/turtlebot/robot.yaml
 
-.PHONY: up test lint types unit docs messages lock clean
+.PHONY: up test lint types unit soak bench docs messages lock clean
 
 up: $(VENV)/.up
 	@$(BIN)/rbxcompose up $(ROBOT)
@@ -21,9 +21,18 @@ types: $(VENV)/.test
 unit: $(VENV)/.test
 	$(BIN)/python -m pytest -q
 
-docs: $(VENV)/.test  ## Write the generated pages and the picture of docs/ anew
-	$(BIN)/python docs/generate.py
+soak: $(VENV)/.test  ## Try many more random manifests and expressions, and fuzz if atheris is installed
+	$(BIN)/python -m pytest -q --soak tests/mutate tests/properties tests/hostile tests/fuzz
+	$(BIN)/python docs/quality.py
+
+bench: $(VENV)/.test  ## Measure, beside peers where they are installed, and write docs/benchmarks.md
+	$(BIN)/python -m benchmarks.run
+
+docs: $(VENV)/.test  ## Write the generated pages and the picture of docs/, and schemas/, anew
+	$(BIN)/python -m docs.generate
+	$(BIN)/python -m benchmarks.misconfig --write
 	$(BIN)/python docs/draw_patrol.py
+	$(BIN)/python -m rbxcompose.schema.documents schemas
 
 messages: $(VENV)/.test  ## Write rbxcompose/msgs/ anew from the interface texts
 	$(BIN)/python -m rbxcompose.msgs.generate

@@ -1,51 +1,48 @@
-"""Writes the generated pages of the documentation: one page per code of a finding.
+"""Writes the generated pages of the documentation: findings and reference, from models, registries and docstrings.
 
 Run it with `make docs`; a test fails when a page is out of date.
 """
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
-import sys
 from pathlib import Path
 
-import rbxcompose
-from rbxcompose.findings import KINDS
+from docs.generating import commands, components, expressions, findings, missions, robot
 
-INTRODUCTION = "# Findings\n\nWhat `rbxcompose check` may say, by code.\n\n"
-
-
-def import_all() -> None:
-    """Import every module of the package, so that every kind of finding is declared."""
-    for module in pkgutil.walk_packages(rbxcompose.__path__, "rbxcompose."):
-        if not module.name.endswith("__main__"):
-            importlib.import_module(module.name)
+DOCS = Path(__file__).parent
+FOLDERS = ("findings", "reference")  # in them is nothing else
 
 
 def pages() -> dict[str, str]:
-    """Return file name -> text of all pages, the index included."""
-    import_all()
-    found = {}
-    index = INTRODUCTION
-    for code, kind in sorted(KINDS.items()):
-        title, _, body = kind.doc.strip().partition("\n")
-        found[f"{code}.md"] = f"# {code}: {title.rstrip('.')}\n\n{body.strip()}\n".replace("\n\n\n", "\n\n")
-        index += f"- [{code}]({code}.md) ({kind.severity.value}): {title.rstrip('.')}\n"
-    found["README.md"] = index
-    return found
+    """Return the path below `docs/` -> text of all pages."""
+    reference = {
+        "robot": robot.whole_page(),
+        "components": components.whole_page(),
+        "missions": missions.whole_page(),
+        "expressions": expressions.whole_page(),
+        "commands": commands.whole_page(),
+    }
+    return {
+        **{f"findings/{name}": text for name, text in findings.pages().items()},
+        **{f"reference/{name}.md": text for name, text in reference.items()},
+    }
 
 
-def main(folder: Path) -> None:
-    """Write all pages into `folder` and remove those of codes that are gone."""
-    folder.mkdir(parents=True, exist_ok=True)
+def written() -> dict[str, str]:
+    """Return the path below `docs/` -> text of the pages that are there."""
+    there = (page for folder in FOLDERS for page in (DOCS / folder).glob("*.md"))
+    return {page.relative_to(DOCS).as_posix(): page.read_text(encoding="utf-8") for page in there}
+
+
+def main() -> None:
+    """Write all pages, and remove those of what is gone."""
     made = pages()
-    for old in folder.glob("*.md"):
-        if old.name not in made:
-            old.unlink()
-    for name, text in made.items():
-        (folder / name).write_text(text, encoding="utf-8")
+    for path in written().keys() - made.keys():
+        (DOCS / path).unlink()
+    for path, text in made.items():
+        (DOCS / path).parent.mkdir(exist_ok=True)
+        (DOCS / path).write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "findings")
+    main()

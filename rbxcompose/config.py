@@ -37,6 +37,11 @@ class Dimensioned:
     dimension: Dimension
 
 
+@dataclass(frozen=True, slots=True)
+class Live:
+    """Marks a field that may change while the robot runs: `speed: Annotated[Speed, Live()] = 0.3`."""
+
+
 def _reads(dimension: Dimension) -> BeforeValidator:
     def read(value: object) -> float:
         return to_si(value, dimension)

@@ -29,6 +29,7 @@ FAMILIES = {
     "80": "simulated and real",
     "90": "commands and running robots",
     "91": "new manifests",
+    "92": "recordings",
 }
 """What the first two digits of a code stand for."""
 

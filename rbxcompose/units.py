@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
 from rbxcompose.findings import suggest
@@ -238,6 +239,7 @@ def _require_moderate(value: float) -> None:
         raise UnitError("a number must be finite and below 1e15")
 
 
+@lru_cache(1000)  # robots say the same again and again
 def parse_quantity(text: str) -> Quantity:
     """Read `0.3 m/s`, `5s`, `-90 deg`, `1e-3 m`, `50 %` or a plain number.
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from rbxcompose.testing.golden import Golden
+from tests.soak import Soak
 
 ROOT = Path(__file__).parents[1]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write golden files anew")
+    parser.addoption("--soak", action="store_true", help="try many more random examples, and keep the figures")
 
 
 @pytest.fixture
@@ -26,3 +29,12 @@ def repository(monkeypatch: pytest.MonkeyPatch) -> Path:
     """The repository's root, as the current directory, so that findings name files as a person would see them."""
     monkeypatch.chdir(ROOT)
     return ROOT
+
+
+@pytest.fixture(scope="session")
+def soak(request: pytest.FixtureRequest) -> Iterator[Soak]:
+    """How many examples random tests try, and where they tell what they found."""
+    soak = Soak(is_on=bool(request.config.getoption("--soak")))
+    yield soak
+    if soak.is_on:
+        soak.write()

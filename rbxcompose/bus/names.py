@@ -8,6 +8,7 @@ from dataclasses import dataclass
 LONGEST_NAME = 247  # rmw's limit: 255 bytes less the prefixes that some middleware adds
 
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+_DDS = re.compile(r"(\w+)::(\w+)::dds_::(\w+)_")
 
 
 def name_problem(name: str) -> str:
@@ -40,6 +41,12 @@ def dds_type(ros_type: str) -> str:
     """Return the name that DDS has for a ROS type: `std_msgs/msg/String` is `std_msgs::msg::dds_::String_`."""
     package, kind, name = ros_type.split("/")
     return f"{package}::{kind}::dds_::{name}_"
+
+
+def ros_type(dds: str) -> str:
+    """Return the ROS type that has this name in DDS; another text as it is."""
+    found = _DDS.fullmatch(dds)
+    return "/".join(found.groups()) if found else dds
 
 
 def data_key(domain: int, full_name: str, ros_type: str, type_hash: str) -> str:

@@ -54,6 +54,11 @@ class Publisher(Generic[M]):
         self._token = node.announce(endpoint)
         topics.publishers.add(self.route, self)
 
+    @property
+    def has_match(self) -> bool:
+        """Tell whether somebody in another process would receive it, now or (if latched) later."""
+        return self._remote.has_match
+
     def __call__(self, message: M) -> None:
         """Publish `message`."""
         process = self._process

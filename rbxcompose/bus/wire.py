@@ -47,6 +47,22 @@ class WireProfile:
         # Deadline, lifespan and liveliness are never set.
         return f"{reliability}:{durability}:{history},{depth}:,:,:,,"
 
+    def read_qos(self, text: str) -> RosQos:
+        """Return what `qos_text` wrote.
+
+        Raises:
+            ValueError: if it is something else.
+        """
+        reliability, durability, history, *_ = text.split(":")
+        kind, depth = history.split(",")
+        default = self.default_qos
+        return RosQos(
+            is_reliable=reliability == "1" if reliability else default.is_reliable,
+            is_transient_local=durability == "1" if durability else default.is_transient_local,
+            keeps_all=kind == "2" if kind else default.keeps_all,
+            depth=int(depth) if depth else default.depth,
+        )
+
 
 def _unless(is_default: bool, value: int) -> str:
     return "" if is_default else str(value)

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import zenoh
 
 LEASE = 2000  # [ms] until a link that went silent counts as lost
+PATIENCE = 1000  # [ms] of a visitor with a router that does not answer
 
 _COMMON: Mapping[str, object] = {
     "scouting/multicast/enabled": False,
@@ -47,9 +48,33 @@ def router_settings(port: int) -> dict[str, object]:
     }
 
 
+def client_settings(router: str) -> dict[str, object]:
+    """Return the configuration of a visitor, which hears through `router` of everything at once."""
+    return {
+        **_COMMON,
+        "mode": "client",
+        "connect/endpoints": [router],
+        "connect/timeout_ms": PATIENCE,
+        "connect/exit_on_failure": True,
+        "transport/unicast/open_timeout": PATIENCE,  # a router that was stopped takes connections, and says nothing
+    }
+
+
 def open_peer(router: str) -> zenoh.Session:
     """Open the session of a process; the router need not be there yet."""
     return zenoh.open(_config(peer_settings(router)))
+
+
+def open_client(router: str) -> zenoh.Session:
+    """Open the session of a visitor.
+
+    Raises:
+        OSError: if `router` is no endpoint, or does not answer.
+    """
+    try:
+        return zenoh.open(_config(client_settings(router)))
+    except zenoh.ZError as error:
+        raise OSError(errno.ECONNREFUSED, f"no router answers at {router}") from error
 
 
 def open_router(port: int) -> zenoh.Session:

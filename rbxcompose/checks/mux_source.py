@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from rbxcompose.checking import check
-from rbxcompose.findings import Finding, correction, suggest
+from rbxcompose.findings import Finding, correction, suggest, surely_meant
 from rbxcompose.model.robot import Robot
 from rbxcompose.sdk.ports import Out
 
@@ -66,7 +66,10 @@ def missing(robot: Robot, source: str) -> Wrong | None:
     if component not in robot.written:
         message = f"takes from a component that the robot does not have: '{component}'"
         valid = robot.manifest.components
-        return Wrong(message, suggest(component, valid, "components of this robot"), component, valid)
+        help_text = suggest(component, valid, "components of this robot")
+        if surely_meant(component, set(valid)) is None:
+            help_text += "; without 'from' the input is open to the outside"
+        return Wrong(message, help_text, component, valid)
     part = robot.parts.get(component)
     if part is None:
         return None  # it is there, but broken: that is said at its own place

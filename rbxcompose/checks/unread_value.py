@@ -14,7 +14,7 @@ def unread_value(robot: Robot) -> Iterator[Finding]:
     """A value that no mission reads
 
     `values:` are names for missions. One that none of them reads is left over, or a mission looks at another one by
-    mistake.
+    mistake. What a part of the robot gives without being asked is no mistake.
 
     Bad:
     ```yaml
@@ -29,8 +29,9 @@ def unread_value(robot: Robot) -> Iterator[Finding]:
     ```
     """
     read = frozenset[str]().union(*(mission.program.reads() for mission in robot.missions.values()))
+    given = frozenset[str]().union(*(part.values for part in robot.manifest.parts.values()))
     for name in robot.manifest.values if robot.missions else ():
-        if name not in read:
+        if name not in read | given:
             yield unread_value.at(
                 robot.key("values", name),
                 f"no mission reads the value '{name}'",

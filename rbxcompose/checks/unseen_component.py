@@ -44,9 +44,9 @@ def unseen_component(robot: Robot) -> Iterator[Finding]:
     """
     analyzers = robot.manifest.diagnostics.analyzers
     groups = [Analyzer(one.match, one.expected) for one in analyzers.values()]
-    lost = dropped(robot)
-    for name in robot.written if groups else ():
-        if name in robot.parts and name not in lost and not any(group.matches(name) for group in groups):
+    seen = {*dropped(robot), *(name for group in groups for name in (*group.match, *group.expected))}
+    for name in robot.written - seen if groups else ():
+        if name in robot.parts and not any(group.matches(name) for group in groups):
             yield unseen_component.at(
                 robot.part_span(name),
                 f"no analyzer matches '{name}'",

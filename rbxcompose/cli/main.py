@@ -1,26 +1,24 @@
 """The command `rbxcompose`: finds the verb's file and hands over. One file in this folder is one verb.
 
 A verb's module has `add_arguments(parser)` and `run(arguments) -> exit code`; the first line of its docstring is its
-help. Only the verb that is asked for is imported.
+help. Only the verb that is asked for is imported, and nothing that help can do without.
 """
 
 from __future__ import annotations
 
-import argparse
-import ast
 import importlib
 import os
-import pkgutil
 import signal
 import sys
-from collections.abc import Sequence
-from pathlib import Path
-from types import FrameType
-from typing import NoReturn, Protocol, cast
+from typing import TYPE_CHECKING, NoReturn, Protocol, cast
 
 import rbxcompose
 from rbxcompose import cli
-from rbxcompose.findings import suggest
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Sequence
+    from types import FrameType
 
 USAGE, INTERRUPTED = 2, 130
 _ABOUT = "Docker Compose for robots: YAML in, a checked and running robot out."
@@ -42,7 +40,8 @@ class Verb(Protocol):
 
 def verbs() -> list[str]:
     """Return the names of all verbs, sorted."""
-    return sorted(one.name for one in pkgutil.iter_modules(cli.__path__) if not one.ispkg and one.name != "main")
+    names = (name.removesuffix(".py") for name in os.listdir(cli.__path__[0]) if name.endswith(".py"))
+    return sorted(name for name in names if name not in ("__init__", "main"))
 
 
 def load(verb: str) -> Verb:
@@ -62,6 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.write(f"rbxcompose {rbxcompose.__version__}\n")
         return 0
     if words[0] not in verbs():
+        from rbxcompose.findings import suggest
+
         hint = suggest(words[0], verbs(), "commands")
         sys.stderr.write(f"rbxcompose: there is no command {words[0]!r}; {hint}\n")
         return USAGE
@@ -74,6 +75,8 @@ def _interrupted(number: int, frame: FrameType | None) -> NoReturn:
 
 
 def _run(name: str, words: Sequence[str]) -> int:
+    import argparse
+
     try:
         verb = load(name)
         about = verb.__doc__ or ""
@@ -93,6 +96,6 @@ def _help() -> str:
 
 
 def _about(name: str) -> str:
-    """Return the first line of a verb's docstring from its text: importing all verbs would take its time."""
-    text = Path(next(iter(cli.__path__)), f"{name}.py").read_text(encoding="utf-8")
-    return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
+    """Return the first line of a verb's docstring, the first of its text: importing all verbs would take its time."""
+    with open(os.path.join(cli.__path__[0], f"{name}.py"), encoding="utf-8") as file:
+        return file.readline().strip().strip('"')

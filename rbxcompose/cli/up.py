@@ -40,15 +40,16 @@ def run(arguments: argparse.Namespace) -> int:
     tell_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.report.has_errors:
         return 1
-    return run_plan(
-        compilation.plan,
-        RunOptions(
-            is_stepped=arguments.rate.is_stepped,
-            rate=arguments.rate.rate,
-            duration=arguments.duration,
-            is_detached=arguments.detach,
-        ),
+    options = RunOptions(
+        is_stepped=arguments.rate.is_stepped,
+        rate=arguments.rate.rate,
+        duration=arguments.duration,
+        is_detached=arguments.detach,
     )
+    if options.is_stepped and options.rate is None and options.duration is None and compilation.plan.start is None:
+        sys.stderr.write("rbxcompose up: without 'start:' nothing ends a run at --rate max: give --for\n")
+        return USAGE
+    return run_plan(compilation.plan, options)
 
 
 def _rate(text: str) -> RunOptions:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field
 
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.msgs.rbxcompose_msgs import SetBatteryLevel
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.sdk import Component, Config, Out, Ratio, Refused, Serves, Time, component
+from rbxcompose.sdk import Component, Config, Live, Out, Ratio, Refused, Serves, Time, component
 from rbxcompose.sim.battery import BatteryCore, BatterySettings
 
 PERCENT = 100.0  # a `battery_level` message counts from 0 to 100
@@ -16,13 +18,13 @@ PERCENT = 100.0  # a `battery_level` message counts from 0 to 100
 class BatterySimConfig(Config):
     """How fast the battery drains and when it complains."""
 
-    runtime: Time = Field(gt=0)
+    runtime: Annotated[Time, Live()] = Field(gt=0)
     """Time from full to empty."""
     initial: Ratio = Field(1.0, ge=0, le=1)
     """Charge at the start."""
-    warn: Ratio = Field(0.5, ge=0, le=1)
+    warn: Annotated[Ratio, Live()] = Field(0.5, ge=0, le=1)
     """Below this charge its status is WARN."""
-    error: Ratio = Field(0.2, ge=0, le=1)
+    error: Annotated[Ratio, Live()] = Field(0.2, ge=0, le=1)
     """Below this charge its status is ERROR."""
 
 
@@ -42,10 +44,13 @@ class BatterySim(Component[BatterySimConfig]):
 
     def configure(self) -> None:
         """Fill the battery."""
-        config = self.config
-        settings = BatterySettings(runtime=config.runtime, warn=config.warn, error=config.error)
-        self.core = BatteryCore(settings, config.initial)
+        self.core = BatteryCore(settings_of(self.config), self.config.initial)
         self.told = Level.OK
+
+    def reconfigure(self, old: BatterySimConfig) -> None:
+        """Drain and complain as it is set now; the charge stays as it is."""
+        self.core.settings = settings_of(self.config)
+        self.publish()
 
     def activate(self) -> None:
         """Tell the first level at once, since others wait for it."""
@@ -73,3 +78,8 @@ class BatterySim(Component[BatterySimConfig]):
         if level is not self.told:
             self.context.log(level, f"{message}: {percent:.0f} %")
             self.told = level
+
+
+def settings_of(config: BatterySimConfig) -> BatterySettings:
+    """Return the settings of the core."""
+    return BatterySettings(runtime=config.runtime, warn=config.warn, error=config.error)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 from pydantic import Field
 
@@ -20,6 +21,7 @@ from rbxcompose.sdk import (
     Component,
     Config,
     In,
+    Live,
     Out,
     Speed,
     Time,
@@ -34,15 +36,15 @@ BASE = "base_footprint"
 class DiffDriveSimConfig(Config):
     """Limits of the base."""
 
-    max_speed: Speed = Field(0.5, gt=0)
+    max_speed: Annotated[Speed, Live()] = Field(0.5, gt=0)
     """Largest speed, forwards and backwards."""
-    max_turn_rate: AngularSpeed = Field(math.pi / 2, gt=0)
+    max_turn_rate: Annotated[AngularSpeed, Live()] = Field(math.pi / 2, gt=0)
     """Largest turn rate."""
-    acceleration: Acceleration = Field(1.0, gt=0)
-    """Of speeding up and of braking."""
-    turn_acceleration: AngularAcceleration = Field(3.0, gt=0)
-    """Of turning faster and slower."""
-    command_timeout: Time = Field(0.5, gt=0)
+    acceleration: Annotated[Acceleration, Live()] = Field(1.0, gt=0)
+    """Acceleration of speeding up and of braking."""
+    turn_acceleration: Annotated[AngularAcceleration, Live()] = Field(3.0, gt=0)
+    """Acceleration of turning faster and slower."""
+    command_timeout: Annotated[Time, Live()] = Field(0.5, gt=0)
     """The base brakes when no command came for this long."""
 
 
@@ -63,16 +65,11 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
 
     def configure(self) -> None:
         """Put the base to the origin of `odom`."""
-        config = self.config
-        self.core = DiffDriveCore(
-            DiffDriveSettings(
-                max_speed=config.max_speed,
-                max_turn_rate=config.max_turn_rate,
-                acceleration=config.acceleration,
-                turn_acceleration=config.turn_acceleration,
-                command_timeout=config.command_timeout,
-            )
-        )
+        self.core = DiffDriveCore(settings_of(self.config))
+
+    def reconfigure(self, old: DiffDriveSimConfig) -> None:
+        """Follow commands within the limits as they are now; the last one holds as it was cut."""
+        self.core.settings = settings_of(self.config)
 
     @property
     def is_at_rest(self) -> bool:
@@ -129,3 +126,14 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
     def summary(self) -> dict[str, str]:
         """Tell how far it went."""
         return {"distance driven": f"{self.core.distance:.2f} m"}
+
+
+def settings_of(config: DiffDriveSimConfig) -> DiffDriveSettings:
+    """Return the settings of the core."""
+    return DiffDriveSettings(
+        max_speed=config.max_speed,
+        max_turn_rate=config.max_turn_rate,
+        acceleration=config.acceleration,
+        turn_acceleration=config.turn_acceleration,
+        command_timeout=config.command_timeout,
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 from pydantic import Field
 
@@ -16,6 +17,7 @@ from rbxcompose.sdk import (
     Component,
     Config,
     Length,
+    Live,
     Looks,
     Out,
     ServedGoal,
@@ -30,13 +32,13 @@ MAP = "map"
 class GoToConfig(Config):
     """How to drive."""
 
-    speed: Speed = Field(0.3, gt=0)
+    speed: Annotated[Speed, Live()] = Field(0.3, gt=0)
     """Largest speed forwards."""
-    turn_rate: AngularSpeed = Field(math.radians(60), gt=0)
+    turn_rate: Annotated[AngularSpeed, Live()] = Field(math.radians(60), gt=0)
     """Largest turn rate."""
-    tolerance: Length = Field(0.05, gt=0)
+    tolerance: Annotated[Length, Live()] = Field(0.05, gt=0)
     """How far from the goal the base may end."""
-    heading_tolerance: Angle = Field(math.radians(3), gt=0)
+    heading_tolerance: Annotated[Angle, Live()] = Field(math.radians(3), gt=0)
     """How far from the goal's heading it may end."""
 
 
@@ -55,16 +57,12 @@ class GoTo(Component[GoToConfig]):
 
     def configure(self) -> None:
         """Build the core."""
-        config = self.config
-        self.core = GoToCore(
-            GoToSettings(
-                speed=config.speed,
-                turn_rate=config.turn_rate,
-                distance_tolerance=config.tolerance,
-                heading_tolerance=config.heading_tolerance,
-            )
-        )
+        self.core = GoToCore(settings_of(self.config))
         self.driving: object = None  # the goal that the core drives to
+
+    def reconfigure(self, old: GoToConfig) -> None:
+        """Go on to the same goal as it is set now."""
+        self.core.settings = settings_of(self.config)
 
     def accept_go_to(self, goal: NavigateToPose.Goal) -> str:
         """Refuse a goal in another frame, or one that is no pose."""
@@ -112,6 +110,16 @@ class GoTo(Component[GoToConfig]):
     def drive(self, velocity: Velocity2) -> None:
         """Publish a velocity."""
         self.cmd_vel(Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular)))
+
+
+def settings_of(config: GoToConfig) -> GoToSettings:
+    """Return the settings of the core."""
+    return GoToSettings(
+        speed=config.speed,
+        turn_rate=config.turn_rate,
+        distance_tolerance=config.tolerance,
+        heading_tolerance=config.heading_tolerance,
+    )
 
 
 def pose_of(message: PoseStamped) -> Pose2:

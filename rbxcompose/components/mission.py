@@ -88,7 +88,7 @@ class Errand:
 class Mission(Component[MissionConfig]):
     """Runs the mission that the robot starts with; each action of the robot is a skill.
 
-    Written by the compiler from the sections `missions`, `start`, `values` and `places`.
+    It is made of the sections `missions`, `start`, `values` and `places`.
 
     Example:
         executive: {type: mission}

@@ -15,6 +15,7 @@ from rbxcompose.diagnostics.status import Status
 
 DEFAULT_TIMEOUT = 5.0  # [s]
 OTHER = "Other"  # the group of what no analyzer matches
+_GLOB = frozenset("*?[")
 MOST_ITEMS = 10_000  # names come from the outside; the tree must not grow without end
 
 
@@ -31,7 +32,8 @@ class Analyzer:
 
     def matches(self, name: str) -> bool:
         """Tell whether the status called `name` belongs to this group."""
-        return any(_matches(name, pattern) for pattern in (*self.match, *self.expected))
+        parts = (name, _component(name))
+        return any(_matches(parts, pattern) for pattern in (*self.match, *self.expected))
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,9 +149,11 @@ def _component(name: str) -> str:
     return name.partition(": ")[0]
 
 
-def _matches(name: str, pattern: str) -> bool:
+def _matches(parts: tuple[str, str], pattern: str) -> bool:
     # Equality first: a name may hold brackets, which are signs of a glob.
-    return any(part == pattern or fnmatchcase(part, pattern) for part in (name, _component(name)))
+    if pattern in parts:
+        return True
+    return not _GLOB.isdisjoint(pattern) and any(fnmatchcase(part, pattern) for part in parts)
 
 
 def _flat(name: str) -> str:

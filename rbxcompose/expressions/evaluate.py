@@ -1,9 +1,13 @@
-"""The value of an expression in a scope, and whether a condition holds; pure, and bounded by the size of the tree."""
+"""The value of an expression in a scope, and whether a condition holds; pure, and bounded by the size of the tree.
+
+A tree becomes a function of the scope at its first use: missions ask the same conditions again and again.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from operator import add, ge, gt, le, lt, mul, sub, truediv
+from typing import TypeAlias
 
 from rbxcompose.expressions.functions import FUNCTIONS, items
 from rbxcompose.expressions.tree import (
@@ -41,6 +45,10 @@ from rbxcompose.expressions.values import (
 )
 from rbxcompose.units import MOST, format_number
 
+Run: TypeAlias = Callable[[Scope], Value]
+Ask: TypeAlias = Callable[[Scope], bool]
+Measure: TypeAlias = Callable[[Scope], float]
+
 _ORDERS: Mapping[str, Callable[[float, float], bool]] = {"<": lt, "<=": le, ">": gt, ">=": ge}
 _OPERATIONS: Mapping[str, Callable[[float, float], float]] = {"+": add, "-": sub, "*": mul, "/": truediv}
 
@@ -53,7 +61,10 @@ def evaluate(expression: Expression, scope: Scope) -> Value:
         EvaluationError: if it has no value otherwise, or one beyond the limits.
     """
     tree = expression.tree
-    value = _value(tree, scope)
+    run = expression.made.get("run")
+    if run is None:
+        run = expression.made["run"] = _run(tree)
+    value = run(scope)
     if is_number(value):
         return _moderate(_number(value, tree), tree)
     return _limited_within(_limited(value, tree), tree)
@@ -67,40 +78,99 @@ def holds(expression: Expression, scope: Scope) -> bool:
     Raises:
         EvaluationError: if it is neither true nor false.
     """
+    ask = expression.made.get("ask")
+    if ask is None:
+        ask = expression.made["ask"] = _ask(expression.tree)
     try:
-        return _flag(expression.tree, scope)
+        return bool(ask(scope))
     except NotArrivedError:
         return False
 
 
-def _value(node: Node, scope: Scope) -> Value:
+def _run(node: Node) -> Run:
+    """Return what computes the value of a part of an expression."""
     match node:
-        case Variable(name=name):
-            return _arrived(name, _known(scope.variable, name, f"${name}", node))
-        case Number(value=value) | Text(value=value) | Flag(value=value):
-            return value
-        case Comparison():
-            return _compared(node, scope)
-        case Junction(operator=operator, operands=operands):
-            wanted = operator == "or"
-            return any(_flag(operand, scope) is wanted for operand in operands) is wanted
-        case Not(operand=operand):
-            return not _flag(operand, scope)
+        case Variable():
+            return _variable(node)
+        case Number(value=value) | Text(value=value):
+            return lambda scope: value
+        case Flag() | Comparison() | Junction() | Not() | Membership():
+            return _ask(node)
         case Word(name=name):
-            return _known(scope.word, name, name, node)
+            return lambda scope: _known(scope.word, name, name, node)
         case Field() | Index():
-            return _part(node, scope)
+            return _part(node)
         case Call():
-            return _called(node, scope)
-        case Membership(item=item, group=group):
-            sought = _value(item, scope)
-            return any(is_same(sought, each) for each in _items(_value(group, scope), group))
+            return _called(node)
         case Arithmetic():
-            return _computed(node, scope)
+            return _computed(node)
         case Minus(operand=operand):
-            return -_number(_value(operand, scope), operand)
+            measure = _measure(operand)
+            return lambda scope: -measure(scope)
         case Items(items=nodes):
-            return [_value(item, scope) for item in nodes]
+            runs = [_run(item) for item in nodes]
+            return lambda scope: [run(scope) for run in runs]
+
+
+def _ask(node: Node) -> Ask:
+    """Return what tells whether a part of an expression is true; it may be nothing else."""
+    match node:
+        case Flag(value=flag):
+            return lambda scope: flag
+        case Comparison():
+            return _compared(node)
+        case Junction(operator=operator, operands=operands):
+            wanted, asks = operator == "or", [_ask(operand) for operand in operands]
+            return lambda scope: any(ask(scope) is wanted for ask in asks) is wanted
+        case Not(operand=operand):
+            inner = _ask(operand)
+            return lambda scope: not inner(scope)
+        case Membership(item=item, group=group):
+            sought, among = _run(item), _run(group)
+            return lambda scope: _is_among(sought(scope), _items(among(scope), group))
+    run = _run(node)
+
+    def ask(scope: Scope) -> bool:
+        value = run(scope)
+        if not isinstance(value, bool):
+            raise EvaluationError("this is neither true nor false", node.start, node.end)
+        return value
+
+    return ask
+
+
+def _is_among(sought: Value, group: list[Value]) -> bool:
+    return any(is_same(sought, each) for each in group)
+
+
+def _measure(node: Node) -> Measure:
+    """Return what computes a part of an expression that must be a number."""
+    if isinstance(node, Number):
+        number = node.value
+        return lambda scope: number
+    run = _run(node)
+
+    def measure(scope: Scope) -> float:
+        value = run(scope)
+        # NaN compares as false whatever is asked, so that `not` would make it true.
+        return value if type(value) is float and value == value else _number(value, node)
+
+    return measure
+
+
+def _variable(node: Variable) -> Run:
+    name = node.name
+
+    def run(scope: Scope) -> Value:
+        try:
+            value = scope.variable(name)
+        except KeyError:
+            raise EvaluationError(f"unknown name '${name}'", node.start, node.end) from None
+        if value is NOT_ARRIVED:
+            raise NotArrivedError(name)
+        return value
+
+    return run
 
 
 def _known(look_up: Callable[[str], Value], name: str, shown: str, node: Node) -> Value:
@@ -108,19 +178,6 @@ def _known(look_up: Callable[[str], Value], name: str, shown: str, node: Node) -
         return look_up(name)
     except KeyError:
         raise EvaluationError(f"unknown name '{shown}'", node.start, node.end) from None
-
-
-def _arrived(name: str, value: Value) -> Value:
-    if value is NOT_ARRIVED:
-        raise NotArrivedError(name)
-    return value
-
-
-def _flag(node: Node, scope: Scope) -> bool:
-    value = _value(node, scope)
-    if not isinstance(value, bool):
-        raise EvaluationError("this is neither true nor false", node.start, node.end)
-    return value
 
 
 def _number(value: Value, node: Node) -> float:
@@ -172,32 +229,50 @@ def _items(value: Value, node: Node) -> list[Value]:
         raise EvaluationError(f"'in' {error}", node.start, node.end) from None
 
 
-def _compared(node: Comparison, scope: Scope) -> bool:
-    left, right = _value(node.left, scope), _value(node.right, scope)
+def _compared(node: Comparison) -> Ask:
     if order := _ORDERS.get(node.operator):
-        return order(_number(left, node.left), _number(right, node.right))
-    for value, operand in ((left, node.left), (right, node.right)):
-        if isinstance(value, float) and value != value:
-            raise EvaluationError("this is not a number", operand.start, operand.end)
-    return is_same(left, right) is (node.operator == "==")
+        one, other = _measure(node.left), _measure(node.right)
+        return lambda scope: order(one(scope), other(scope))
+    left, right, is_equal = _run(node.left), _run(node.right), node.operator == "=="
+
+    def ask(scope: Scope) -> bool:
+        values = left(scope), right(scope)
+        for value, operand in zip(values, (node.left, node.right), strict=True):
+            if isinstance(value, float) and value != value:
+                raise EvaluationError("this is not a number", operand.start, operand.end)
+        return is_same(*values) is is_equal
+
+    return ask
 
 
-def _computed(node: Arithmetic, scope: Scope) -> Value:
-    left, right = _value(node.left, scope), _value(node.right, scope)
-    if node.operator == "+":
-        if isinstance(left, str) and isinstance(right, str):
-            return _limited(left + right, node)
-        if isinstance(left, list | tuple) and isinstance(right, list | tuple):
-            return _limited([*left, *right], node)
-    one, other = _number(left, node.left), _number(right, node.right)
-    if node.operator == "/" and other == 0:
-        raise EvaluationError("division by zero", node.right.start, node.right.end)
-    return _moderate(_OPERATIONS[node.operator](one, other), node)
+def _computed(node: Arithmetic) -> Run:
+    left, right, operation = _run(node.left), _run(node.right), _OPERATIONS[node.operator]
+
+    def run(scope: Scope) -> Value:
+        one, other = left(scope), right(scope)
+        if node.operator == "+":
+            if isinstance(one, str) and isinstance(other, str):
+                return _limited(one + other, node)
+            if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+                return _limited([*one, *other], node)
+        first, second = _number(one, node.left), _number(other, node.right)
+        if node.operator == "/" and second == 0:
+            raise EvaluationError("division by zero", node.right.start, node.right.end)
+        return _moderate(operation(first, second), node)
+
+    return run
 
 
-def _part(node: Field | Index, scope: Scope) -> Value:
-    whole = _value(node.of, scope)
-    key = node.name if isinstance(node, Field) else _value(node.index, scope)
+def _part(node: Field | Index) -> Run:
+    of = _run(node.of)
+    if isinstance(node, Field):
+        name = node.name
+        return lambda scope: _entry(of(scope), name, node)
+    index = _run(node.index)
+    return lambda scope: _entry(of(scope), index(scope), node)
+
+
+def _entry(whole: Value, key: Value, node: Field | Index) -> Value:
     if not isinstance(key, str) and isinstance(key, Place):
         key = key.name
     if isinstance(whole, Mapping):
@@ -213,27 +288,37 @@ def _part(node: Field | Index, scope: Scope) -> Value:
     return whole[int(position)]
 
 
-def _called(node: Call, scope: Scope) -> Value:
-    function = FUNCTIONS[node.function]
-    if wrong := function.wrong_count(len(node.arguments)):
+def _called(node: Call) -> Run:
+    function, name = FUNCTIONS[node.function], node.function
+    compute, wrong = function.compute, function.wrong_count(len(node.arguments))
+    if compute is None or wrong:
+        return lambda scope: _asked(node, scope, wrong)
+    runs = [_run(argument) for argument in node.arguments]
+
+    def run(scope: Scope) -> Value:
+        values = [run(scope) for run in runs]
+        if name == "distance":
+            values = [
+                _known(scope.word, value, value, argument) if isinstance(value, str) else value
+                for value, argument in zip(values, node.arguments, strict=True)
+            ]
+        try:
+            return compute(*values)
+        except ValueError as error:
+            raise EvaluationError(f"{name}() {error}", node.start, node.end) from None
+
+    return run
+
+
+def _asked(node: Call, scope: Scope, wrong: str) -> Value:
+    """Return what only the scope knows of a `$name`."""
+    if wrong:
         raise EvaluationError(f"{node.function}() {wrong}", node.start, node.end)
-    if not function.compute:
-        return _asked(node, scope)
-    values = [_value(argument, scope) for argument in node.arguments]
-    if node.function == "distance":
-        values = [
-            _known(scope.word, value, value, argument) if isinstance(value, str) else value
-            for value, argument in zip(values, node.arguments, strict=True)
-        ]
-    try:
-        return function.compute(*values)
-    except ValueError as error:
-        raise EvaluationError(f"{node.function}() {error}", node.start, node.end) from None
-
-
-def _asked(node: Call, scope: Scope) -> Value:
     argument = node.arguments[0]
     if not isinstance(argument, Variable):
         raise EvaluationError(f"{node.function}() needs a name with '$'", argument.start, argument.end)
     ask = scope.age if node.function == "age" else scope.is_new
-    return _arrived(argument.name, _known(ask, argument.name, f"${argument.name}", argument))
+    value = _known(ask, argument.name, f"${argument.name}", argument)
+    if value is NOT_ARRIVED:
+        raise NotArrivedError(argument.name)
+    return value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from rbxcompose.units import Dimension
 
@@ -209,6 +209,8 @@ class Expression:
     """Bare words, with their dots."""
     calls: tuple[Reference, ...] = field(init=False, compare=False, repr=False)
     """Functions."""
+    made: dict[str, Any] = field(init=False, compare=False, repr=False, default_factory=dict)
+    """What was made of the tree, to compute it faster."""
 
     def __post_init__(self) -> None:
         nodes = [node for node, _ in walk(self.tree)]

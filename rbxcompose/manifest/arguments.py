@@ -30,16 +30,16 @@ CHOICE = "choice"
 
 
 class ArgumentModel(Config):
-    """One entry of `args:` or `inputs:`; the values are read by its type."""
+    """A typed argument of a robot or part, or a typed input of a mission."""
 
     type: str = Field(json_schema_extra={"enum": [*TYPES, CHOICE]})
     """What it is: a dimension, `count`, `number`, `text`, `flag`, `place`, `pose`, `choice`, `list` or `map`."""
     default: Any = None
     """Its value if nobody gives one."""
     min: Any = None
-    """Smallest value."""
+    """Smallest value; for quantities, counts and numbers."""
     max: Any = None
-    """Largest value."""
+    """Largest value; for quantities, counts and numbers."""
     choices: list[str] = []
     """The words that a `choice` takes."""
     about: str = ""

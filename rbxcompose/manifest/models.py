@@ -15,6 +15,7 @@ from rbxcompose.findings import Span
 from rbxcompose.manifest.history import History
 from rbxcompose.manifest.inclusions import Inclusions
 from rbxcompose.manifest.tree import Mapping
+from rbxcompose.restarts import DEFAULT, Restart, When
 
 SECTIONS = (
     *("args", "bus", "components", "include", "body", "buses", "actuators", "joints", "controllers", "safety"),
@@ -31,10 +32,10 @@ InterfaceName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(/(ms
 PortName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)?$", max_length=121)]
 
 
-def _short_for(key: str, model: type[Config]) -> BeforeValidator:
+def _short_for(key: str, model: type[Config], word: Any = str) -> BeforeValidator:
     """Let one word stand for a map with that one key."""
     return BeforeValidator(
-        lambda value: {key: value} if isinstance(value, str) else value, json_schema_input_type=model | str
+        lambda value: {key: value} if isinstance(value, str) else value, json_schema_input_type=model | word
     )
 
 
@@ -44,9 +45,9 @@ class Header(Config):
     rbx: Literal[1]
     """Version of the language."""
     kind: str
-    """What this file describes."""
+    """What this file describes: `Robot`, `Part`, `Overlay` or `Mission`."""
     name: Name
-    """Its name."""
+    """Its name: small letters, digits and underscores."""
     about: str = ""
     """What it is for, in a sentence."""
 
@@ -55,21 +56,21 @@ class Sections(Header):
     """What robots, parts and overlays have in common."""
 
     args: Any = None
-    """Typed arguments by name."""
+    """Arguments by name: what a user of the robot or part may want to set, read by `${args.NAME}`."""
     include: Any = None
-    """Parts, by the name of the instance."""
+    """Parts of which the robot is made, by the name of the instance, which stands before all names of the part."""
     components: Any = None
-    """What runs, by name."""
+    """What runs, by name: a `type`, the settings of that type, and options that every type takes."""
     muxes: Any = None
-    """Who may command what, by output topic."""
+    """Who may command, by the topic that is commanded: the live input of the largest priority is let through."""
     diagnostics: Any = None
-    """How the states of components are grouped."""
+    """How the states of components are grouped: each group is OK, WARN, ERROR or STALE."""
     places: Any = None
-    """Named poses in `map`."""
+    """Places by name: poses in `map`, to which missions refer."""
     values: Any = None
-    """Short names for data that missions read."""
+    """Short names for data that missions read by `$NAME`."""
     missions: Any = None
-    """Mission files by name."""
+    """Missions that the robot has, by name: their files, and the values of their inputs."""
 
 
 class RobotFile(Sections):
@@ -80,7 +81,7 @@ class RobotFile(Sections):
     start: Any = None
     """The mission that `up` runs."""
     profiles: Any = None
-    """Named overlays."""
+    """Changes to the robot by name, made when asked for by `--profile NAME`."""
 
 
 class OverlayFile(Sections):
@@ -96,9 +97,9 @@ class PartFile(Sections):
     """Something that robots are made of: sections of a robot with arguments of their own."""
 
     needs: Any = None
-    """What must be there outside of the part."""
+    """What must be there outside of the part; `check` sees to it."""
     provides: Any = None
-    """What the part gives to the rest of the robot."""
+    """What the part gives to the rest of the robot, by the part's own names; `check` sees to it."""
 
 
 class Needs(Config):
@@ -123,9 +124,9 @@ class Include(Config):
     """An instance of a part."""
 
     part: str
-    """The part's file."""
+    """The part's file, relative to this one, or `rbx:parts/NAME.yaml` of the library."""
     with_: dict[Name, Any] = Field({}, alias="with")
-    """Values of its arguments."""
+    """Values of its arguments, by name."""
     connect: dict[TopicName, TopicName] = {}
     """Other names for its topics: those of its ports, of its muxes, and `MUX/INPUT` of a mux's inputs."""
 
@@ -145,6 +146,9 @@ class Bus(Config):
     """An existing router to use instead of an own one, such as `tcp/192.168.0.2:7447`."""
 
 
+RestartModel = Annotated[Restart, _short_for("when", Restart, When)]
+
+
 class ComponentOptions(Config):
     """What every component takes beside its own configuration."""
 
@@ -152,6 +156,8 @@ class ComponentOptions(Config):
     """Its process group; what shares a group shares a process."""
     starts_after: tuple[Name, ...] = ()
     """Components that are active before this one."""
+    restart: RestartModel = DEFAULT
+    """When it is tried again after a failure: a word, or a map with `when`, `max`, `within` and `backoff`."""
     connect: dict[Name, TopicName] = {}
     """Topics by port, where they differ from the port's name."""
 
@@ -214,7 +220,7 @@ class PlaceModel(Config):
     y: Length
     """Position along y."""
     heading: Angle = 0.0
-    """Direction, counted from x towards y."""
+    """Direction, counted from x towards y: 90 deg looks along y."""
     colour: str = ""
     """How viewers draw it."""
 
@@ -227,7 +233,7 @@ class Value(Config):
     topic: TopicName | None = None
     """Topic of data from outside."""
     field: PortName | None = None
-    """Field of its message."""
+    """Field of its message; without it, `data`."""
     type: str | None = None
     """What it is: a dimension, `number`, `text`, `flag`, ..."""
     unit: str | None = None
@@ -238,9 +244,9 @@ class Mission(Config):
     """A mission that the robot has."""
 
     file: str
-    """The mission's file."""
+    """The mission's file, relative to this one."""
     with_: dict[Name, Any] = Field({}, alias="with")
-    """Values of its inputs."""
+    """Values of its inputs, by name."""
 
 
 IncludeModel = Annotated[Include, _short_for("part", Include)]

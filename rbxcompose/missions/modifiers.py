@@ -65,7 +65,13 @@ def modifier(name: str) -> Callable[[M], M]:
 
 @modifier("only_if")
 class OnlyIf(Modifier):
-    """Start only if the condition holds, else be skipped."""
+    """Start only if the condition holds, else be skipped.
+
+    Example:
+        do:
+          - go_to: dock
+            only_if: $battery < 90 %
+    """
 
     __slots__ = ("condition",)
 
@@ -85,7 +91,14 @@ class OnlyIf(Modifier):
 
 @modifier("optional")
 class Optional(Modifier):
-    """Count a failure as success."""
+    """Count a failure as success.
+
+    Example:
+        do:
+          - go_to: corner_1
+            optional: true
+          - go_to: dock
+    """
 
     __slots__ = ("is_on",)
 
@@ -110,7 +123,13 @@ class Optional(Modifier):
 
 @modifier("timeout")
 class Timeout(Modifier):
-    """Fail when the node takes longer, all its attempts together; a result of the same instant is in time."""
+    """Fail when the node takes longer, all its attempts together; a result of the same instant is in time.
+
+    Example:
+        do:
+          go_to: corner_1
+          timeout: 30 s
+    """
 
     __slots__ = ("allowed", "deadline", "duration")
 
@@ -149,7 +168,13 @@ class Tries:
 
 @modifier("attempts")
 class Attempts(Modifier):
-    """Try again after a failure, at the next tick."""
+    """Try again after a failure, at the next tick.
+
+    Example:
+        do:
+          go_to: corner_1
+          attempts: 3
+    """
 
     __slots__ = ("left", "most")
 

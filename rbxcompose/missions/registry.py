@@ -70,7 +70,7 @@ def kind(name: str, options: Mapping[str, str] = MappingProxyType({})) -> Callab
 
 @cache
 def kinds() -> dict[str, Kind]:
-    """Return all kinds by their word."""
+    """Return all kinds by their word, sorted."""
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{package.__name__}.{module.name}")
-    return _KINDS
+    return dict(sorted(_KINDS.items()))

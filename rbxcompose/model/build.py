@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from rbxcompose.config import Config
 from rbxcompose.findings import Report
-from rbxcompose.manifest.models import ComponentEntry, RobotManifest
+from rbxcompose.manifest.models import ComponentEntry, ComponentOptions, RobotManifest
 from rbxcompose.missions.goals import skill_of
 from rbxcompose.missions.sources import SkillSource, ValueSource
 from rbxcompose.model.missions import read_missions
@@ -21,6 +21,7 @@ from rbxcompose.sdk.registry import component_type
 
 MUX = "mux"
 MISSION = "mission"
+NO_OPTIONS = ComponentOptions()
 ALWAYS = ("transforms", "diagnostics")  # what every robot runs
 
 
@@ -44,9 +45,7 @@ def written_parts(manifest: RobotManifest) -> dict[str, Part]:
     for name, entry in manifest.components.items():
         if entry.config is not None:
             connect = {**entry.options.connect, **remaps.get(name, {})}
-            path = ("components", name)
-            options = (entry.options.process, entry.options.starts_after)
-            parts[name] = _part(manifest, name, entry.type, entry.config, connect, path, *options)
+            parts[name] = _part(manifest, name, entry.type, entry.config, connect, ("components", name), entry.options)
     for name in manifest.muxes:
         parts[name] = _mux(manifest, name, parts)
     return parts
@@ -92,12 +91,12 @@ def _part(
     config: Config,
     connect: Mapping[str, str],
     path: tuple[str, ...],
-    process: str | None = None,
-    starts_after: tuple[str, ...] = (),
+    options: ComponentOptions = NO_OPTIONS,
 ) -> Part:
     cls = component_type(type_name)
     ends = ends_of(name, cls, config, manifest.bus.namespace or "", connect)
-    return Part(name, type_name, cls, config, process or cls.process, starts_after, ends, path)
+    process = options.process or cls.process
+    return Part(name, type_name, cls, config, process, options.starts_after, ends, path, options.restart)
 
 
 def _mux_sources(manifest: RobotManifest) -> dict[str, dict[str, str]]:

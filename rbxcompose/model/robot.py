@@ -15,6 +15,7 @@ from rbxcompose.manifest.tree import Mapping, Path, at, key_span, value_span
 from rbxcompose.missions.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, ValueSource
 from rbxcompose.model.wiring import End
+from rbxcompose.restarts import DEFAULT, Restart
 from rbxcompose.sdk.component import Component
 
 
@@ -30,6 +31,7 @@ class Part:
     starts_after: tuple[str, ...]
     ends: tuple[End, ...]
     path: Path = ()
+    restart: Restart = DEFAULT
 
     def end(self, port: str) -> End | None:
         """Return the end of a port, or None."""

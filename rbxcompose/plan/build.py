@@ -28,4 +28,4 @@ def build_plan(robot: Robot) -> Plan:
 
 def _instance(part: Part) -> Instance:
     wires = tuple(Wire(end.name, end.port.kind, end.topic, end.type_name) for end in part.ends)
-    return Instance(part.name, part.type_name, part.config, part.process, part.starts_after, wires)
+    return Instance(part.name, part.type_name, part.config, part.process, part.starts_after, wires, part.restart)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from rbxcompose.config import Config
+from rbxcompose.restarts import DEFAULT, Restart
 
 STEPPED_GROUP = "robot"  # the one process group of a robot on a stepped clock
 
@@ -29,6 +30,7 @@ class Instance:
     process: str
     starts_after: tuple[str, ...] = ()
     wires: tuple[Wire, ...] = ()
+    restart: Restart = DEFAULT
 
     def topic(self, port: str) -> str:
         """Return the absolute name at a port.

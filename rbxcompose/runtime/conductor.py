@@ -84,6 +84,7 @@ class Member:
     is_told_lost: bool = False
     is_closing: bool = False
     is_stopped: bool = False  # as it was told last
+    is_given_up: bool = False  # it has gone, and nothing in it is ever restarted
     last_word: float = 0.0  # [s]
     restarts: int = 0
     requested: set[str] = field(default_factory=set)  # components that were told to become active
@@ -139,7 +140,7 @@ class Conductor:
         """Do the next step of starting, for the robot as a whole or for processes that came again."""
         if self.phase not in (Phase.STARTING, Phase.RUNNING) or not self._all_configured():
             return
-        waiting = [one for one in self._plan.instances if self.states[one.name][0] != "active"]
+        waiting = [one for one in self._plan.instances if self.states[one.name][0] not in ("active", "failed")]
         fresh = [one for one in waiting if one.name not in self.members[one.process].requested]
         if self.phase is Phase.STARTING and waiting[:1] != fresh[:1]:
             return  # the answer of the first is to come, or it is being restarted in place
@@ -156,14 +157,15 @@ class Conductor:
                 self._scheduler.at(self._options.duration, _OWNER, lambda: self.go_down(FINE, "the time is up"))
 
     def _all_configured(self) -> bool:
-        return all(self.members[group].is_configured for group in self._plan.groups)
+        members = (self.members[group] for group in self._plan.groups)
+        return all(member.is_configured or member.is_given_up for member in members)
 
     def _activate(self, group: str, names: list[str]) -> None:
         self.members[group].requested.update(names)
         self._effects.send(group, say.Activate(names))
 
     def _start(self, member: Member) -> None:
-        if not member.is_started:
+        if not member.is_started and not member.is_given_up:
             member.is_started = True
             self._effects.send(member.name, say.Start())
 
@@ -232,12 +234,14 @@ class Conductor:
             self._close_when_at_rest()
             self._close_next()
             return
-        lost = [one.name for one in self._plan.of_group(name)]
-        for one in lost:
-            self.states[one] = ("unconfigured", 0)
+        lost = self._plan.of_group(name)
+        is_for_good = bool(lost) and all(one.restart.when == "never" for one in lost)
+        self.states.update({one.name: ("failed" if is_for_good else "unconfigured", 0) for one in lost})
         delay = member.policy.after_failure(self._scheduler.now)
         if name == WORLD:
             self.go_down(ROBOT_FAILED, f"process '{name}' {how}, and simulated truth with it", Level.ERROR, detail)
+        elif is_for_good:
+            self._give_up(member, how, detail)
         elif delay is None:
             self.go_down(ROBOT_FAILED, f"process '{name}' {how}, too often to go on", Level.ERROR, detail)
         else:
@@ -245,6 +249,12 @@ class Conductor:
             self._tell_lost(member, how)
             member.restarts += 1
             self._scheduler.at(self._scheduler.now + delay, _OWNER, lambda: self._fork_again(name))
+
+    def _give_up(self, member: Member, how: str, detail: str) -> None:
+        member.is_given_up = True
+        self._effects.log(Level.ERROR, f"process '{member.name}' {how}; nothing in it is ever restarted", detail)
+        self._tell_lost(member, how)
+        self._proceed()
 
     def _fork_again(self, name: str) -> None:
         if self.phase in (Phase.STARTING, Phase.RUNNING):

@@ -6,26 +6,34 @@ import traceback
 from collections import deque
 from pathlib import Path
 
-WITHIN = 60.0  # [s] in which failures are counted
-MOST = 5  # failures within that time after which there is no further try
-FIRST_BACKOFF = 0.1  # [s], doubled by each failure in a row
+from rbxcompose.restarts import DEFAULT, Restart
 
 
 class RestartPolicy:
     """Counts failures: `after_failure` tells how long to wait for the next try."""
 
-    def __init__(self) -> None:
+    def __init__(self, restart: Restart = DEFAULT) -> None:
         self.restarts = 0
-        self._failures: deque[float] = deque(maxlen=MOST)
+        self._restart = restart
+        self._failures: deque[float] = deque(maxlen=restart.max)
+
+    @property
+    def is_allowed(self) -> bool:
+        """Tell whether there is any further try, however few failures there were."""
+        return self._restart.when != "never"
 
     def after_failure(self, now: float) -> float | None:
-        """Return the pause before the next try [s], or None if there were `MOST` failures within `WITHIN`."""
+        """Return the pause before the next try [s], or None if there is none.
+
+        The pause stays short enough for `max` failures to fit into `within`: otherwise none would be the last.
+        """
+        limits = self._restart
         self._failures.append(now)
-        recent = sum(1 for time in self._failures if now - time <= WITHIN)
-        if recent >= MOST:
+        recent = sum(1 for time in self._failures if now - time <= limits.within)
+        if not self.is_allowed or (limits.when == "on_failure" and recent >= limits.max):
             return None
         self.restarts += 1
-        return float(FIRST_BACKOFF * 2 ** (recent - 1))
+        return float(min(limits.backoff * 2.0 ** (recent - 1), limits.within / limits.max))
 
 
 def explain(error: BaseException, file: str | None = None) -> tuple[str, str]:

@@ -51,6 +51,7 @@ class State:
     components: Sequence[ComponentState]
     router: str | None = None
     boot: str = ""
+    domain: int = 0
 
     def to_text(self) -> str:
         """Return the text of the state file: a checksum, then JSON."""

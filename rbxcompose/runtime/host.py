@@ -12,7 +12,9 @@ from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.runtime.faults import RestartPolicy, explain
 from rbxcompose.runtime.frames import Frames
 from rbxcompose.runtime.hosted import Hosted, State
+from rbxcompose.runtime.parameters import Parameters
 from rbxcompose.runtime.records import Log, Record
+from rbxcompose.runtime.rosout import Rosout
 from rbxcompose.runtime.statuses import Statuses
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.bound import Refused
@@ -48,9 +50,11 @@ class Host:
         self.owner = f"host_{instances[0].process}" if instances else "host"
         self._wanted: set[str] = set()  # to be active, as soon as they can
         self.statuses = Statuses(self.owner, bus, scheduler, clock)
+        self.parameters = Parameters(self.owner, bus, clock, plan.bus.namespace)
+        self._rosout = Rosout(self.owner, bus, clock)
         self.tree = self._frames(instances)
         self.hosted = {one.name: Hosted(self, one) for one in instances}
-        self._policies = {one.name: RestartPolicy() for one in instances}
+        self._policies = {one.name: RestartPolicy(one.restart) for one in instances}
         scheduler.on_error = self.failed
 
     def _frames(self, instances: Sequence[Instance]) -> Frames | None:
@@ -136,7 +140,8 @@ class Host:
         return {name: (one.state.value, self._policies[name].restarts) for name, one in self.hosted.items()}
 
     def log(self, source: str, level: Level, text: str, detail: str = "") -> None:
-        """Write one record."""
+        """Write one record, for people and for who listens on the bus."""
+        self._rosout.publish(source, level, text)
         self._log(Record(self.clock.now(), level, source, text, detail))
 
     def changed(self, name: str) -> None:
@@ -161,9 +166,16 @@ class Host:
         if delay is not None:
             self.scheduler.at(self.clock.now() + delay, self.owner, lambda: self._restart(name))
         elif not self.is_braking:
-            self.hosted[name].state = State.FAILED
-            self.changed(name)
+            self._give_up(name, text)
+
+    def _give_up(self, name: str, text: str) -> None:
+        """Leave a component as it is; one that failed too often, unlike one that is never restarted, ends the robot."""
+        self.hosted[name].state = State.FAILED
+        if self._policies[name].is_allowed:  # told first: a robot that starts would go on without what has failed
             self.notify("failed", {"instance": name, "message": f"'{name}' failed too often: {text}"})
+        else:
+            self.log(name, Level.WARN, "stays failed: it is never restarted")
+        self.changed(name)
 
     def _restart(self, name: str) -> None:
         if self.is_braking:

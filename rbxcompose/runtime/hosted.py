@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbxcompose.body.transforms import TransformTree
 from rbxcompose.clock import Clock
+from rbxcompose.config import Config
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Instance
 from rbxcompose.runtime.binding import bind
@@ -36,6 +37,7 @@ class Hosted:
         self.host, self.instance = host, instance
         self.clock: Clock = host.clock
         self.state = State.UNCONFIGURED
+        self.config = instance.config  # as it is now: parameters may have changed it
         self.component: Component[Any] | None = None
         self._wakes: set[float] = set()  # robot times [s] at which the component is to be woken
 
@@ -48,13 +50,25 @@ class Hosted:
 
     def configure(self) -> None:
         """Make the component, bind its ports, let it get ready."""
-        made = component_type(self.instance.type)(self.instance.name, self.instance.config, self)
+        made = component_type(self.instance.type)(self.instance.name, self.config, self)
         tree = self.host.tree.tree if self.host.tree else TransformTree()
         self.component = made
         bind(made, self.instance, self.host.bus, tree, self._refusal)
+        self.host.parameters.serve(self)
         made.configure()
         self._enter(State.INACTIVE)
         self.host.statuses.set(self.instance.name, Level.OK, "ready", {})
+
+    def reconfigure(self, config: Config) -> None:
+        """Let the component follow another configuration; if it raises, the old one stays."""
+        component, old = self._made(), self.config
+        component.config = config
+        try:
+            component.reconfigure(old)
+        except BaseException:
+            component.config = old
+            raise
+        self.config = config
 
     def activate(self) -> None:
         """Let the component work; it joins a robot that has started, is stopped or goes down as the others did."""

@@ -248,6 +248,7 @@ class Supervisor:
             components=components,
             router=self.conductor.endpoint,
             boot=boot_id(),
+            domain=self._launch.plan.bus.domain,
         )
 
     def _component(self, name: str, type_name: str, process: str) -> ComponentState:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, ClassVar, Generic, Protocol, TypeVar, get_args
 
 from rbxcompose.clock import Clock
@@ -72,7 +73,8 @@ class Component(Generic[C]):
     @classmethod
     def ports(cls, config: C) -> dict[str, Port[Any]]:
         """Return all ports by name; override and add those that depend on the configuration."""
-        return {name: port for name, port in inspect.getmembers(cls) if isinstance(port, Port)}
+        here: Any = cls  # for mypy, classes of a generic are not hashable
+        return dict(_declared_ports(here))
 
     @property
     def now(self) -> float:
@@ -103,6 +105,13 @@ class Component(Generic[C]):
 
     def configure(self) -> None:
         """Get ready: import what is heavy, build the core, open devices. Nothing moves yet."""
+
+    def reconfigure(self, old: C) -> None:
+        """Follow `config`, of which a field that is marked `Live` has changed since it was `old`.
+
+        Raises:
+            Refused: if it cannot be done now, with the reason; `config` is `old` again then.
+        """
 
     def activate(self) -> None:
         """Start to work; steps and messages come from now on."""
@@ -148,3 +157,8 @@ class Component(Generic[C]):
     def summary(self) -> dict[str, str]:
         """Return facts for the summary at the end, by their label."""
         return {}
+
+
+@cache
+def _declared_ports(cls: Any) -> Mapping[str, Port[Any]]:
+    return {name: port for name, port in inspect.getmembers(cls) if isinstance(port, Port)}

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 import pytest
 
@@ -56,3 +57,21 @@ def test_real_devices_keep_their_own_time(capsys: pytest.CaptureFixture[str]) ->
 def test_profiles_and_values_come_in_their_order() -> None:
     arguments = parse("--profile", "a", "--set", "x.y=1", "--profile", "b", "--set", "z=2", "-d")
     assert (arguments.profile, arguments.sets, arguments.detach) == (["a", "b"], ["x.y=1", "z=2"], True)
+
+
+IDLE = "rbx: 1\nkind: Robot\nname: idle\ncomponents:\n  base:\n    type: diff_drive_sim\n"
+
+
+def test_a_run_that_would_never_end_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(
+        "rbx: 1\nkind: Robot\nname: idle\ncomponents:\n  base:\n    type: diff_drive_sim\n", encoding="utf-8"
+    )
+    assert up.run(parse_robot(str(robot), "--rate", "max")) == up.USAGE
+    assert "give --for" in capsys.readouterr().err
+
+
+def parse_robot(*words: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    up.add_arguments(parser)
+    return parser.parse_args(words)

@@ -15,10 +15,13 @@ PATROL = (ROOT / "missions/patrol.yaml").read_text(encoding="utf-8")
 HEADER = "rbx: 1\nkind: Mission\nname: example\n"
 EXAMPLE = f"{HEADER}do: recharge\n"
 
+WALKED_THROUGH = "tutorial.md"  # its manifests build on each other; a test of its own follows them
+
 _FENCE = re.compile(r"^```(?P<info>[^\n`]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 _SECTION = re.compile(r"^(?=[^\s#])", re.MULTILINE)
 _ENTRY = re.compile(r"^(?=  [^\s#])", re.MULTILINE)
 _MISSION_FILE = re.compile(r"(?:\.\./)*missions/")  # however far above the robot's file a page sees it
+_NAMED_MISSION = re.compile(r"\.\./\.\./missions/\w+\.yaml")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +52,12 @@ def blocks_of(text: str, page: str) -> Iterator[Block]:
 
 
 def page_blocks(language: str) -> list[Block]:
-    """Return the blocks of one language in the pages that are written by hand."""
+    """Return the blocks of one language in all pages but those of findings."""
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+    pages += sorted((ROOT / "docs/reference").glob("*.md"))
     found = (block for page in pages for block in blocks_of(page.read_text(encoding="utf-8"), page.name))
-    return [block for block in found if block.language == language]
+    known = (block for block in found if (block.page, block.language) != (WALKED_THROUGH, "yaml"))
+    return [block for block in known if block.language == language]
 
 
 def checked(block: Block, folder: Path) -> Checked:
@@ -64,7 +69,26 @@ def checked(block: Block, folder: Path) -> Checked:
         return check_robot(with_sections(ROBOT, block.text), folder, profiles=profiles_of(block.text))
     if "\nkind: Mission\n" in block.text:
         return check_mission(block.text, folder)
+    if "\nkind: Part\n" in block.text:
+        return check_part(block.text, folder)
+    if "\nkind: Overlay\n" in block.text:
+        return check_overlay(block.text, folder)
     return check_robot(block.text, folder)
+
+
+def check_part(text: str, folder: Path) -> Checked:
+    """Compile the patrol robot with an instance of a part."""
+    path = folder / "parts" / "example.yaml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return check_robot(with_sections(ROBOT, "include:\n  example: ../../parts/example.yaml\n"), folder)
+
+
+def check_overlay(text: str, folder: Path) -> Checked:
+    """Compile the patrol robot with an overlay."""
+    path = folder / "example.yaml"
+    path.write_text(text, encoding="utf-8")
+    return check_robot(ROBOT, folder, overlays=[str(path)])
 
 
 def check_mission(text: str, folder: Path) -> Checked:
@@ -79,13 +103,15 @@ def check_robot(
     folder: Path,
     *,
     profiles: Sequence[str] = (),
+    overlays: Sequence[str] = (),
     real: bool = False,
     example: str = EXAMPLE,
 ) -> Checked:
-    others = {"../../missions/patrol.yaml": PATROL, "../../missions/example.yaml": example}
     robot = _MISSION_FILE.sub("../../missions/", text)
+    others = dict.fromkeys(_NAMED_MISSION.findall(robot), example)  # a page shows a robot before its mission
+    others |= {"../../missions/patrol.yaml": PATROL, "../../missions/example.yaml": example}
     home = folder / "robots" / "example"
-    return check_text(robot, home, others=others, profiles=profiles, real=real, environment={})
+    return check_text(robot, home, others=others, profiles=profiles, overlays=overlays, real=real, environment={})
 
 
 def with_sections(robot: str, fragment: str) -> str:

@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 import rbxcompose
+from rbxcompose.edits import safe_fixes
 from rbxcompose.findings import KINDS, Kind
+from rbxcompose.testing.manifests import Checked
 from tests.docs.examples import HEADER, ROBOT, check_mission, check_robot, profiles_of, with_sections
 
 for _module in pkgutil.walk_packages(rbxcompose.__path__, "rbxcompose."):
@@ -22,11 +24,14 @@ NOT_SHOWN = {
     "RBX1103": "an example would be too large to read; the long number of its page is told as RBX1109",
     "RBX1105": "the comma of its example is told as text that needs quotes, RBX1101",
     "RBX1111": "the mistake is in the bytes of a file",
+    "RBX1207": "the mistake is in a file that is not there",
     "RBX1303": "the mistake is on the command line",
+    "RBX1308": "the mistake is in two files",
     "RBX4115": "the example is cut short: nobody wants to read 40 levels",
     "RBX4116": "no component that ships has an action that cannot be restarted",
 }
-ONLY_SAID = {code for code in KINDS if code.startswith("RBX90")}  # they are about running robots, not about texts
+SOMETIMES_FIXED = {f"RBX{n}" for n in (1102, 1106, 1304, 3006, 3007, 4105, 4110, 4113, 4114)}  # not as they show
+ONLY_SAID = {code for code in KINDS if code.startswith(("RBX90", "RBX91", "RBX92"))}  # running robots, files
 
 BATTERY = "components:\n  battery:\n    type: battery_sim\n", 4
 BASE = "components:\n  base:\n    type: diff_drive_sim\n", 4
@@ -52,12 +57,16 @@ def examples(kind: Kind) -> dict[str, str]:
 
 
 def codes_of(kind: Kind, text: str, folder: Path) -> set[str]:
+    return set(compiled(kind, text, folder).codes)
+
+
+def compiled(kind: Kind, text: str, folder: Path) -> Checked:
     above, depth = STANDS_BELOW.get(kind.code, ("", 0))
     fragment = above + textwrap.indent(text, " " * depth)
     if kind.code.startswith("RBX41") and not fragment.startswith("missions:"):
-        return set(check_mission(HEADER + fragment, folder).codes)
+        return check_mission(HEADER + fragment, folder)
     robot = with_sections(ROBOT, fragment)
-    return set(check_robot(robot, folder, profiles=profiles_of(fragment), real=kind.code == "RBX8001").codes)
+    return check_robot(robot, folder, profiles=profiles_of(fragment), real=kind.code == "RBX8001")
 
 
 SHOWN = [kind for code, kind in sorted(KINDS.items()) if code not in {*NOT_SHOWN, *ONLY_SAID}]
@@ -73,5 +82,12 @@ def test_the_good_example_has_it_no_more(kind: Kind, tmp_path: Path) -> None:
     assert kind.code not in codes_of(kind, examples(kind)["Good"], tmp_path)
 
 
+@pytest.mark.parametrize("kind", [kind for kind in SHOWN if "Bad" in examples(kind)], ids=lambda kind: kind.code)
+def test_its_page_tells_whether_it_can_be_fixed(kind: Kind, tmp_path: Path) -> None:
+    found = compiled(kind, examples(kind)["Bad"], tmp_path).compilation
+    fixes = safe_fixes([one for one in found.report if one.code == kind.code], found.sources)
+    assert bool(fixes) == (kind.is_fixable and kind.code not in SOMETIMES_FIXED)
+
+
 def test_every_exception_is_a_kind() -> None:
-    assert NOT_SHOWN.keys() <= KINDS.keys()
+    assert NOT_SHOWN.keys() | SOMETIMES_FIXED <= KINDS.keys()

@@ -7,12 +7,26 @@ import re
 
 import pytest
 
+from docs.generating.components import MADE_OF_SECTIONS
 from rbxcompose.cli.main import load, verbs
 from rbxcompose.config import Config
 from rbxcompose.expressions.functions import FUNCTIONS
 from rbxcompose.expressions.types import TYPES
 from rbxcompose.manifest.arguments import ArgumentModel
-from rbxcompose.manifest.models import Analyzer, Bus, ComponentOptions, Mission, MuxInput, PlaceModel, RobotFile, Value
+from rbxcompose.manifest.models import (
+    Analyzer,
+    Bus,
+    ComponentOptions,
+    Include,
+    Mission,
+    MuxInput,
+    Needs,
+    PartFile,
+    PlaceModel,
+    Provides,
+    RobotFile,
+    Value,
+)
 from rbxcompose.missions.header import INPUT_KEYS
 from rbxcompose.missions.modifiers import MODIFIERS
 from rbxcompose.missions.reading import AFTERWARDS, INTERRUPT_KEYS, KEYS
@@ -25,8 +39,6 @@ PAGE = (ROOT / "docs/language.md").read_text(encoding="utf-8")
 ROWS = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in PAGE.splitlines() if line[:1] == "|"]
 QUOTED = frozenset(word for piece in re.findall(r"`([^`\n]+)`", PAGE) for word in piece.replace(":", " ").split())
 WORDS = frozenset(re.findall(r"[\w%/^]+", PAGE))
-
-NOT_WRITTEN_BY_USERS = {"mux", "diagnostics", "transforms", "mission"}  # the compiler makes them of sections
 
 
 def row(first: str) -> str:
@@ -41,7 +53,10 @@ def test_it_has_every_unit_type_and_function() -> None:
     assert [name for name in FUNCTIONS if f"`{name}(" not in PAGE] == []
 
 
-@pytest.mark.parametrize("model", [RobotFile, ArgumentModel, Bus, MuxInput, Analyzer, PlaceModel, Value, Mission])
+@pytest.mark.parametrize(
+    "model",
+    [RobotFile, ArgumentModel, Bus, MuxInput, Analyzer, PlaceModel, Value, Mission, Include, Needs, PartFile, Provides],
+)
 def test_it_has_every_key_of_a_robot(model: type[Config]) -> None:
     keys = {field.alias or name for name, field in model.model_fields.items()}
     assert keys - WORDS == set()
@@ -51,7 +66,7 @@ def test_it_has_every_option_of_components() -> None:
     assert all(row(option) for option in ComponentOptions.model_fields)
 
 
-@pytest.mark.parametrize("name", sorted(PLUGINS.shipped - NOT_WRITTEN_BY_USERS))
+@pytest.mark.parametrize("name", sorted(PLUGINS.shipped - MADE_OF_SECTIONS.keys()))
 def test_it_has_every_component_type_with_its_settings(name: str) -> None:
     settings = component_type(name).config_type().model_fields
     assert [setting for setting in settings if f"`{setting}`" not in row(name)] == []

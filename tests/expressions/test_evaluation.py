@@ -293,3 +293,17 @@ def test_any_expression_has_a_moderate_value_or_a_declared_error(text: str) -> N
     assert not isinstance(value, float) or abs(value) < 1e15
     assert not isinstance(value, str) or len(value) <= 4096
     assert not isinstance(value, list) or len(value) <= 1000
+
+
+def grown(text: str, rounds: int) -> Value:
+    value: Value = []
+    for _ in range(rounds):
+        value = evaluate(parse(text), Known({"x": value}))
+    return value
+
+
+@pytest.mark.parametrize(("text", "most"), [("[$x, $x]", 12), ("[$x]", 49)])
+def test_a_list_that_grows_inwards_comes_to_an_end(text: str, most: int) -> None:
+    assert grown(text, most)
+    with pytest.raises(EvaluationError, match="more than"):
+        grown(text, most + 1)

@@ -122,3 +122,15 @@ def test_any_text_is_a_template(text: str) -> None:
 
 def test_an_opaque_value_is_written_as_it_writes_itself() -> None:
     assert show_value("x", None) == "None"
+
+
+def test_a_text_with_many_long_values_is_given_up_at_once() -> None:
+    shown: list[str] = []
+
+    def show(name: str, value: Value) -> str:
+        shown.append(name)
+        return "x" * 3000
+
+    with pytest.raises(EvaluationError, match="4,096 characters"):
+        fill(parse_template("$long " * 10_000), Scope(), show)
+    assert len(shown) == 2

@@ -18,7 +18,8 @@ from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.robot_file import load_robot
 from rbxcompose.manifest.tree import Mapping
 from rbxcompose.manifest.validate import to_plain
-from rbxcompose.rendering import render_json, render_text
+from rbxcompose.rendering.json_ import render_json
+from rbxcompose.rendering.text import render_text
 
 ROOT = Path(__file__).parents[2]
 TURTLEBOT = (ROOT / "robots/turtlebot/robot.yaml").read_text()
@@ -29,7 +30,7 @@ import json, resource, sys, time
 from pathlib import Path
 from rbxcompose.findings import Report
 from rbxcompose.manifest.robot_file import load_robot
-from rbxcompose.rendering import render_text
+from rbxcompose.rendering.text import render_text
 import rbxcompose.components.go_to, rbxcompose.components.battery_sim
 pages = int(Path("/proc/self/statm").read_text().split()[0])
 limit = pages * resource.getpagesize() + int(sys.argv[2])
@@ -168,7 +169,7 @@ def load(text: bytes, folder: Path, sets: tuple[str, ...] = ()) -> None:
     report, sources = Report(), dict[str, str]()
     load_robot(path, report=report, sources=sources, profiles=["tired"], sets=sets)
     render_text(report, sources)
-    render_json(report)
+    render_json(report, sources)
 
 
 @pytest.fixture(scope="module")

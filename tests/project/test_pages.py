@@ -2,28 +2,52 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
+import subprocess
+import sys
 
-DOCS = Path(__file__).parents[2] / "docs"
-
-
-def generated() -> dict[str, str]:
-    spec = importlib.util.spec_from_file_location("generate_docs", DOCS / "generate.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    pages: dict[str, str] = module.pages()
-    return pages
+from docs import generate
+from docs.generating.components import MADE_OF_SECTIONS
+from docs.generating.sections import SECTIONS
+from rbxcompose.expressions.types import TYPES
+from rbxcompose.manifest.models import Header, RobotFile
+from rbxcompose.pages import all_kinds, family_of
+from rbxcompose.sdk.registry import PLUGINS
 
 
-def test_every_code_has_its_page_and_no_page_is_out_of_date() -> None:
-    made = generated()
-    written = {page.name: page.read_text(encoding="utf-8") for page in (DOCS / "findings").glob("*.md")}
-    assert written == made, "run `make docs`"
+def test_every_page_is_there_and_none_is_out_of_date() -> None:
+    assert generate.written() == generate.pages(), "run `make docs`"
 
 
 def test_every_page_says_more_than_its_title() -> None:
-    short = [name for name, text in generated().items() if len(text.splitlines()) < 3]
+    short = [name for name, text in generate.pages().items() if len(text.splitlines()) < 3]
     assert short == []
+
+
+def test_every_section_has_an_example() -> None:
+    assert RobotFile.model_fields.keys() - Header.model_fields.keys() == SECTIONS.keys()
+
+
+def test_every_type_has_its_row() -> None:
+    page = generate.pages()["reference/expressions.md"]
+    assert [name for name in (*TYPES, "choice") if f"| `{name}` |" not in page] == []
+
+
+def test_only_types_that_ship_are_made_of_sections() -> None:
+    assert MADE_OF_SECTIONS.keys() <= PLUGINS.shipped
+
+
+def test_every_code_belongs_to_a_family() -> None:
+    assert [code for code, kind in all_kinds().items() if family_of(kind) == "other"] == []
+
+
+def test_no_kind_is_left_out_by_looking_for_declarations() -> None:
+    script = (
+        "import importlib, pkgutil, rbxcompose\n"
+        "from rbxcompose.findings import KINDS\n"
+        "for module in pkgutil.walk_packages(rbxcompose.__path__, 'rbxcompose.'):\n"
+        "    if not module.name.endswith('__main__'):\n"
+        "        importlib.import_module(module.name)\n"
+        "print(*KINDS)\n"
+    )
+    out = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert set(out.stdout.split()) == set(all_kinds())

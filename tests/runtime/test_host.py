@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
+from rbxcompose.restarts import Restart
 from rbxcompose.sdk import Component, Config, In, Out, Refused, component
 from rbxcompose.testing import Bench, instance
 
@@ -105,6 +108,32 @@ def test_a_component_that_keeps_failing_has_failed_and_the_supervisor_is_told() 
     assert robot.host.states()["healthy"] == ("active", 0)
 
 
+def with_restart(restart: Restart, times: int) -> Bench:
+    broken = replace(instance("broken", "toy_for_host", {"breaks_in": "step", "times": times}), restart=restart)
+    return Bench(broken, instance("healthy", "toy_for_host"))
+
+
+def test_a_component_that_is_never_restarted_stays_failed_and_the_robot_goes_on() -> None:
+    robot = with_restart(Restart(when="never"), times=1)
+    robot.advance(10.0)
+    assert robot.host.states() == {"broken": ("failed", 0), "healthy": ("active", 0)}
+    assert "broken: stays failed: it is never restarted" in robot.texts()
+    assert [event for event, _ in robot.events if event == "failed"] == []
+
+
+def test_a_component_that_is_always_restarted_outlives_any_number_of_failures() -> None:
+    robot = with_restart(Restart(when="always"), times=30)
+    robot.advance(600.0)
+    assert robot.host.states()["broken"] == ("active", 30)
+
+
+def test_the_bound_of_failures_is_that_of_the_component() -> None:
+    robot = with_restart(Restart(max=2), times=30)
+    robot.advance(10.0)
+    assert robot.host.states()["broken"] == ("failed", 1)
+    assert [data["instance"] for event, data in robot.events if event == "failed"] == ["broken"]
+
+
 def test_a_message_that_breaks_its_handler_restarts_only_that_component() -> None:
     robot = bench("on_add")
     robot.publish("/add", Float32(data=5.0))
@@ -142,4 +171,5 @@ def test_nothing_of_a_component_is_left_on_the_bus_after_shutdown() -> None:
     robot = bench("")
     ends = len(robot.bus)
     robot.host.shutdown()
-    assert len(robot.bus) == ends - 4
+    of_each = 2 + 6  # its ports, and the services of its parameters
+    assert len(robot.bus) == ends - 2 * of_each

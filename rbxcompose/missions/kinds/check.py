@@ -16,7 +16,13 @@ if TYPE_CHECKING:
 
 @kind("check")
 class Check(Task):
-    """Succeed if the condition holds, else fail."""
+    """Succeed if the condition holds, else fail.
+
+    Example:
+        do:
+          - check: $battery > 20 %
+          - go_to: corner_1
+    """
 
     __slots__ = ("condition",)
 

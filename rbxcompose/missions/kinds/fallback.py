@@ -9,7 +9,14 @@ from rbxcompose.missions.statuses import SUCCESS
 
 @kind("fallback")
 class Fallback(InTurn):
-    """Try the nodes of a list in order; the first success is the fallback's own, a skipped one is passed over."""
+    """Try the nodes of a list in order; the first success is the fallback's own, a skipped one is passed over.
+
+    Example:
+        do:
+          fallback:
+            - check: distance($pose, dock) < 15 cm
+            - go_to: dock
+    """
 
     __slots__ = ()
     decides = SUCCESS

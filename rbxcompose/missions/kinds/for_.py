@@ -43,7 +43,16 @@ class ForOptions:
     },
 )
 class For(Task):
-    """Do the body with each item in turn; the list is read once, at the start."""
+    """Do the body with each item in turn; the list is read once, at the start.
+
+    Example:
+        do:
+          for: corner
+          in: [corner_1, corner_3]
+          if_one_fails: next
+          do:
+            go_to: $corner
+    """
 
     __slots__ = ("body", "did", "index", "items", "options", "view")
 

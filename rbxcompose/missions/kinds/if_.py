@@ -16,7 +16,17 @@ if TYPE_CHECKING:
 
 @kind("if", {"then": "What is done if the condition holds.", "else": "What is done if it does not."})
 class If(Task):
-    """Ask the condition once, then do `then` or `else`; without a match it is skipped."""
+    """Ask the condition once, then do `then` or `else`; without a match it is skipped.
+
+    Example:
+        do:
+          if: $battery < 90 %
+          then:
+            - go_to: dock
+            - recharge
+          else:
+            log: The battery has $battery
+    """
 
     __slots__ = ("chosen", "condition", "otherwise", "then")
 

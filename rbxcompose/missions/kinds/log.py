@@ -27,7 +27,13 @@ class LogOptions:
 
 @kind("log", {"level": "How bad it is."})
 class Log(Task):
-    """Write one line; `$name` in it is filled in."""
+    """Write one line; `$name` in it is filled in.
+
+    Example:
+        do:
+          log: The battery has $battery
+          level: warn
+    """
 
     __slots__ = ("options",)
 

@@ -39,7 +39,16 @@ class RepeatOptions:
     },
 )
 class Repeat(Task):
-    """Do the body again and again; a round that fails fails it, a number that is used up succeeds."""
+    """Do the body again and again; a round that fails fails it, a number that is used up succeeds.
+
+    Example:
+        do:
+          repeat: 3
+          every: 1 min
+          until: $battery < 40 %
+          do:
+            go_to: corner_1
+    """
 
     __slots__ = ("body", "did", "due", "is_between", "left", "options", "period")
 

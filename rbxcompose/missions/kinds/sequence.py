@@ -9,7 +9,14 @@ from rbxcompose.missions.statuses import FAILURE
 
 @kind("sequence")
 class Sequence(InTurn):
-    """Do the nodes of a list in order; the first failure is the sequence's own."""
+    """Do the nodes of a list in order; the first failure is the sequence's own.
+
+    Example:
+        do:
+          sequence:                       # a bare list is one too
+            - go_to: dock
+            - recharge
+    """
 
     __slots__ = ()
     decides = FAILURE

@@ -22,7 +22,17 @@ if TYPE_CHECKING:
 
 @kind("set")
 class Set(Task):
-    """Compute all right sides first, then set them."""
+    """Compute all right sides first, then set them.
+
+    Example:
+        data:
+          visited: 0
+        do:
+          - go_to: corner_1
+          - set:
+              visited: $visited + 1
+          - log: $visited visited
+    """
 
     __slots__ = ("assignments",)
 

@@ -16,7 +16,13 @@ if TYPE_CHECKING:
 
 @kind("wait")
 class Wait(Task):
-    """Succeed after a time; it goes on with the rest when the mission was cut short meanwhile."""
+    """Succeed after a time; it goes on with the rest when the mission was cut short meanwhile.
+
+    Example:
+        do:
+          - wait: 5 s
+          - go_to: corner_1
+    """
 
     __slots__ = ("deadline", "duration")
 

@@ -18,7 +18,13 @@ if TYPE_CHECKING:
 
 @kind("wait_for")
 class WaitFor(Task):
-    """Succeed as soon as the condition holds; `timeout` bounds it."""
+    """Succeed as soon as the condition holds; `timeout` bounds it.
+
+    Example:
+        do:
+          wait_for: $battery > 50 %
+          timeout: 1 min
+    """
 
     __slots__ = ("watched",)
 

@@ -1,0 +1,100 @@
+"""Measures every subject: `python -m benchmarks.run [SUBJECT ...]` writes the results and the page of the docs.
+
+A subject is a file of this folder with a function `rows()`. Each runs in a process of its own.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import platform
+import subprocess
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from benchmarks.measuring import ROOT, Row
+
+FOLDER = Path(__file__).parent
+RESULTS = FOLDER / "results.json"
+PAGE = ROOT / "docs" / "benchmarks.md"
+ONE = "--one"
+ABOUT = """# Benchmarks
+
+Written by `make bench`. Times are medians, beside 99 of 100 where there are many; of whole commands by the clock on the
+wall, within a process by that of the processor. A peer is measured in turns with ours, in the same run, so that ratios
+hold where times do not: these differ from machine to machine by a factor of two or three.
+
+{table}
+
+Measured on {machine}.
+"""
+
+
+def subjects() -> list[str]:
+    """Return the names of all files that have rows."""
+    files = sorted(FOLDER.glob("*.py"))
+    return [file.stem for file in files if "\ndef rows(" in file.read_text(encoding="utf-8")]
+
+
+def measured(subject: str) -> list[dict[str, Any]]:
+    """Return the rows of a subject, measured in a process of its own.
+
+    Raises:
+        CalledProcessError: if it fails.
+    """
+    command = [sys.executable, "-m", "benchmarks.run", ONE, subject]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, cwd=ROOT)
+    found: list[dict[str, Any]] = json.loads(done.stdout)
+    return found
+
+
+def as_data(row: Row, subject: str) -> dict[str, Any]:
+    """Return a row with what follows from it."""
+    return {"subject": subject, **asdict(row), "ratio": row.ratio, "bar": row.bar, "met": row.met}
+
+
+def page(results: dict[str, Any]) -> str:
+    """Return the page of the docs."""
+    lines = [
+        "| what | ours | p99 | peer | ratio | bar | | how |",
+        "| --- | ---: | ---: | ---: | ---: | --- | --- | --- |",
+    ]
+    for row in results["rows"]:
+        met = {True: "met", False: "**missed**", None: ""}[row["met"]]
+        peer = f"{_figure(row['peer'])} ({row['against']})" if row["peer"] else ""
+        ratio = f"{_figure(row['ratio'])}x" if row["ratio"] else ""
+        ours = f"{_figure(row['ours'])} {row['unit']}".strip()
+        cells = [row["name"], ours, _figure(row["p99"]), peer, ratio, row["bar"], met, row["how"]]
+        lines.append(f"| {' | '.join(cells)} |")
+    return ABOUT.format(table="\n".join(lines), machine=results["machine"])
+
+
+def _figure(value: float | None) -> str:
+    if value is None:
+        return ""
+    return f"{value:.0f}" if abs(value) >= 100 or value == int(value) else f"{value:.3g}"
+
+
+def main(arguments: list[str]) -> None:
+    """Measure all subjects, or those that are named, and write down everything that is known."""
+    if arguments[:1] == [ONE]:
+        module = importlib.import_module(f"benchmarks.{arguments[1]}")
+        sys.stdout.write(json.dumps([as_data(row, arguments[1]) for row in module.rows()]))
+        return
+    known = json.loads(RESULTS.read_text(encoding="utf-8"))["rows"] if arguments and RESULTS.exists() else []
+    rows = {name: [row for row in known if row["subject"] == name] for name in subjects()}
+    for name in arguments or subjects():
+        rows[name] = measured(name)
+        for row in rows[name]:
+            sys.stderr.write(f"{row['name']}: {_figure(row['ours'])} {row['unit']}  [{row['bar']}] met: {row['met']}\n")
+    machine = f"{os.cpu_count()} cores, Python {platform.python_version()}, {platform.system()} {platform.machine()}"
+    results = {"machine": machine, "rows": [row for name in rows for row in rows[name]]}
+    RESULTS.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    PAGE.write_text(page(results), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,50 @@
+"""The reference of the commands: what `--help` tells of each."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+from docs.generating.markdown import code, page, table
+from rbxcompose.cli.main import load, verbs
+
+
+def whole_page() -> str:
+    """Return the page."""
+    return page("Commands", *(of_command(parser, 2) for parser in parsers()))
+
+
+def parsers() -> Iterator[argparse.ArgumentParser]:
+    """Give the parser of each verb, as the command line makes it."""
+    for name in verbs():
+        verb = load(name)
+        parser = argparse.ArgumentParser(f"rbxcompose {name}", description=verb.__doc__ or "", allow_abbrev=False)
+        verb.add_arguments(parser)
+        yield parser
+
+
+def of_command(parser: argparse.ArgumentParser, level: int, about: str = "") -> str:
+    """Return what is known of a command, then of the commands below it."""
+    title, space, rest = (parser.description or about).strip().partition("\n\n")
+    words = f"{'#' * level} {code(parser.prog)}\n{title}{space}{rest}\n"
+    own = [one for one in parser._actions if not isinstance(one, argparse._HelpAction | argparse._SubParsersAction)]
+    parts = [words, table(("argument", "what it is"), [(written(one), one.help or "") for one in own])]
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            helps = {choice.dest: choice.help or "" for choice in action._choices_actions}
+            parts += [of_command(below, level + 1, sentence(helps[name])) for name, below in action.choices.items()]
+    return "\n".join(part for part in parts if part)
+
+
+def sentence(words: str) -> str:
+    """Return words as a sentence."""
+    return f"{words[:1].upper()}{words[1:]}."
+
+
+def written(action: argparse.Action) -> str:
+    """Return an argument as it is written: `-f FILE`, `--file FILE`, `[PATH ...]`."""
+    value = action.metavar if isinstance(action.metavar, str) else "|".join(map(str, action.choices or [action.dest]))
+    if action.option_strings:
+        return ", ".join(code(option if action.nargs == 0 else f"{option} {value}") for option in action.option_strings)
+    shapes = {"*": f"[{value} ...]", "?": f"[{value}]", "+": f"{value} ..."}
+    return code(shapes.get(str(action.nargs), value))

@@ -1,0 +1,113 @@
+"""The reference of component types: what each is, its settings, its ports."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from docs.generating.markdown import about, code, example, example_of, indented, page, table
+from docs.generating.shapes import keys_table
+from rbxcompose.config import Place
+from rbxcompose.missions.goals import skill_of
+from rbxcompose.qos import Qos
+from rbxcompose.schema.components import examples_of
+from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.ports import In, Looks, Out, Port, ServesAction
+from rbxcompose.sdk.registry import PLUGINS, component_type
+
+MADE_OF_SECTIONS: Mapping[str, str] = {
+    "diagnostics": "Every robot runs one; its groups are those of the section `diagnostics`.",
+    "mission": "A robot with missions runs one.",
+    "mux": "There is one for each entry of the section `muxes`.",
+    "transforms": "Every robot runs one.",
+}
+"""The types that nobody writes under `components`: the compiler makes their instances."""
+
+DIRECTIONS = {
+    "in": "reads",
+    "out": "writes",
+    "serves": "serves",
+    "calls": "calls",
+    "serves_action": "skill",
+    "calls_action": "uses",
+    "looks": "looks up",
+}
+QOS = {
+    Qos.COMMAND: "only the newest counts; rather dropped than late",
+    Qos.STATE: "the newest counts, a few are kept",
+    Qos.LATCHED: "the last one is kept for who comes later",
+    Qos.EVENT: "none may be lost",
+    Qos.BULK: "large, with the lowest priority",
+}
+PORTS = """## Ports
+**writes** and **reads** are messages on a topic, **serves** and **calls** a service, **skill** an action that missions
+may use, **uses** an action of somebody else, **looks up** a pose among the frames. Ports of one topic and type are
+connected; `connect` gives a port another topic. A skill that *claims* something has it for itself while it runs.
+
+The class of a topic (QoS) says what counts:
+
+"""
+
+
+def whole_page() -> str:
+    """Return the page."""
+    classes = PORTS + table(("class", "what counts"), [(code(qos), words) for qos, words in QOS.items()])
+    return page("Components", classes, *(of_type(name) for name in sorted(PLUGINS.shipped)))
+
+
+def of_type(name: str) -> str:
+    """Return what is known of a type."""
+    cls = component_type(name)
+    parts = [f"## {code(name)}\n{about(cls)}\n"]
+    if name in MADE_OF_SECTIONS:
+        parts.append(f"{MADE_OF_SECTIONS[name]} It does not stand under `components`.\n")
+    else:
+        parts.append(f"{facts(cls)}\n")
+        parts.append(example(f"components:\n{indented(example_of(cls))}", "yaml robot"))
+        parts.append(keys_table(cls.config_type()))
+    rows = [port_row(port) for port in ports_of(name).values()]
+    parts.append(table(("port", "does", "what", "topic", "class", "unit", "remarks"), rows))
+    return "\n".join(part for part in parts if part)
+
+
+def facts(cls: type[Component[Any]]) -> str:
+    """Return where and how often a type runs."""
+    rate = f", at {cls.rate:g} Hz" if cls.rate else ""
+    only = "; it exists only in simulation" if cls.simulated else ""
+    return f"It runs in the process `{cls.process}`{rate}{only}."
+
+
+def ports_of(name: str) -> dict[str, Port[Any]]:
+    """Return the ports of a type, those that depend on the configuration as its example has them."""
+    cls = component_type(name)
+    [written] = examples_of(name)
+    settings = {key: value for key, value in dict(written).items() if key != "type"}  # type: ignore[call-overload]
+    config = cls.config_type().model_validate(settings, context={"places": {"dock": Place("dock", 0, 0, 0)}})
+    return cls.ports(config)
+
+
+def port_row(port: Port[Any]) -> tuple[str, ...]:
+    """Return the row of a port."""
+    if isinstance(port, Looks):
+        return code(port.name), DIRECTIONS[port.kind], f"{code(port.source)} in {code(port.target)}", "", "", "", ""
+    interface = port.interface.TYPE if port.interface else ""
+    flow = (str(port.qos), port.unit) if isinstance(port, In | Out) else ("", "")
+    first = (code(port.name), DIRECTIONS[port.kind], code(interface), code(port.topic))
+    return *first, code(flow[0]), code(flow[1]), remarks(port)
+
+
+def remarks(port: Port[Any]) -> str:
+    """Return what else is to be known of a port."""
+    if isinstance(port, In) and port.is_open:
+        return "may be fed from outside the robot"
+    if not isinstance(port, ServesAction):
+        return ""
+    words = [f"takes {', '.join(map(code, arguments))}"] if (arguments := arguments_of(port)) else []
+    words += [f"claims the {port.claims}"] if port.claims else []
+    words += [] if port.restartable else ["cannot be started again"]
+    return "; ".join(words)
+
+
+def arguments_of(port: ServesAction[Any, Any, Any]) -> list[str]:
+    """Return the arguments that a skill takes, the first one first."""
+    return list(skill_of(port.interface, port.topic).arguments) if port.interface else []

@@ -1,0 +1,156 @@
+"""The reference of missions: keys of the file, kinds of nodes, modifiers, skills."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from docs.generating.components import ports_of
+from docs.generating.markdown import about, code, example, example_of, lowered, page, table
+from docs.generating.shapes import keys_table
+from rbxcompose.expressions.text import Template
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.types import UNKNOWN, Type
+from rbxcompose.manifest.arguments import ArgumentModel
+from rbxcompose.missions.goals import skill_of
+from rbxcompose.missions.modifiers import MODIFIERS
+from rbxcompose.missions.program import Assignment
+from rbxcompose.missions.reading import INTERRUPT_KEYS
+from rbxcompose.missions.registry import Kind, kinds
+from rbxcompose.schema.asking import Asking, first_line
+from rbxcompose.schema.mission import mission_schema
+from rbxcompose.schema.scalars import Schema
+from rbxcompose.sdk.ports import ServesAction
+from rbxcompose.sdk.registry import PLUGINS, component_type
+
+NODES = """## Nodes
+A node is a word (a skill without arguments), a list (a `sequence`), or a map with exactly one kind or skill, its
+options and [modifiers](#modifiers). Any node may have a `name`. Each ends in success, in failure, or skipped.
+"""
+SKILLS = """## Skills
+Every action of a component of the robot is a skill, named after the last word of its topic. Those of the types that
+ship; the first argument is the one that a single value is.
+
+"""
+ORDER = "## Modifiers\nAny node may have them. They work from the outside in, in this order:"
+_HEAD = ("key", "takes", "what it is")
+
+
+class Told(Asking):
+    """A reader that has every key, and keeps for each in words what it takes."""
+
+    def __init__(self, key: str) -> None:
+        super().__init__(key)
+        self.words: dict[str, str] = {}
+
+    def expression(self, key: str, wanted: Type, what: str) -> Expression:
+        """Note what is asked for."""
+        self.words[key] = "a value" if wanted == UNKNOWN else what
+        return super().expression(key, wanted, what)
+
+    def count_or_forever(self, key: str) -> Expression | None:
+        """Note a number."""
+        self.words[key] = "a whole number or `forever`"
+        return super().count_or_forever(key)
+
+    def flag(self, key: str) -> bool:
+        """Note a flag."""
+        self.words[key] = "`true` or `false`"
+        return super().flag(key)
+
+    def choice(self, key: str, choices: tuple[str, ...]) -> str:
+        """Note the words, the default first."""
+        self.words[key] = " or ".join(map(code, choices)) + (" (the first one)" if len(choices) > 1 else "")
+        return super().choice(key, choices)
+
+    def template(self, key: str) -> Template:
+        """Note a text."""
+        self.words[key] = "a text"
+        return super().template(key)
+
+    def child(self, key: str) -> None:
+        """Note a node."""
+        self.words[key] = "a node"
+        super().child(key)
+
+    def steps(self) -> None:
+        """Note a list."""
+        self.words[self.key] = "a list of nodes"
+        super().steps()
+
+    def item_name(self) -> None:
+        """Note a name."""
+        self.words[self.key] = "a name for the item"
+        super().item_name()
+
+    def items(self, key: str) -> Expression | tuple[Expression, ...]:
+        """Note a list of values."""
+        self.words[key] = "a list, or an expression"
+        return super().items(key)
+
+    def assignments(self) -> tuple[Assignment, ...]:
+        """Note a map."""
+        self.words[self.key] = "a map from data to values"
+        return super().assignments()
+
+
+def whole_page() -> str:
+    """Return the page."""
+    schema = mission_schema(sorted(PLUGINS.shipped))
+    interrupt = schema["properties"]["interrupts"]["additionalProperties"]["properties"]
+    return page(
+        "Missions",
+        f"## Keys of the file\n{described(schema['properties'], schema['required'])}",
+        f"### An input\n{keys_table(ArgumentModel)}",
+        f"### An interrupt\n{described({key: interrupt[key] for key in INTERRUPT_KEYS}, ['when'])}",
+        NODES,
+        *(of_kind(kind) for kind in kinds().values()),
+        ORDER,
+        *(of_modifier(name) for name in MODIFIERS),
+        SKILLS + table(("skill", "arguments", "component", "action"), skills()),
+    )
+
+
+def described(properties: Mapping[str, Schema], required: list[str]) -> str:
+    """Return a table of keys with what they are for."""
+    rows = [(code(key), "yes" if key in required else "", one["description"]) for key, one in properties.items()]
+    return table(("key", "must be there", "what it is"), rows)
+
+
+def of_kind(kind: Kind) -> str:
+    """Return what is known of a kind: what it does, its keys, an example."""
+    told = Told(kind.name)
+    kind.task.read(told)
+    rows = [(code(key), takes(told, key), kind.options.get(key, "")) for key in told.words]
+    return "\n".join(
+        [
+            f"### {code(kind.name)}\n{about(kind.task)}\n",
+            table(_HEAD, rows),
+            example(example_of(kind.task), "yaml mission"),
+        ]
+    )
+
+
+def takes(told: Told, key: str) -> str:
+    """Return what a key takes, and whether it may be missing."""
+    return told.words[key] + ("; may be missing" if key in told.optional and key != told.key else "")
+
+
+def of_modifier(name: str) -> str:
+    """Return what is known of a modifier."""
+    told = Told(name)
+    MODIFIERS[name].read(told, name)
+    words = f"### {code(name)}\n{about(MODIFIERS[name])} It takes {told.words[name]}.\n"
+    return "\n".join([words, example(example_of(MODIFIERS[name]), "yaml mission")])
+
+
+def skills() -> list[tuple[str, ...]]:
+    """Return the row of each skill that ships."""
+    rows = []
+    for name in sorted(PLUGINS.shipped):
+        for port in ports_of(name).values():
+            if isinstance(port, ServesAction) and port.interface:
+                skill = skill_of(port.interface, port.topic.rpartition("/")[2])
+                arguments = [f"{code(key)}: {one.phrase}" for key, one in skill.arguments.items()]
+                what = f"{code(name)}: {lowered(first_line(component_type(name).__doc__))}"
+                rows.append((code(skill.name), ", ".join(arguments) or "none", what, code(port.interface.TYPE)))
+    return rows

@@ -1,0 +1,119 @@
+"""What a key takes, in words: read from the annotations of the models."""
+
+from __future__ import annotations
+
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from annotated_types import Ge, Gt, Le, Lt, MinLen
+from pydantic.fields import FieldInfo
+
+from docs.generating.markdown import code, table
+from rbxcompose.config import Config, Dimensioned, Name, PlaceName, Secret
+from rbxcompose.manifest.models import (
+    IncludeModel,
+    InterfaceName,
+    MissionModel,
+    PortName,
+    RestartModel,
+    TopicName,
+    ValueModel,
+)
+from rbxcompose.restarts import Restart
+from rbxcompose.units import Dimension, format_number, format_quantity
+
+_NAMED: tuple[tuple[object, str], ...] = (
+    (Name, "name"),
+    (TopicName, "topic"),
+    (InterfaceName, "message type"),
+    (PortName, "`component` or `component.port`"),
+    (PlaceName, "name of a place"),
+    (IncludeModel, "file, or a map"),
+    (ValueModel, "`component.port`, or a map"),
+    (MissionModel, "file, or a map"),
+    (RestartModel, "word, or a map"),
+    (Secret, "secret"),
+    (str, "text"),
+    (bool, "`true` or `false`"),
+    (int, "whole number"),
+    (float, "number"),
+    (Any, "any value"),
+)
+_LIMITS: tuple[tuple[type, str, str], ...] = (
+    (Gt, "gt", "above"),
+    (Ge, "ge", "at least"),
+    (Lt, "lt", "below"),
+    (Le, "le", "at most"),
+)
+
+
+def keys_table(model: type[Config]) -> str:
+    """Return a table of the keys of a model."""
+    hints = get_type_hints(model, include_extras=True)
+    rows = [_row(field.alias or name, field, hints[name]) for name, field in model.model_fields.items()]
+    return table(("key", "takes", "default", "what it is"), rows)
+
+
+def _row(key: str, field: FieldInfo, hint: object) -> tuple[str, str, str, str]:
+    takes = ", ".join([takes_of(hint), *limits(field, dimension_of(hint))])
+    return code(key), takes, default_of(field, dimension_of(hint)), field.description or ""
+
+
+def takes_of(hint: object) -> str:
+    """Return what a key with this annotation takes."""
+    for known, words in _NAMED:
+        if hint == known:
+            return words
+    if dimension := dimension_of(hint):
+        return dimension.name.replace("_", " ")
+    inner = [takes_of(one) for one in get_args(hint) if not isinstance(one, str) and one not in (type(None), ...)]
+    origin = get_origin(hint)
+    if origin in (Union, UnionType):
+        return " or ".join(inner)
+    if origin is Literal:
+        return " or ".join(code(str(word)) for word in get_args(hint))
+    if origin in (tuple, list):
+        return f"list of {plural(inner[0])}"
+    if origin is dict:
+        return f"map from {plural(inner[0])} to {plural(inner[1])}"
+    return "map" if isinstance(hint, type) and issubclass(hint, Config) else "made by the compiler"
+
+
+def plural(words: str) -> str:
+    """Return words for several of what the words are for one: 'names', 'any values', 'maps'."""
+    head, space, rest = words.partition(" of ")
+    return words if head.endswith("`") else f"{head}s{space}{rest}"
+
+
+def dimension_of(hint: object) -> Dimension | None:
+    """Return what a quantity of this annotation measures, None for other things."""
+    inner = get_args(hint)
+    marks = (one.dimension for one in inner if isinstance(one, Dimensioned))
+    return next(marks, None) or next((found for one in inner if (found := dimension_of(one))), None)
+
+
+def limits(field: FieldInfo, dimension: Dimension | None) -> list[str]:
+    """Return the limits of a field: 'above 0 m', 'at least one'."""
+    found = []
+    for limit in field.metadata:
+        for kind, key, words in _LIMITS:
+            if isinstance(limit, kind):
+                found.append(f"{words} {_shown(getattr(limit, key), dimension)}")
+        if isinstance(limit, MinLen):
+            found.append("at least one")
+    return found
+
+
+def default_of(field: FieldInfo, dimension: Dimension | None) -> str:
+    """Return the default of a field; '*must be there*' for one without."""
+    if field.is_required():
+        return "*must be there*"
+    value = field.get_default(call_default_factory=True)
+    value = value.when if isinstance(value, Restart) else value  # the word that stands for it
+    return code(_shown(value, dimension)) if value not in (None, {}, (), [], "") else ""
+
+
+def _shown(value: object, dimension: Dimension | None) -> str:
+    if dimension and isinstance(value, int | float):
+        return format_quantity(value, dimension)
+    return format_number(value) if isinstance(value, int | float) and not isinstance(value, bool) else str(value)

@@ -1,0 +1,130 @@
+"""Drive with the keyboard: arrows or w, a, s, d; space stops, q quits.
+
+It is the input `teleop` of the mux for `cmd_vel`. The robot moves only while a key is pressed: 0.3 s after the last one
+it is told to stand still, and then nothing more, so that the mux lets others through.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+import termios
+import tty
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+
+from rbxcompose.bus.graph import Name
+from rbxcompose.bus.topics import Publisher
+from rbxcompose.cli.common.bus_place import add_bus_options
+from rbxcompose.cli.common.dead_man import PERIOD, DeadMan, Velocity, keys
+from rbxcompose.cli.common.guest import NAME, Guest
+from rbxcompose.cli.common.nouns import NO_NAME, NOBODY, add_timeout_option, positive, visit
+from rbxcompose.cli.common.robots import NotDoneError
+from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.findings import kind
+from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.qos import Qos
+from rbxcompose.units import ANGULAR_SPEED, SPEED
+
+_INPUT = "/cmd_vel/teleop"
+_HELP = "arrows or w a s d: drive   space: stop   q: quit"
+_MOST_READ = 1024  # bytes of keys at once
+
+NO_TERMINAL = kind(
+    "RBX9027",
+    """Driving needs a keyboard
+
+`rbxcompose drive` reads keys from a terminal. Where there is none, `rbxcompose topic pub` sends velocities.
+
+Bad: `rbxcompose drive < keys.txt`
+Good: `rbxcompose drive`
+""",
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    speed, turn = positive(SPEED), positive(ANGULAR_SPEED)
+    parser.add_argument("--speed", type=speed, default=0.2, metavar="V", help="forward and back (default: 0.2 m/s)")
+    parser.add_argument(
+        "--turn", type=turn, default=math.radians(45.0), metavar="V", help="left and right (default: 45 deg/s)"
+    )
+    parser.add_argument("--topic", metavar="TOPIC", help="the topic that takes velocities (default: cmd_vel/teleop)")
+    add_timeout_option(parser, "2s")
+    add_bus_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Drive until q, an interrupt, or the end of the terminal."""
+    if not sys.stdin.isatty():
+        return refuse(NO_TERMINAL.at(None, "there is no terminal to read keys from"))
+    return visit(arguments, lambda guest: _drive(guest, arguments))
+
+
+def _drive(guest: Guest, arguments: argparse.Namespace) -> int:
+    name = _input(guest.graph().topics, arguments.topic)
+    publisher = guest.bus().publisher(NAME, name, Twist, Qos.COMMAND)
+    if not guest.run(lambda: publisher.has_match, arguments.timeout):
+        return refuse(NOBODY.at(None, f"nobody takes velocities on '{name}'"))
+    wheel = _Wheel(guest, publisher, DeadMan(arguments.speed, arguments.turn))
+    with guest.interruptible(), _raw(sys.stdin.fileno()):
+        tell(_HELP)
+        try:
+            guest.watch(sys.stdin.fileno(), wheel.read)
+            guest.run(lambda: wheel.is_over or guest.is_interrupted)
+        finally:
+            wheel.let_go()
+    return 0
+
+
+def _input(topics: Iterable[Name], wanted: str | None) -> str:
+    """Return the topic that takes the keyboard's commands; a robot with a namespace has it below that."""
+    taking = [one.name for one in topics if one.takers and Twist.TYPE in one.types]
+    fitting = [name for name in taking if name.endswith(_INPUT)] if wanted is None else [f"/{wanted.lstrip('/')}"]
+    if len(fitting) == 1 and fitting[0] in taking:
+        return fitting[0]
+    words = (
+        f"several topics end in '{_INPUT}'" if len(fitting) > 1 else f"nobody takes velocities on '{wanted or _INPUT}'"
+    )
+    raise NotDoneError(NO_NAME.misspelt(None, words, wanted or _INPUT, taking, "topics that take velocities"))
+
+
+class _Wheel:
+    """Turns keys into commands."""
+
+    def __init__(self, guest: Guest, publisher: Publisher[Twist], dead_man: DeadMan) -> None:
+        self.is_over = False
+        self._guest, self._publisher, self._dead_man = guest, publisher, dead_man
+        guest.scheduler.every(PERIOD, NAME, lambda dt: self._send(dead_man.due(guest.clock.now())))
+
+    def read(self) -> None:
+        """Take the keys that were pressed."""
+        data = os.read(sys.stdin.fileno(), _MOST_READ)
+        for key in keys(data.decode(errors="replace")):
+            self._send(self._dead_man.press(key, self._guest.clock.now()))
+            self.is_over = self.is_over or key == "q"
+        self.is_over = self.is_over or not data
+
+    def let_go(self) -> None:
+        """Stand still, and be silent."""
+        self._send(self._dead_man.release())
+
+    def _send(self, velocity: Velocity | None) -> None:
+        if velocity is not None:
+            self._publisher(Twist(linear=Vector3(x=velocity.speed), angular=Vector3(z=velocity.turn)))
+
+
+@contextmanager
+def _raw(terminal: int) -> Iterator[None]:
+    """Have keys at once and unseen; what the terminal was before it is again at the end."""
+    before = termios.tcgetattr(terminal)
+    try:
+        tty.setcbreak(terminal)
+        now = termios.tcgetattr(terminal)
+        now[6][termios.VSUSP] = b"\0"  # who suspends us would be left with this terminal
+        termios.tcsetattr(terminal, termios.TCSANOW, now)
+        yield
+    finally:
+        termios.tcsetattr(terminal, termios.TCSADRAIN, before)

@@ -1,0 +1,64 @@
+"""Show the definition of a message, service or action, or write our own ones as a ROS 2 package.
+
+ROS 2 knows all types that a robot uses but those of the package `rbxcompose_msgs`: `msg export ros2_ws/src` writes it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import rbxcompose
+from rbxcompose.cli.common.messages import NO_TYPE, to_json
+from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.manifest.files import shown_name
+from rbxcompose.msgs.generate import all_structures
+from rbxcompose.msgs.hashes import type_hash
+from rbxcompose.msgs.packages import OWN, all_names, package_files, parts_of, whole_text
+from rbxcompose.scaffold.writing import write_new
+
+LICENCE = "Apache-2.0"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    actions = parser.add_subparsers(dest="action", metavar="show|export", required=True)
+    show = actions.add_parser("show", help="print a definition with all that it is made of, and its type hash")
+    show.add_argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
+    show.add_argument("--json", action="store_true", help="answer in JSON")
+    export = actions.add_parser("export", help=f"write the package {OWN} for a ROS 2 workspace")
+    export.add_argument("folder", metavar="DIR", type=Path, help=f"the folder in which {OWN} is made")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Show a type, or write the package."""
+    return _export(arguments.folder) if arguments.action == "export" else _show(arguments.type, arguments.json)
+
+
+def _show(wanted: str, as_json: bool) -> int:
+    names = all_names()
+    name = next((name for name in names if wanted in (name, _short(name))), None)
+    if name is None:
+        words = f"'{wanted}' is not a type that is known here"
+        return refuse(NO_TYPE.misspelt(None, words, wanted, [*names, *map(_short, names)], "known types"))
+    hashed, text = type_hash(name, all_structures()), whole_text(name)
+    if as_json:
+        tell(to_json({"type": name, "hash": hashed, "text": text, "parts": parts_of(name)}))
+    else:
+        tell(f"# {name}\n# {hashed}\n{text}".rstrip("\n"))
+    return 0
+
+
+def _short(name: str) -> str:
+    package, _, bare = name.split("/")
+    return f"{package}/{bare}"
+
+
+def _export(folder: Path) -> int:
+    target = folder / OWN
+    finding = write_new(target, package_files(OWN, rbxcompose.__version__, LICENCE))
+    if finding is not None:
+        return refuse(replace(finding, help="choose another folder"))
+    tell(f"{shown_name(target)} is written; in the workspace: colcon build --packages-select {OWN}")
+    return 0

@@ -1,0 +1,127 @@
+"""Record the topics of a robot to an MCAP file, until Ctrl-C.
+
+Payloads are kept as they are on the bus, with the definitions of their types, so that Foxglove, Lichtblick and ROS 2
+read them. A recorder that is killed loses at most half a second: its file is recovered at the next start in its folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import time
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+
+from rbxcompose.cli.common.bus_place import BusPlace, add_bus_options, find_place
+from rbxcompose.cli.common.recording_bus import Tap, join
+from rbxcompose.cli.common.recordings import (
+    add_selection_options,
+    recover_in,
+    seconds,
+    selection_of,
+    table,
+    until_interrupted,
+    warn,
+)
+from rbxcompose.cli.common.robots import NotDoneError, find_robot
+from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.clock import MonotonicClock
+from rbxcompose.plain import plain
+from rbxcompose.recording.codes import LOST, UNWRITABLE
+from rbxcompose.recording.files import ENDING
+from rbxcompose.recording.recorder import Recorder, Split
+
+_PAUSE = 0.02  # [s] between looks for messages
+_SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kMG])B")
+_TIMES = {"k": 1e3, "M": 1e6, "G": 1e9}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_bus_options(parser)
+    add_selection_options(parser)
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="the file, else ROBOT-DATE-TIME.mcap")
+    parser.add_argument("--for", type=seconds, dest="duration", metavar="30s", help="end after this time")
+    parser.add_argument(
+        "--split", type=_split, default=Split(), metavar="SIZE|TIME", help="begin a new file after 500MB, or 10min"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Record, then tell what was recorded."""
+    try:
+        place = find_place(arguments)
+        path = _path(arguments)
+        if path.parent.is_dir():
+            recover_in(path.parent)
+        return _record(arguments, place, path)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def _record(arguments: argparse.Namespace, place: BusPlace, path: Path) -> int:
+    clock = MonotonicClock()
+    with until_interrupted() as interrupt:
+        try:
+            recorder = Recorder(path, clock.now(), arguments.split)
+        except OSError as error:
+            return refuse(UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {_reason(error)}"))
+        try:
+            transport = join(place)
+        except NotDoneError:
+            recorder.discard()
+            raise
+        tap = Tap(transport, place.domain, selection_of(arguments), clock)
+        tell(f"recording to {recorder.paths[0]}; Ctrl-C ends it")
+        start = clock.now()
+        try:
+            return _write(
+                recorder, tap, clock, lambda: bool(interrupt) or _is_over(clock.now() - start, arguments.duration)
+            )
+        finally:
+            transport.close()
+
+
+def _write(recorder: Recorder, tap: Tap, clock: MonotonicClock, is_over: Callable[[], bool]) -> int:
+    try:
+        while not is_over():
+            time.sleep(_PAUSE)
+            for message in tap.take():
+                recorder.add(message)
+            recorder.keep(clock.now())
+        recorder.finish()
+    except OSError as error:
+        recorder.abandon()
+        return refuse(UNWRITABLE.at(None, f"'{plain(str(recorder.paths[-1]))}' cannot be written: {_reason(error)}"))
+    if tap.lost:
+        warn(LOST.at(None, f"{tap.lost:,} messages came too fast to be recorded", help="choose fewer with '--topics'"))
+    paths = ", ".join(map(str, recorder.paths))
+    tell(f"{table(recorder.counts)}\nrecorded {recorder.counts.total():,} messages to {paths}")
+    return 0
+
+
+def _is_over(elapsed: float, duration: float | None) -> bool:
+    return duration is not None and elapsed >= duration
+
+
+def _path(arguments: argparse.Namespace) -> Path:
+    wanted: Path | None = arguments.output
+    if wanted is not None:
+        return wanted if wanted.suffix == ENDING else wanted.with_name(wanted.name + ENDING)
+    name = "recording" if arguments.router else find_robot(arguments.robot).path.name
+    return Path(f"{name}-{datetime.now():%Y%m%d-%H%M%S}{ENDING}")
+
+
+def _reason(error: OSError) -> str:
+    return plain(error.strerror or str(error))
+
+
+def _split(text: str) -> Split:
+    """Read `500MB` or `10min`."""
+    if found := _SIZE.fullmatch(text.strip()):
+        return Split(size=max(1, int(float(found[1]) * _TIMES[found[2]])))
+    try:
+        return Split(time=seconds(text))
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(f"'{text}' is no size and no time; write '500MB' or '10min'") from None

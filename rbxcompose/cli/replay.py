@@ -1,0 +1,189 @@
+"""Publish a recording again on a robot's bus, or show what is in it.
+
+Messages come at the intervals in which they were recorded. Topics of the class `command` make a robot move: they are
+left out unless `--topics` names them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rbxcompose.cli.common.bus_place import add_bus_options, find_place
+from rbxcompose.cli.common.recording_bus import Player, join
+from rbxcompose.cli.common.recordings import (
+    Interrupt,
+    add_selection_options,
+    recover_in,
+    seconds,
+    selection_of,
+    table,
+    until_interrupted,
+    warn,
+)
+from rbxcompose.cli.common.robots import NotDoneError
+from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.clock import MonotonicClock
+from rbxcompose.plain import plain
+from rbxcompose.qos import Qos
+from rbxcompose.recording.codes import DAMAGED, NOT_REPLAYED, NOTHING, UNREADABLE
+from rbxcompose.recording.files import PART
+from rbxcompose.recording.message import Recorded
+from rbxcompose.recording.reader import NotARecordingError, RecordingReader
+from rbxcompose.recording.schedule import playlist
+from rbxcompose.recording.summary import Summary, summary_of
+from rbxcompose.recording.topics import Selection, Topic, is_replayable
+
+_PAUSE = 0.05  # [s] at most between looks for an interrupt
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", type=Path, metavar="FILE", help="the recording")
+    add_bus_options(parser)
+    add_selection_options(parser)
+    parser.add_argument("--rate", type=_rate, default=1.0, metavar="2x", help="faster or slower than it was")
+    parser.add_argument(
+        "--from", type=seconds, default=0.0, dest="start", metavar="10s", help="leave out what is before"
+    )
+    parser.add_argument("--loop", action="store_true", help="begin anew at the end, until Ctrl-C")
+    parser.add_argument("--info", action="store_true", help="only show topics, types, counts and duration")
+    parser.add_argument("--json", action="store_true", help="with --info: answer with one JSON object")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read the file once to know what is in it, then replay it."""
+    path = arguments.path
+    if path.parent.is_dir():
+        recover_in(path.parent)
+    if path.name.endswith(PART) and not path.exists():
+        path = path.with_name(path.name.removesuffix(PART))
+    try:
+        summary = _look_through(path)
+        if arguments.info:
+            tell(json.dumps(_fields(summary)) if arguments.json else _text(path, summary))
+            return 0
+        return _replay(arguments, path, summary)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def _look_through(path: Path) -> Summary:
+    with _opened(path) as reader:
+        summary = summary_of(reader.messages())
+    if reader.damage:
+        place = f"after {summary.messages:,} messages"
+        warn(DAMAGED.at(None, f"'{plain(str(path))}' is damaged {place}: {reader.damage}"))
+    return summary
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[RecordingReader]:
+    try:
+        if path.exists() and not path.is_file():
+            raise NotARecordingError("it is no file")
+        with path.open("rb") as file:
+            yield RecordingReader(file)
+    except OSError as error:
+        reason = plain(error.strerror or str(error))
+        raise NotDoneError(UNREADABLE.at(None, f"'{plain(str(path))}' cannot be read: {reason}")) from error
+    except NotARecordingError as error:
+        finding = UNREADABLE.at(None, f"'{plain(str(path))}' is no recording: {error}")
+        raise NotDoneError(finding) from error
+
+
+def _replay(arguments: argparse.Namespace, path: Path, summary: Summary) -> int:
+    topics = _chosen(summary, selection_of(arguments))
+    if not topics or arguments.start > summary.duration:
+        why = "no topic that was chosen can be replayed" if not topics else f"it lasts {summary.duration:.1f} s"
+        return refuse(NOTHING.at(None, f"nothing of '{plain(str(path))}' is replayed: {why}"))
+    place = find_place(arguments)
+    transport = join(place)
+    clock = MonotonicClock()
+    try:
+        player = Player(transport, place.domain, topics, clock)
+        with until_interrupted() as interrupt:
+            player.wait_for_subscribers()
+            tell(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
+            count = _play(path, player, topics, arguments, interrupt)
+            while arguments.loop and _wait(time.monotonic() + _PAUSE, interrupt):  # also if it lasts no time at all
+                count += _play(path, player, topics, arguments, interrupt)
+    finally:
+        transport.close()
+    tell(f"replayed {count:,} messages")
+    return 0
+
+
+def _chosen(summary: Summary, wanted: Selection) -> list[Topic]:
+    """Return the topics to publish and tell which others were wanted."""
+    topics = sorted((one for one in summary.counts if wanted.takes(one)), key=lambda one: one.name)
+    unfit = [one.name for one in topics if not is_replayable(one)]
+    commands = [one.name for one in topics if one.qos is Qos.COMMAND and not wanted.patterns]
+    if unfit:
+        warn(NOT_REPLAYED.at(None, f"topics that the bus cannot carry: {plain(', '.join(unfit))}"))
+    if commands:
+        names = plain(", ".join(commands))
+        warn(NOT_REPLAYED.at(None, f"topics that make a robot move: {names}", help="'--topics NAME' replays them"))
+    return [one for one in topics if one.name not in {*unfit, *commands}]
+
+
+def _play(path: Path, player: Player, topics: list[Topic], arguments: argparse.Namespace, interrupt: Interrupt) -> int:
+    """Publish the recording once and return how many messages that were."""
+    chosen = set(topics)
+    count = 0
+    start = time.monotonic()
+    with _opened(path) as reader:
+        for due, message in playlist(reader.messages(), rate=arguments.rate, start=arguments.start):
+            if not _wait(start + due, interrupt):
+                break
+            count += _put(player, message, chosen)
+    return count
+
+
+def _put(player: Player, message: Recorded, chosen: set[Topic]) -> int:
+    if message.topic not in chosen:
+        return 0
+    player.put(message)
+    return 1
+
+
+def _wait(until: float, interrupt: Interrupt) -> bool:
+    """Wait for a time of the monotonic clock; return False if an interrupt came first."""
+    while not interrupt and (left := until - time.monotonic()) > 0:
+        time.sleep(min(left, _PAUSE))
+    return not interrupt
+
+
+def _text(path: Path, summary: Summary) -> str:
+    head = f"{plain(str(path))}: {summary.messages:,} messages, {summary.duration:.3f} s"
+    return f"{head}\n{table(summary.counts)}" if summary.counts else head
+
+
+def _fields(summary: Summary) -> dict[str, object]:
+    topics = [
+        {"name": one.name, "type": one.type, "class": one.qos.value, "encoding": one.encoding, "messages": number}
+        for one, number in sorted(summary.counts.items(), key=lambda item: (item[0].name, item[0].type))
+    ]
+    return {
+        "messages": summary.messages,
+        "start": summary.start,
+        "end": summary.end,
+        "duration": summary.duration,
+        "topics": topics,
+    }
+
+
+def _rate(text: str) -> float:
+    """Read `2x`."""
+    try:
+        rate = float(text.removesuffix("x"))
+    except ValueError:
+        rate = math.nan
+    if not 0 < rate < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a rate; write '2x' or '0.5x'")
+    return rate

@@ -1,0 +1,114 @@
+"""List the topics on the bus, show their messages, measure their rate, publish.
+
+It sees ROS 2 participants as well as components. It needs no robot of this machine: `--router` names any other bus.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from rbxcompose.bus.graph import End
+from rbxcompose.cli.common.bus_place import add_bus_options
+from rbxcompose.cli.common.guest import Guest
+from rbxcompose.cli.common.nouns import (
+    add_count_options,
+    add_json_option,
+    add_ls_options,
+    add_timeout_option,
+    count,
+    described,
+    hertz,
+    seconds,
+    table,
+    tell_list,
+    visit,
+    wanted,
+)
+from rbxcompose.cli.common.telling import tell
+
+_ENDS = ("publishers", "subscriptions")
+_WINDOW = 100  # messages
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    actions = parser.add_subparsers(dest="action", metavar="ls|show|echo|hz|pub", required=True)
+    ls = actions.add_parser("ls", help="list the topics with their types")
+    add_ls_options(ls)
+    ls.set_defaults(do=_ls)
+    show = actions.add_parser("show", help="show who publishes and who subscribes")
+    add_json_option(show)
+    show.set_defaults(do=_show)
+    echo = actions.add_parser("echo", help="print the messages")
+    add_count_options(echo)
+    add_json_option(echo)
+    echo.set_defaults(do=_echo)
+    hz = actions.add_parser("hz", help="measure how often messages come")
+    hz.add_argument("--window", type=count, default=_WINDOW, metavar="N", help=f"of so many messages ({_WINDOW})")
+    hz.add_argument("--for", dest="duration", type=seconds, metavar="T", help="end after this time")
+    add_json_option(hz)
+    hz.set_defaults(do=_hz)
+    pub = actions.add_parser("pub", help="publish a message, once if nothing else is said")
+    for one in (show, echo, hz, pub):
+        one.add_argument("topic", metavar="TOPIC", help="its name, such as /odom")
+    pub.add_argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
+    pub.add_argument("message", metavar="MESSAGE", nargs="?", default="", help="YAML; what it leaves out is zero")
+    pub.add_argument("--rate", type=hertz, metavar="10Hz", help="publish again and again, until interrupted")
+    pub.add_argument("-n", "--count", type=count, metavar="N", help="end after so many")
+    add_timeout_option(pub, "2s")
+    add_json_option(pub)
+    pub.set_defaults(do=_pub)
+    for one in (ls, show, echo, hz, pub):
+        add_bus_options(one)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Do what is asked for."""
+    return visit(arguments, lambda guest: int(arguments.do(guest, arguments)))
+
+
+def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
+    return tell_list(guest.graph().topics, _ENDS, arguments)
+
+
+def _show(guest: Guest, arguments: argparse.Namespace) -> int:
+    topic = wanted(guest.graph().topics, arguments.topic, "topic")
+    if arguments.json:
+        tell(json.dumps(described(topic, _ENDS)))
+        return 0
+    tell(f"{topic.name}: {', '.join(topic.types)}")
+    if topic.clash:
+        tell(f"! {topic.clash}")
+    ends = (("publisher", topic.givers), ("subscription", topic.takers))
+    tell(table([(what, end.node, end.kind.type, _qos(end)) for what, given in ends for end in given]))
+    return 0
+
+
+def _qos(end: End) -> str:
+    if end.qos is None:
+        return "unknown quality of service"
+    reliability = "reliable" if end.qos.is_reliable else "best effort"
+    durability = ", kept for who comes later" if end.qos.is_transient_local else ""
+    return f"{reliability}{durability}, {'all' if end.qos.keeps_all else f'newest {end.qos.depth}'}"
+
+
+# What messages need is imported by those who need it: a list answers in half of the time without.
+
+
+def _echo(guest: Guest, arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.common.listening import echo
+
+    return echo(guest, arguments)
+
+
+def _hz(guest: Guest, arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.common.measuring import measure
+
+    return measure(guest, arguments)
+
+
+def _pub(guest: Guest, arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.common.publishing import publish
+
+    return publish(guest, arguments)

@@ -1,0 +1,88 @@
+"""Interface texts as others want them: one with all that it is made of, or a package for a ROS 2 workspace."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rbxcompose.msgs.definitions import INTERFACES, KINDS, interface_names, read
+
+OWN = "rbxcompose_msgs"
+"""The package that no ROS 2 installation has."""
+
+_SEPARATOR = "=" * 80
+_XML = """<?xml version="1.0"?>
+<package format="3">
+  <name>{package}</name>
+  <version>{version}</version>
+  <description>Messages, services and actions of rbxcompose.</description>
+  <maintainer email="rbxcompose@localhost">rbxcompose</maintainer>
+  <license>{licence}</license>
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <buildtool_depend>rosidl_default_generators</buildtool_depend>
+{depends}  <exec_depend>rosidl_default_runtime</exec_depend>
+  <member_of_group>rosidl_interface_packages</member_of_group>
+  <export>
+    <build_type>ament_cmake</build_type>
+  </export>
+</package>
+"""
+_CMAKE = """cmake_minimum_required(VERSION 3.8)
+project({package})
+find_package(ament_cmake REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+{finds}rosidl_generate_interfaces(${{PROJECT_NAME}}
+{files})
+ament_export_dependencies(rosidl_default_runtime)
+ament_package()
+"""
+
+
+def all_names() -> list[str]:
+    """Return the names of all interfaces that have a text, sorted."""
+    return sorted(name for kind in KINDS for name in interface_names(kind))
+
+
+def text_of(name: str) -> str:
+    """Return the text of an interface, such as `std_srvs/srv/SetBool`."""
+    return _path(INTERFACES, name).read_text(encoding="utf-8")
+
+
+def parts_of(name: str) -> list[str]:
+    """Return the names of the messages that an interface is made of, each once, what holds them first."""
+    found: list[str] = []
+    left = [name]
+    while left:
+        fields = [field for structure in read(left.pop(0)) for field in structure.fields]
+        fresh = dict.fromkeys(field.type.base for field in fields if field.type.is_message)
+        new = [one for one in fresh if one not in found]
+        found += new
+        left += new
+    return found
+
+
+def whole_text(name: str) -> str:
+    """Return the text of an interface and, each below a line of `=`, those of the messages that it is made of."""
+    parts = [f"{_SEPARATOR}\nMSG: {one.replace('/msg/', '/')}\n{text_of(one)}" for one in parts_of(name)]
+    return "".join([text_of(name), *parts])
+
+
+def package_files(package: str, version: str, licence: str) -> dict[str, str]:
+    """Return the files of a ROS 2 package by their paths below its folder, with all interfaces of `package`."""
+    names = [name for name in all_names() if name.startswith(f"{package}/")]
+    texts = {name.partition("/")[2] + "." + name.split("/")[1]: text_of(name) for name in names}
+    used = {part.split("/")[0] for name in names for part in parts_of(name)} - {package}
+    depends = used | ({"action_msgs"} if any("/action/" in name for name in names) else set())
+    lines = [f'  "{path}"\n' for path in texts]
+    lines += [f"  DEPENDENCIES {' '.join(sorted(used))}\n"] if used else []
+    finds = "".join(f"find_package({one} REQUIRED)\n" for one in sorted(used))
+    tags = "".join(f"  <depend>{one}</depend>\n" for one in sorted(depends))
+    return {
+        **texts,
+        "package.xml": _XML.format(package=package, version=version, licence=licence, depends=tags),
+        "CMakeLists.txt": _CMAKE.format(package=package, finds=finds, files="".join(lines)),
+    }
+
+
+def _path(root: Path, name: str) -> Path:
+    package, kind, bare = name.split("/")
+    return root / package / kind / f"{bare}.{kind}"

@@ -1,0 +1,188 @@
+"""Messages as plain data (maps, lists, numbers, texts, flags), and back with every mistake as a finding.
+
+Bytes are lists of numbers here. What is left out keeps its default.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Generic, Protocol, TypeVar
+
+from rbxcompose.findings import Finding, Span, kind, suggest
+from rbxcompose.msgs.definitions import FLOATS, OCTETS, FieldType, Shape, attribute, parse_type
+from rbxcompose.msgs.types import Message, declared
+
+M = TypeVar("M", bound=Message)
+Key = str | int
+Path = tuple[Key, ...]  # from the message: ("pose", "position", "x") or ("transforms", 0)
+
+NO_FIELD = kind(
+    "RBX9023",
+    """A field that the message does not have
+
+The text of a message names its fields as its type does. `rbxcompose msg show TYPE` prints the type.
+
+Bad: `rbxcompose topic pub /cmd_vel geometry_msgs/Twist '{linaer: {x: 0.1}}'`
+Good: `rbxcompose topic pub /cmd_vel geometry_msgs/Twist '{linear: {x: 0.1}}'`
+""",
+)
+WRONG_VALUE = kind(
+    "RBX9024",
+    """A value that does not fit the field of a message
+
+Each field has a type and a range: numbers, flags, texts, lists of so many values, other messages. Numbers of messages
+have no units: they are what ROS 2 means by them, mostly SI.
+
+Bad: `rbxcompose topic pub /answer std_msgs/Int32 '{data: many}'`
+Good: `rbxcompose topic pub /answer std_msgs/Int32 '{data: 42}'`
+""",
+)
+
+_RANGES = {
+    "byte": (0, 255),
+    "char": (0, 255),
+    **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
+    **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
+}
+_FLOAT32 = struct.Struct("<f")
+_DIGITS = range(6, 9)  # significant ones, of which a float32 never needs more than nine
+
+
+class Places(Protocol):
+    """Where in a text the parts of plain data stand."""
+
+    def key(self, path: Path) -> Span | None:
+        """Return the place of a key."""
+        ...
+
+    def value(self, path: Path) -> Span | None:
+        """Return the place of a value."""
+        ...
+
+
+class Nowhere:
+    """The places of data that have no text."""
+
+    def key(self, path: Path) -> None:
+        """Return no place."""
+
+    def value(self, path: Path) -> None:
+        """Return no place."""
+
+
+def to_plain(message: Message) -> dict[str, Any]:
+    """Return a message as plain data; a `float32` is the shortest number that stands for it."""
+    return {
+        name: _plain(parse_type(text), getattr(message, attribute(name))) for name, text in type(message).FIELDS.items()
+    }
+
+
+def _plain(type_: FieldType, value: Any) -> Any:
+    if type_.shape is not Shape.SINGLE:
+        single = FieldType(type_.base)
+        return [_plain(single, one) for one in (value.tolist() if hasattr(value, "tolist") else value)]
+    if type_.is_message:
+        return to_plain(value)
+    return _shortest(value) if type_.base == "float32" else value
+
+
+def _shortest(value: float) -> float:
+    for digits in _DIGITS:
+        short = float(f"{value:.{digits}g}")
+        if _is_same(short, value):
+            return short
+    return value
+
+
+def _is_same(short: float, value: float) -> bool:
+    try:
+        return _FLOAT32.pack(short) == _FLOAT32.pack(value)
+    except OverflowError:  # rounded up, beyond the largest one
+        return False
+
+
+@dataclass(slots=True)
+class _Reading(Generic[M]):
+    """One reading of plain data: where it stands, and the mistakes so far."""
+
+    places: Places
+    findings: list[Finding] = field(default_factory=list)
+
+    def message(self, message: type[M], data: object, path: Path) -> M | None:
+        """Return the message, or None with a finding."""
+        if data is None:
+            data = {}  # an empty text: all defaults
+        if not isinstance(data, Mapping):
+            self._wrong(path, f"{message.TYPE} is a map of its fields")
+            return None
+        values = {}
+        for name, value in data.items():
+            if name not in message.FIELDS:
+                words = f"{message.TYPE} has no field '{name}'"
+                place = self.places.key((*path, name))
+                self.findings.append(NO_FIELD.at(place, words, help=suggest(str(name), message.FIELDS, "its fields")))
+            else:
+                values[attribute(name)] = self._value(parse_type(message.FIELDS[name]), value, (*path, name))
+        return None if self.findings else message(**values)
+
+    def _value(self, type_: FieldType, value: object, path: Path) -> Any:
+        if type_.shape is not Shape.SINGLE:
+            return self._list(type_, value, path)
+        if type_.is_message:
+            return self.message(declared[type_.base], value, path)
+        if type_.base == "string":
+            return self._text(type_, value, path)
+        if type_.base == "bool":
+            return value if isinstance(value, bool) else self._wrong(path, "true or false is expected")
+        return self._number(type_.base, value, path)
+
+    def _list(self, type_: FieldType, value: object, path: Path) -> Any:
+        if not isinstance(value, list | tuple):
+            return self._wrong(path, f"a list is expected ({type_})")
+        count, length = len(value), type_.length
+        if (type_.shape is Shape.ARRAY and count != length) or (type_.shape is Shape.BOUNDED and count > length):
+            most = "at most " if type_.shape is Shape.BOUNDED else ""
+            return self._wrong(path, f"{most}{length} values are expected, these are {count}")
+        single = FieldType(type_.base, text_limit=type_.text_limit)
+        values = [self._value(single, one, (*path, index)) for index, one in enumerate(value)]
+        if self.findings:
+            return None
+        return bytes(values) if type_.base in OCTETS else tuple(values)
+
+    def _text(self, type_: FieldType, value: object, path: Path) -> Any:
+        if not isinstance(value, str):
+            return self._wrong(path, "text is expected; a number or a flag that is meant as text stands in quotes")
+        limit = type_.text_limit
+        if limit and len(value.encode()) > limit:
+            return self._wrong(path, f"at most {limit} bytes of text are expected, these are {len(value.encode())}")
+        return value
+
+    def _number(self, base: str, value: object, path: Path) -> Any:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return self._wrong(path, f"a number is expected ({base}), without a unit")
+        if base in FLOATS:
+            return self._float(base, value, path)
+        low, high = _RANGES[base]
+        if not isinstance(value, int) or not low <= value <= high:
+            return self._wrong(path, f"a whole number from {low} to {high} is expected ({base})")
+        return value
+
+    def _float(self, base: str, value: float, path: Path) -> Any:
+        try:
+            number = float(value)
+            return number if base == "float64" else _FLOAT32.unpack(_FLOAT32.pack(number))[0]
+        except OverflowError:
+            return self._wrong(path, f"this number is too large for a {base}")
+
+    def _wrong(self, path: Path, message: str) -> None:
+        where = ".".join(map(str, path))
+        self.findings.append(WRONG_VALUE.at(self.places.value(path), f"{where}: {message}" if where else message))
+
+
+def from_plain(message: type[M], data: object, places: Places | None = None) -> tuple[M | None, list[Finding]]:
+    """Return the message that plain data stand for, or None and what is wrong with them."""
+    reading: _Reading[M] = _Reading(places or Nowhere())
+    made = reading.message(message, data, ())
+    return (None if reading.findings else made), reading.findings

@@ -1,0 +1,227 @@
+"""The fields of a configuration as parameters of ROS 2: what they hold, what they are for, and a change of them.
+
+Numbers are SI. Who sets one may also send text with a unit (`30 s`), as it would stand in a manifest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from rbxcompose.config import Config, Dimensioned, Live
+from rbxcompose.findings import suggest
+from rbxcompose.msgs.rcl_interfaces import (
+    FloatingPointRange,
+    IntegerRange,
+    ListParametersResult,
+    Parameter,
+    ParameterDescriptor,
+    ParameterValue,
+)
+from rbxcompose.params.values import HIGHEST, LOWEST, from_message, parameter_type, to_message
+from rbxcompose.units import RATIO, UNITS, Dimension, Quantity, UnitError, format_quantity
+
+SEPARATOR = "."
+_BOUNDS = {"gt": "greater than", "ge": "at least", "lt": "less than", "le": "at most"}
+
+
+class UnsettableError(ValueError):
+    """Raised with the reason why parameters cannot be set."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A parameter: a field of the configuration, or one below a field (`inputs.teleop.priority`)."""
+
+    name: str
+    value: object
+    field: FieldInfo | None = None
+
+    @property
+    def is_live(self) -> bool:
+        """Tell whether it may change while the robot runs."""
+        return any(isinstance(mark, Live) for mark in self._marks)
+
+    @property
+    def dimension(self) -> Dimension | None:
+        """Return what it measures, None if it is no quantity."""
+        return dimension_of(self.field) if self.field else None
+
+    @property
+    def descriptor(self) -> ParameterDescriptor:
+        """Return what it is for and what it takes."""
+        numbers, integers = self._ranges()
+        return ParameterDescriptor(
+            name=self.name,
+            type=parameter_type(self.value) or 0,
+            description=self._description(),
+            additional_constraints=self._constraints(),
+            read_only=not self.is_live,
+            floating_point_range=numbers,
+            integer_range=integers,
+        )
+
+    @property
+    def _marks(self) -> Sequence[Any]:
+        return self.field.metadata if self.field else ()
+
+    def _description(self) -> str:
+        text = (self.field.description or "") if self.field else ""
+        return f"{text} [{unit}]".strip() if (unit := _si_unit(self.dimension)) else text
+
+    def _bounds(self) -> Iterator[tuple[str, float]]:
+        for mark in self._marks:
+            for key in _BOUNDS:
+                if (bound := getattr(mark, key, None)) is not None:
+                    yield key, bound
+
+    def _ranges(self) -> tuple[tuple[FloatingPointRange, ...], tuple[IntegerRange, ...]]:
+        low = [bound for key, bound in self._bounds() if key in ("gt", "ge")]
+        high = [bound for key, bound in self._bounds() if key in ("lt", "le")]
+        if not low and not high:
+            return (), ()
+        if isinstance(self.value, int):
+            least, most = int(max(low, default=LOWEST)), int(min(high, default=HIGHEST))
+            return (), (IntegerRange(from_value=least, to_value=most),)
+        lowest, highest = max(low, default=-math.inf), min(high, default=math.inf)
+        return (FloatingPointRange(from_value=lowest, to_value=highest),), ()
+
+    def _constraints(self) -> str:
+        words = [f"{_BOUNDS[key]} {self._shown(bound)}" for key, bound in self._bounds()]
+        if self.field is not None and get_origin(self.field.annotation) is Literal:
+            words.append(f"one of {', '.join(map(str, get_args(self.field.annotation)))}")
+        return ", ".join(words)
+
+    def _shown(self, bound: float) -> str:
+        return format_quantity(bound, self.dimension) if self.dimension else f"{bound:g}"
+
+
+def _si_unit(dimension: Dimension | None) -> str:
+    """Return the unit in which a parameter counts; ratios go from 0 to 1."""
+    if dimension == RATIO:
+        return "0 to 1"
+    return next((name for name, unit in UNITS.items() if unit.dimension == dimension and unit.to_si(1.0) == 1.0), "")
+
+
+def settings(config: Config) -> dict[str, Setting]:
+    """Return all parameters by name; what is no plain value, such as a secret, is none."""
+    found: dict[str, Setting] = {}
+    for name, field in type(config).model_fields.items():
+        for one in _settings_of(name, getattr(config, name), field):
+            found[one.name] = one
+    return found
+
+
+def _settings_of(name: str, value: object, field: FieldInfo | None) -> Iterator[Setting]:
+    match value:
+        case Config():
+            for key in type(value).model_fields:
+                yield from _settings_of(f"{name}{SEPARATOR}{key}", getattr(value, key), None)
+        case Mapping():
+            for key, each in value.items():
+                yield from _settings_of(f"{name}{SEPARATOR}{key}", each, None)
+        case _ if parameter_type(value) is not None:
+            yield Setting(name, value, field)
+
+
+def values_of(known: Mapping[str, Setting], names: Iterable[str]) -> tuple[ParameterValue, ...]:
+    """Return the values of parameters; one that does not exist is not set."""
+    found = (to_message(known[name].value) if name in known else None for name in names)
+    return tuple(value or ParameterValue() for value in found)
+
+
+def listed(known: Iterable[str], prefixes: Sequence[str], depth: int) -> ListParametersResult:
+    """Return the names below one of `prefixes` (none: all) by at most `depth` words (0: any number)."""
+
+    def is_wanted(name: str, prefix: str) -> bool:
+        if prefix and name != prefix and not name.startswith(prefix + SEPARATOR):
+            return False
+        below = name.removeprefix(prefix).removeprefix(SEPARATOR) if prefix else name
+        return not depth or below.count(SEPARATOR) < depth
+
+    names = [name for name in known if any(is_wanted(name, prefix) for prefix in prefixes or ("",))]
+    above = dict.fromkeys(name.rpartition(SEPARATOR)[0] for name in names if SEPARATOR in name)
+    return ListParametersResult(names=tuple(names), prefixes=tuple(above))
+
+
+def changed(config: Config, parameters: Sequence[Parameter]) -> Config:
+    """Return the configuration with all of `parameters` set.
+
+    Raises:
+        UnsettableError: if one of them is unknown, is read-only or takes no such value, or if together they do not fit.
+    """
+    known = settings(config)
+    wanted = {one.name: _wanted(known, one) for one in parameters}
+    fields = type(config).model_fields
+    data: dict[str, object] = {}
+    for name, field in fields.items():
+        value = _with_unit(wanted.get(name, getattr(config, name)), dimension_of(field))
+        data[field.alias or name] = value
+    try:
+        return type(config).model_validate(data, strict=True)
+    except ValidationError as error:
+        raise UnsettableError(_reason(error.errors(include_url=False)[0])) from error
+
+
+def _wanted(known: Mapping[str, Setting], parameter: Parameter) -> object:
+    setting = known.get(parameter.name)
+    if setting is None:
+        help_text = suggest(parameter.name, known, "parameters")
+        raise UnsettableError(f"there is no parameter '{parameter.name}'" + (f"; {help_text}" if help_text else ""))
+    if not setting.is_live:
+        raise UnsettableError(f"'{parameter.name}' cannot change while the robot runs")
+    value = from_message(parameter.value)
+    if value is None:
+        raise UnsettableError(f"'{parameter.name}' needs a value")
+    return value
+
+
+def _with_unit(value: object, dimension: Dimension | None) -> object:
+    """Return SI numbers as quantities: a bare number would not be taken for an angle."""
+    match value:
+        case _ if dimension is None:
+            return value
+        case bool():
+            return value
+        case int() | float():
+            return Quantity(float(value), dimension)
+        case tuple():
+            return tuple(_with_unit(each, dimension) for each in value)
+        case Mapping():
+            return {key: _with_unit(each, dimension) for key, each in value.items()}
+    return value
+
+
+def _reason(error: ErrorDetails) -> str:
+    name = SEPARATOR.join(map(str, error["loc"]))
+    cause = error.get("ctx", {}).get("error")
+    if isinstance(cause, UnitError):
+        words = f"{cause.message}; {cause.detail}" if cause.detail else cause.message
+    else:
+        words = str(cause or error["msg"]).replace("Input should be", "must be")
+    return f"'{name}' {words}" if name else words
+
+
+def differences(old: Config, new: Config) -> tuple[Parameter, ...]:
+    """Return the parameters that are others in `new`, with their new values."""
+    before = settings(old)
+    others = (one for one in settings(new).values() if one.name not in before or before[one.name].value != one.value)
+    return tuple(Parameter(name=one.name, value=to_message(one.value) or ParameterValue()) for one in others)
+
+
+def dimension_of(field: FieldInfo) -> Dimension | None:
+    """Return what a field's values measure, also within `... | None` and lists; None if they are no quantities."""
+    marks = (*field.metadata, *_marks_within(field.annotation))
+    return next((mark.dimension for mark in marks if isinstance(mark, Dimensioned)), None)
+
+
+def _marks_within(hint: Any) -> Iterator[Any]:
+    yield from getattr(hint, "__metadata__", ())
+    for argument in get_args(hint):
+        yield from _marks_within(argument)

@@ -1,0 +1,243 @@
+"""A plan as text, and back: `load(dump(plan)) == plan`, unless a configuration holds a secret, which nobody is shown.
+
+The text is JSON. Types stand in no text: they are those of the plan's fields and of the components' configurations, so
+that loading a file makes nothing but plans. Configurations are validated again, missions are read again from their
+located tree. Maps are sorted by key, so that equal plans give equal texts.
+"""
+
+from __future__ import annotations
+
+import json
+import types
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import to_jsonable_python
+
+from rbxcompose.config import HIDDEN, Config, Dimensioned, Place, Secret
+from rbxcompose.findings import Report
+from rbxcompose.manifest.tree import Mapping as LocatedMapping
+from rbxcompose.missions.program import Program
+from rbxcompose.missions.reading import read_program
+from rbxcompose.plan.located import node_of_data, node_to_data
+from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.plan.units import dimension_of_data, dimension_to_data
+from rbxcompose.sdk.registry import component_names, component_type
+from rbxcompose.units import Dimension, Quantity
+
+VERSION = 1
+VERSION_KEY = "rbxcompose_plan"
+
+
+class PlanTextError(ValueError):
+    """Raised when a text is no plan that this installation can read."""
+
+
+def dump(plan: Plan) -> str:
+    """Return a plan as JSON; a secret is written as `***`."""
+    return json.dumps({VERSION_KEY: VERSION, **_encode(plan, Plan)}, ensure_ascii=False, indent=1) + "\n"
+
+
+def load(text: str) -> Plan:
+    """Return the plan that `dump` wrote.
+
+    Raises:
+        PlanTextError: if the text is none, or names a component type that is not installed.
+    """
+    try:
+        data = json.loads(text)
+        if not isinstance(data, dict) or data.pop(VERSION_KEY, None) != VERSION:
+            raise PlanTextError(f"this is no plan of version {VERSION}")
+        plan = _decode(data, Plan)
+    except PlanTextError:
+        raise
+    except RecursionError:
+        raise PlanTextError("this is no plan: it is nested too deeply") from None
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError, OverflowError) as error:
+        raise PlanTextError(f"this is no plan: {error!r}"[:300]) from error
+    if not isinstance(plan, Plan):
+        raise PlanTextError("this is no plan")
+    return plan
+
+
+def _encode(value: Any, hint: Any) -> Any:
+    """Return a value of a field's type as data for JSON."""
+    hint = _plain_hint(hint)
+    if hint in (Any, object):
+        return _encode_free(value)
+    match value:
+        case Secret():
+            return HIDDEN
+        case Program():
+            return node_to_data(value.root)
+        case Dimension():
+            return dimension_to_data(value)
+        case Enum():
+            return value.name
+        case Mapping():
+            return {str(key): _encode(each, _item(hint)) for key, each in sorted(value.items())}
+        case frozenset() | set():
+            return sorted(_encode(each, _item(hint)) for each in value)
+        case tuple() | list():
+            return [_encode(each, _item(hint, index)) for index, each in enumerate(value)]
+        case _ if isinstance(value, Config) or is_dataclass(value):
+            cls: Any = type(value)
+            return {name: _encode(getattr(value, name), each) for name, each in _hints(cls).items()}
+        case _:
+            return to_jsonable_python(value)
+
+
+def _encode_free(value: Any) -> Any:
+    """Return a value of an expression as data: what is no plain value of JSON is a map with one key, its kind."""
+    match value:
+        case Place():
+            return {"place": _encode(value, Place)}
+        case Mapping():
+            return {"map": {str(key): _encode_free(each) for key, each in value.items()}}
+        case list():
+            return [_encode_free(each) for each in value]
+        case _:
+            return to_jsonable_python(value)
+
+
+def _decode(data: Any, hint: Any) -> Any:
+    """Return the value of a field's type that `_encode` made data of; what pydantic can read is left to it."""
+    dimensions = [one.dimension for one in _metadata(hint) if isinstance(one, Dimensioned)]
+    whole, hint = hint, _plain_hint(hint)
+    if hint in (Any, object):
+        return _decode_free(data)
+    if data is None:
+        return _none(whole)
+    if dimensions:
+        return Quantity(float(data), dimensions[0])
+    if not isinstance(hint, type):
+        return _decode_several(data, hint)
+    if hint is Program:
+        return _program(data)
+    if hint is Dimension:
+        return dimension_of_data(data)
+    if hint is Instance:
+        return _instance(data)
+    if issubclass(hint, Secret):
+        return Secret(str(data))
+    if issubclass(hint, Enum):
+        return hint[data]
+    if issubclass(hint, BaseModel):
+        return _model(data, hint)
+    if is_dataclass(hint):
+        return hint(**_members(data, hint))
+    if hint in (str, bool, int, float) and not isinstance(data, (int, float) if hint is float else hint):
+        raise TypeError(f"{data!r} is no {hint.__name__}")
+    return data
+
+
+def _none(hint: Any) -> None:
+    while get_origin(hint) is Annotated:
+        hint = get_args(hint)[0]
+    if type(None) not in get_args(hint):
+        raise TypeError("a value is missing")
+
+
+def _decode_several(data: Any, hint: Any) -> Any:
+    origin = get_origin(hint)
+    if not isinstance(origin, type):  # a type without items, a choice
+        return data
+    if issubclass(origin, Mapping):
+        return {key: _decode(each, _item(hint)) for key, each in data.items()}
+    if origin in (frozenset, set, tuple, list):
+        if not isinstance(data, list):
+            raise TypeError("a list is missing")
+        return origin(_decode(each, _item(hint, index)) for index, each in enumerate(data))
+    return data
+
+
+def _decode_free(data: Any) -> Any:
+    match data:
+        case {"place": place}:
+            return _decode(place, Place)
+        case {"map": dict(entries)}:
+            return {key: _decode_free(each) for key, each in entries.items()}
+        case list():
+            return [_decode_free(each) for each in data]
+        case _:
+            return data
+
+
+def _program(data: Any) -> Program:
+    report = Report()
+    root = node_of_data(data)
+    program = read_program(root, report) if isinstance(root, LocatedMapping) else None
+    if program is None or report.has_errors:
+        raise PlanTextError("a mission of this plan cannot be read")
+    return program
+
+
+def _instance(data: Any) -> Instance:
+    if data["type"] not in component_names():
+        raise PlanTextError(f"no component type '{data['type']}' is installed")
+    config = _model(data["config"], component_type(data["type"]).config_type())
+    others = {name: each for name, each in data.items() if name != "config"}
+    return Instance(config=config, **_members(others, Instance))
+
+
+def _model(data: Any, cls: type[BaseModel]) -> Any:
+    try:
+        return cls.model_validate(_members(data, cls))
+    except ValidationError as error:
+        raise PlanTextError(f"this is no plan: {error.errors(include_url=False)[0]['msg']}") from error
+
+
+def _members(data: Any, cls: Any) -> dict[str, Any]:
+    hints = _hints(cls)
+    if unknown := data.keys() - hints.keys():
+        raise PlanTextError(f"this is no plan: unknown '{min(unknown)}'"[:300])
+    return {name: _decode(each, hints[name]) for name, each in data.items()}
+
+
+@cache
+def _hints(cls: Any) -> dict[str, Any]:
+    """Return the types of the fields of a dataclass or a configuration, with what they are annotated with."""
+    hints = get_type_hints(cls, include_extras=True)
+    names = cls.model_fields if issubclass(cls, BaseModel) else [field.name for field in fields(cls)]
+    return {name: hints[name] for name in names}
+
+
+def _metadata(hint: Any) -> tuple[Any, ...]:
+    """Return what a type is annotated with, also within `... | None`."""
+    if get_origin(hint) is Annotated:
+        return (*hint.__metadata__, *_metadata(get_args(hint)[0]))
+    alternative = _not_none(hint)
+    return () if alternative is None else _metadata(alternative)
+
+
+def _plain_hint(hint: Any) -> Any:
+    """Return a type without what it is annotated with and without `| None`."""
+    while True:
+        if get_origin(hint) is Annotated:
+            hint = get_args(hint)[0]
+        elif (alternative := _not_none(hint)) is not None:
+            hint = alternative
+        else:
+            return hint
+
+
+def _not_none(hint: Any) -> Any:
+    """Return the only alternative to None; None if there is another number of them, which is left to pydantic."""
+    if get_origin(hint) not in (Union, types.UnionType):
+        return None
+    others = [one for one in get_args(hint) if one is not type(None)]
+    return others[0] if len(others) == 1 else None
+
+
+def _item(hint: Any, index: int = 0) -> Any:
+    """Return the type of an item of a list or set, of a value of a map; of a tuple that one at `index`."""
+    arguments = get_args(hint)
+    if not arguments:
+        return Any
+    if get_origin(hint) is tuple and arguments[-1] is not Ellipsis:
+        return arguments[index]
+    return arguments[0] if get_origin(hint) in (tuple, list, set, frozenset) else arguments[-1]

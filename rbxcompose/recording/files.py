@@ -1,0 +1,103 @@
+"""Files of recordings. One that is being written has `.part` behind its name and is locked by its writer.
+
+So a part that nobody locks is one that was never finished; it is recovered and then gets its name.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from rbxcompose.recording.reader import NotARecordingError
+from rbxcompose.recording.recovery import recover
+
+ENDING, PART = ".mcap", ".part"
+_NEW = ".new"
+
+
+@dataclass(frozen=True, slots=True)
+class Recovered:
+    """What became of an unfinished file: its name now and the number of its messages, or why it stayed as it was."""
+
+    path: Path
+    messages: int = 0
+    problem: str = ""
+
+
+def part_of(path: Path) -> Path:
+    """Return the name that a file has until it is finished."""
+    return path.with_name(path.name + PART)
+
+
+def create(path: Path) -> IO[bytes]:
+    """Create the part of a new file and lock it.
+
+    Raises:
+        FileExistsError: if the file or its part is there already.
+        OSError: if it cannot be created.
+    """
+    if path.exists():
+        raise FileExistsError(f"{path} is there already")
+    file = part_of(path).open("xb")
+    fcntl.flock(file.fileno(), fcntl.LOCK_EX)
+    return file
+
+
+def complete(path: Path, file: IO[bytes]) -> None:
+    """Give a finished file its name, so that it is there as a whole or not at all, even if the power fails."""
+    os.fsync(file.fileno())
+    os.rename(part_of(path), path)
+    file.close()
+    _sync_folder(path.parent)
+
+
+def recover_all(folder: Path) -> Iterator[Recovered]:
+    """Recover what lies unfinished in a folder and is not being written by anybody."""
+    for part in sorted(folder.glob(f"*{ENDING}{PART}")):
+        path = part.with_name(part.name.removesuffix(PART))
+        try:
+            descriptor = os.open(part, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+            with open(descriptor, "rb") as file:
+                if _is_ours(file, part):
+                    yield Recovered(path, _recover(file, part, path))
+        except (OSError, NotARecordingError) as error:
+            yield Recovered(part, problem=str(error))
+
+
+def _is_ours(file: IO[bytes], part: Path) -> bool:
+    """Lock a part; it is not ours if its writer still has it, or has finished it meanwhile."""
+    try:
+        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return part.exists() and os.path.samestat(os.fstat(file.fileno()), os.stat(part))
+
+
+def _recover(file: IO[bytes], part: Path, path: Path) -> int:
+    if path.exists():
+        raise FileExistsError(f"{path} is there already")
+    new = part.with_name(part.name + _NEW)
+    new.unlink(missing_ok=True)  # of a recovery that was interrupted
+    with new.open("xb") as whole:
+        try:
+            messages = recover(file, whole)
+        except NotARecordingError:
+            new.unlink()
+            raise
+        os.fsync(whole.fileno())
+    os.rename(new, part)  # from here on the part is whole, and recovering it once more would change nothing
+    os.rename(part, path)
+    _sync_folder(path.parent)
+    return messages
+
+
+def _sync_folder(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,105 @@
+"""Reads recordings, also broken ones and those of strangers: all that is whole comes out, then why it ended."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import IO
+
+import lz4.frame
+import zstandard
+from mcap.exceptions import McapError
+from mcap.records import Channel, Chunk, McapRecord, Message, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
+
+from rbxcompose.plain import plain
+from rbxcompose.recording.message import Recorded
+from rbxcompose.recording.topics import HASH, Topic, qos_of_metadata
+
+LARGEST = 64 * 1024 * 1024  # bytes of a record, and of a chunk once it is unpacked
+_MAGIC = b"\x89MCAP0\r\n"
+
+# Besides their own, the readers of MCAP and of its compressions raise these for bytes that make no sense.
+_BROKEN = (McapError, ValueError, struct.error, OverflowError, RuntimeError, EOFError, zstandard.ZstdError)
+
+
+class NotARecordingError(ValueError):
+    """Raised when a file does not begin as MCAP does."""
+
+
+class RecordingReader:
+    """Reads one file once, from its beginning. `damage` tells afterwards why it ended early, if it did."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        """Look at the first bytes.
+
+        Raises:
+            NotARecordingError: if it is another kind of file.
+        """
+        head = file.read(len(_MAGIC))
+        if not _MAGIC.startswith(head):
+            raise NotARecordingError("it does not begin as MCAP does")
+        file.seek(0)
+        self.damage = ""
+        self._file = file
+        self._reader = StreamReader(file, emit_chunks=True, record_size_limit=LARGEST)
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, Topic] = {}
+
+    def messages(self) -> Iterator[Recorded]:
+        """Yield the messages in the order of the file, until it ends or makes no sense."""
+        try:
+            for record in self._reader.records:
+                if isinstance(record, Chunk):
+                    yield from self._messages_of(breakup_chunk(_unpacked(record), validate_crc=True))
+                else:
+                    yield from self._messages_of([record])
+        except _BROKEN as error:
+            # What is cut off gives many kinds of error: numbers that are short, chunks that do not unpack.
+            is_cut = not self._file.read(1)
+            self.damage = "it ends in the middle" if is_cut else f"a part makes no sense ({plain(str(error), 100)})"
+
+    def _messages_of(self, records: list[McapRecord]) -> Iterator[Recorded]:
+        for record in records:
+            if isinstance(record, Schema):
+                self._schemas[record.id] = record
+            elif isinstance(record, Channel):
+                self._channels[record.id] = self._topic(record)
+            elif isinstance(record, Message):
+                if record.channel_id not in self._channels:
+                    raise ValueError("a message of an unknown channel")
+                yield Recorded(
+                    self._channels[record.channel_id],
+                    record.log_time,
+                    record.publish_time,
+                    record.sequence,
+                    record.data,
+                )
+
+    def _topic(self, channel: Channel) -> Topic:
+        schema = self._schemas.get(channel.schema_id)
+        return Topic(
+            channel.topic,
+            schema.name if schema else "",
+            channel.metadata.get(HASH, ""),
+            qos_of_metadata(channel.metadata),
+            schema.data.decode() if schema else "",
+            channel.message_encoding,
+        )
+
+
+def _unpacked(chunk: Chunk) -> Chunk:
+    """Unpack a chunk, but never into more than `LARGEST` bytes, whatever it claims."""
+    if chunk.compression == "zstd":
+        size = zstandard.get_frame_parameters(chunk.data).content_size
+        if size != zstandard.CONTENTSIZE_UNKNOWN and size > LARGEST:
+            raise ValueError("a chunk is too large")
+        data = zstandard.ZstdDecompressor().decompress(chunk.data, min(chunk.uncompressed_size, LARGEST))
+    elif chunk.compression == "lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, LARGEST)
+    elif not chunk.compression:
+        data = chunk.data
+    else:
+        raise ValueError("a chunk is packed in a way that is not known")
+    return replace(chunk, compression="", data=data)

@@ -1,0 +1,84 @@
+"""A recording that goes on: closed chunks twice a second, and a new file when one is full. Time [s] is an argument."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from rbxcompose.recording.files import complete, create, part_of
+from rbxcompose.recording.message import Recorded
+from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.writer import RecordingWriter
+
+FLUSH, SYNC = 0.5, 5.0  # [s] what a killed recorder, and a computer without power, may lose
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """When to begin a new file: after so many bytes or seconds; 0 means never."""
+
+    size: int = 0
+    time: float = 0.0
+
+    def __bool__(self) -> bool:
+        return bool(self.size or self.time)
+
+
+class Recorder:
+    """Writes messages to `path`, or to `NAME_0.mcap`, `NAME_1.mcap`... if it is split.
+
+    All of it raises `OSError` if a file cannot be created or written.
+    """
+
+    def __init__(self, path: Path, now: float, split: Split | None = None) -> None:
+        self.counts: Counter[Topic] = Counter()
+        self.paths: list[Path] = []
+        self._wanted, self._split = path, split or Split()
+        self._opened = self._flushed = self._synced = now
+        self._open(now)
+
+    def add(self, message: Recorded) -> None:
+        """Record a message."""
+        self._writer.add(message)
+        self.counts[message.topic] += 1
+
+    def keep(self, now: float) -> None:
+        """Do what is due: to be called several times a second."""
+        if now - self._flushed >= FLUSH:
+            self._writer.flush()
+            self._flushed = now
+        if now - self._synced >= SYNC:
+            os.fsync(self._file.fileno())
+            self._synced = now
+        is_long = 0 < self._split.time <= now - self._opened
+        if self._writer.counts and (is_long or 0 < self._split.size <= self._writer.size):
+            self.finish()
+            self._open(now)
+
+    def finish(self) -> None:
+        """End the file, which then has its index and its name."""
+        self._writer.finish()
+        complete(self.paths[-1], self._file)
+
+    def abandon(self) -> None:
+        """Leave the file as it is; what was written is recovered later."""
+        with contextlib.suppress(OSError):  # closing tries to write the rest once more, which is what has failed
+            self._file.close()
+
+    def discard(self) -> None:
+        """Remove the file, in which nothing is yet."""
+        self._file.close()
+        part_of(self.paths[-1]).unlink()
+
+    def _open(self, now: float) -> None:
+        path = self._wanted
+        if self._split:
+            path = path.with_name(f"{path.stem}_{len(self.paths)}{path.suffix}")
+        self._file: IO[bytes] = create(path)
+        self.paths.append(path)
+        self._writer = RecordingWriter(self._file)
+        self._opened = self._flushed = self._synced = now

@@ -1,0 +1,21 @@
+"""Recovers recordings that were not finished: all that is whole goes into a new file, which then has its index."""
+
+from __future__ import annotations
+
+from typing import IO
+
+from rbxcompose.recording.reader import RecordingReader
+from rbxcompose.recording.writer import RecordingWriter
+
+
+def recover(broken: IO[bytes], whole: IO[bytes]) -> int:
+    """Copy every message of `broken` up to where it ends or makes no sense; return how many.
+
+    Raises:
+        NotARecordingError: if `broken` is another kind of file.
+    """
+    reader, writer = RecordingReader(broken), RecordingWriter(whole)
+    for message in reader.messages():
+        writer.add(message)
+    writer.finish()
+    return sum(writer.counts.values())

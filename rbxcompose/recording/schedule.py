@@ -1,0 +1,35 @@
+"""When each message of a recording is due in a replay. Time is counted from the start of the replay [s]."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from rbxcompose.clock import NANOSECONDS
+from rbxcompose.qos import Qos
+from rbxcompose.recording.message import Recorded
+from rbxcompose.recording.topics import Topic
+
+
+def playlist(
+    messages: Iterable[Recorded], *, rate: float = 1.0, start: float = 0.0
+) -> Iterator[tuple[float, Recorded]]:
+    """Yield each message with the time at which it is due, in the order of the recording.
+
+    `start` [s of the recording] leaves out what was before, but for the last message of each latched topic, which is
+    due at once. A message whose time lies before that of the one before it is due together with that one.
+    """
+    first: int | None = None
+    latched: dict[Topic, Recorded] = {}
+    due = 0.0
+    for message in messages:
+        first = message.log_time if first is None else first
+        since = (message.log_time - first) / NANOSECONDS - start
+        if since < 0 and due == 0:
+            if message.topic.qos is Qos.LATCHED:
+                latched[message.topic] = message
+            continue
+        for one in latched.values():
+            yield 0.0, one
+        latched.clear()
+        due = max(due, since / rate)
+        yield due, message

@@ -1,0 +1,101 @@
+"""What a recording knows of a topic, where that comes from on the bus, and which topics are chosen."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from rbxcompose.bus.classes import ros_qos
+from rbxcompose.bus.names import name_problem
+from rbxcompose.bus.tokens import EndpointToken, EntityKind
+from rbxcompose.qos import Qos
+
+CDR = "cdr"
+HASH, CLASS, ROS_QOS = "topic_type_hash", "rbxcompose.class", "offered_qos_profiles"  # keys of a channel's metadata
+
+_DDS_TYPE = re.compile(r"(\w+)::(msg|srv|action)::dds_::(\w+)_", re.ASCII)
+_TYPE = re.compile(r"\w+/(msg|srv|action)/\w+", re.ASCII)
+_HASH = re.compile(r"\w{1,100}", re.ASCII)
+_QOS = re.compile(r"(?P<reliability>\d?):(?P<durability>\d?):(?P<history>\d?),(?P<depth>\d{0,9}):.*")
+_FOREVER = "{sec: 9223372036, nsec: 854775807}"  # how ROS writes that there is no limit
+_IS_LATCHED = re.compile(r"^[\s-]*durability: *(1|transient_local)\s*$", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic with one type; another type under the same name is another topic."""
+
+    name: str  # with its leading slash
+    type: str  # `geometry_msgs/msg/Twist`
+    hash: str  # of the type, as the keys of the bus have it
+    qos: Qos = Qos.STATE
+    definition: str = ""  # text of the type and all that it is made of; empty if we have none
+    encoding: str = CDR
+
+    def metadata(self) -> dict[str, str]:
+        """Return what a channel tells beside name and type: hash and quality of service, for ROS and for us."""
+        qos = ros_qos(self.qos)
+        profile = (
+            f"- history: {2 if qos.keeps_all else 1}\n  depth: {qos.depth}\n"
+            f"  reliability: {1 if qos.is_reliable else 2}\n  durability: {1 if qos.is_transient_local else 2}\n"
+            f"  deadline: {_FOREVER}\n  lifespan: {_FOREVER}\n"
+            f"  liveliness: 1\n  liveliness_lease_duration: {_FOREVER}\n  avoid_ros_namespace_conventions: false\n"
+        )
+        return {HASH: self.hash, CLASS: self.qos.value, ROS_QOS: profile}
+
+
+def qos_of_metadata(metadata: Mapping[str, str]) -> Qos:
+    """Return the class of a recorded topic; recordings of others tell at most whether it is latched."""
+    written = metadata.get(CLASS, "")
+    if written in set(Qos):
+        return Qos(written)
+    return Qos.LATCHED if _IS_LATCHED.search(metadata.get(ROS_QOS, "")) else Qos.STATE
+
+
+def is_replayable(topic: Topic) -> bool:
+    """Tell whether a recorded topic can be published: its names must be fit for the bus, which has only CDR."""
+    is_named = _TYPE.fullmatch(topic.type) and _HASH.fullmatch(topic.hash) and not name_problem(topic.name)
+    return bool(is_named) and topic.encoding == CDR
+
+
+def topic_of(token: EndpointToken) -> Topic | None:
+    """Return the topic of a publisher, without a definition; None for other endpoints and for names that are none."""
+    found = _DDS_TYPE.fullmatch(token.dds_type)
+    if token.kind is not EntityKind.PUBLISHER or not found or name_problem(token.name):
+        return None
+    if not _HASH.fullmatch(token.type_hash):  # it becomes part of a key
+        return None
+    return Topic(token.name, "/".join(found.groups()), token.type_hash, qos_of_token(token.qos))
+
+
+def qos_of_token(text: str) -> Qos:
+    """Return the class that comes nearest to the quality of service of a token."""
+    found = _QOS.fullmatch(text)
+    if not found:
+        return Qos.STATE
+    if found["durability"] == "1":
+        return Qos.LATCHED
+    if found["reliability"] == "2":
+        return Qos.BULK
+    if found["history"] == "2":
+        return Qos.EVENT
+    return Qos.COMMAND if found["depth"] == "1" else Qos.STATE
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Which topics are wanted: by name (`odom`, `/camera/*`) and by class; nothing given means all."""
+
+    patterns: Sequence[str] = ()
+    classes: Sequence[Qos] = ()
+
+    def takes(self, topic: Topic) -> bool:
+        """Tell whether a topic is wanted."""
+        return self.names(topic) and (not self.classes or topic.qos in self.classes)
+
+    def names(self, topic: Topic) -> bool:
+        """Tell whether a topic has one of the names that are wanted."""
+        name = topic.name.lstrip("/")
+        return not self.patterns or any(fnmatchcase(name, pattern.lstrip("/")) for pattern in self.patterns)

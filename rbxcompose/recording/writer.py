@@ -1,0 +1,64 @@
+"""Writes recordings: MCAP with CDR payloads, in chunks that are small and closed often, so that crashes lose little."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import IO
+
+from mcap.writer import CompressionType, Writer
+
+import rbxcompose
+from rbxcompose.recording.message import Recorded
+from rbxcompose.recording.topics import Topic
+
+PROFILE = "ros2"
+SCHEMA = "ros2msg"
+CHUNK = 256 * 1024  # bytes
+_MASK = 0xFFFF_FFFF  # a sequence number of MCAP has 32 bits
+
+
+class RecordingWriter:
+    """Writes one file. Errors of the file are passed on as `OSError`."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self.counts: Counter[Topic] = Counter()
+        self._file = file
+        self._channels: dict[Topic, int] = {}
+        self._schemas: dict[tuple[str, str], int] = {}
+        self._writer = Writer(file, chunk_size=CHUNK, compression=CompressionType.ZSTD)
+        self._writer.start(PROFILE, f"rbxcompose {rbxcompose.__version__}")
+
+    @property
+    def size(self) -> int:
+        """Return how many bytes were written; those of the open chunk come on top."""
+        return self._file.tell()
+
+    def add(self, message: Recorded) -> None:
+        """Add a message to the open chunk."""
+        topic = message.topic
+        if topic not in self._channels:
+            self._channels[topic] = self._declare(topic)
+        self._writer.add_message(
+            self._channels[topic],
+            message.log_time,
+            message.payload,
+            message.publish_time,
+            message.sequence & _MASK,
+        )
+        self.counts[topic] += 1
+
+    def flush(self) -> None:
+        """Close the open chunk and give everything to the operating system."""
+        self._writer.flush()  # type: ignore[no-untyped-call]
+
+    def finish(self) -> None:
+        """Write the index, after which nothing can be added."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._file.flush()
+
+    def _declare(self, topic: Topic) -> int:
+        key = (topic.type, topic.definition)
+        if key not in self._schemas:
+            encoding = SCHEMA if topic.definition else ""
+            self._schemas[key] = self._writer.register_schema(topic.type, encoding, topic.definition.encode())
+        return self._writer.register_channel(topic.name, topic.encoding, self._schemas[key], topic.metadata())

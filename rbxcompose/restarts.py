@@ -1,0 +1,28 @@
+"""When what has failed is tried again: the option `restart` of a component."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from rbxcompose.config import Config, Time
+
+When = Literal["on_failure", "always", "never"]
+
+
+class Restart(Config):
+    """When a component that has failed is tried again."""
+
+    when: When = "on_failure"
+    """`on_failure` ends the robot after `max` failures, `always` never gives up, `never` leaves it failed."""
+    max: int = Field(5, ge=1, le=100)
+    """The failure, within the time `within`, after which there is no further try."""
+    within: Time = Field(60.0, gt=0)
+    """The time in which failures are counted."""
+    backoff: Time = Field(0.1, ge=0)
+    """The pause before the first try; each failure in a row doubles it."""
+
+
+DEFAULT = Restart()
+"""What holds where a manifest says nothing."""

@@ -1,0 +1,28 @@
+"""What was probably meant is found among few names, and among thousands within no time."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rbxcompose.findings import MOST_COMPARED, nearest, suggest
+
+MANY = [f"battery_{number}" for number in range(50 * MOST_COMPARED)]
+
+
+@pytest.mark.parametrize("slip", ["chargr", "chharger", "chasger", "hcarger", "charger"])
+def test_one_slip_is_found_among_thousands_as_among_few(slip: str) -> None:
+    assert nearest(slip, ["charger", "base", "go_to"]) == nearest(slip, ["charger", *MANY]) == ["charger"]
+
+
+def test_among_thousands_what_is_far_away_is_listed_only() -> None:
+    listed = "battery_0, battery_1, battery_10, battery_100, battery_1000, battery_1001"
+    assert suggest("carger_two", ["charger", *MANY], "components") == f"components: {listed} and 4995 more"
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.text(max_size=100), st.lists(st.text(max_size=20), max_size=5))
+def test_a_name_that_is_there_is_nearest_to_itself(name: str, others: list[str]) -> None:
+    if name:
+        assert nearest(name, [name, *others]) == nearest(name, [name, *others, *MANY[:200]]) == [name]

@@ -1,0 +1,73 @@
+"""Definitions of types on the command line, and as a package for ROS 2."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from rbxcompose.cli.main import main
+from rbxcompose.msgs.definitions import parse
+from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.packages import all_names, package_files, parts_of, whole_text
+from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
+
+
+def test_a_type_is_shown_with_its_hash_and_its_parts(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["msg", "show", "nav_msgs/Odometry"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert shown[:2] == ["# nav_msgs/msg/Odometry", f"# {Odometry.HASH}"]
+    assert "geometry_msgs/TwistWithCovariance twist" in shown
+    assert "MSG: geometry_msgs/Vector3" in shown
+
+
+def test_services_and_actions_are_shown_too(capsys: pytest.CaptureFixture[str]) -> None:
+    for wanted, type_hash in (
+        ("rbxcompose_msgs/srv/SetBatteryLevel", SetBatteryLevel.HASH),
+        ("rbxcompose_msgs/Recharge", Recharge.HASH),
+    ):
+        assert main(["msg", "show", wanted, "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["hash"] == type_hash
+
+
+def test_a_type_that_is_misspelt_is_told_with_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["msg", "show", "nav_msgs/Odometri"]) == 1
+    assert "did you mean 'nav_msgs/Odometry'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", all_names())
+def test_each_part_of_a_type_is_shown_once_in_a_form_that_can_be_read(name: str) -> None:
+    _, *rest = whole_text(name).split("=" * 80 + "\n")
+    heads = [one.partition("\n")[0] for one in rest]
+    assert heads == [f"MSG: {part.replace('/msg/', '/')}" for part in parts_of(name)]
+    assert len(set(heads)) == len(heads)
+    for part, text in zip(parts_of(name), rest, strict=True):
+        parse(part, text.partition("\n")[2])
+
+
+def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: Path) -> None:
+    assert main(["msg", "export", str(tmp_path)]) == 0
+    folder = tmp_path / "rbxcompose_msgs"
+    written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert written == {"package.xml", "CMakeLists.txt", "action/Recharge.action", "srv/SetBatteryLevel.srv"}
+    cmake = (folder / "CMakeLists.txt").read_text()
+    assert '"action/Recharge.action"' in cmake
+    assert '"srv/SetBatteryLevel.srv"' in cmake
+    root = ElementTree.fromstring((folder / "package.xml").read_text())
+    assert root.findtext("name") == "rbxcompose_msgs"
+    assert [one.text for one in root.iter("depend")] == ["action_msgs"]
+
+
+def test_an_export_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["msg", "export", str(tmp_path)])
+    assert main(["msg", "export", str(tmp_path)]) == 1
+    assert "is there already" in capsys.readouterr().err
+
+
+def test_a_package_names_the_packages_that_its_types_are_made_of() -> None:
+    files = package_files("nav_msgs", "1.0", "Apache-2.0")
+    assert "DEPENDENCIES builtin_interfaces geometry_msgs std_msgs\n" in files["CMakeLists.txt"]
+    assert "find_package(geometry_msgs REQUIRED)\n" in files["CMakeLists.txt"]
+    assert "<depend>geometry_msgs</depend>" in files["package.xml"]

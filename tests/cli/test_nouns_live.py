@@ -1,0 +1,243 @@
+"""Topics, services, actions, frames and the keyboard, on a robot in real processes."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import termios
+from argparse import Namespace
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rbxcompose.bus.graph import find
+from rbxcompose.cli.common.bus_place import BusPlace, find_place
+from rbxcompose.cli.common.guest import Guest, Heard
+from rbxcompose.msgs.cdr import decode
+from rbxcompose.msgs.geometry_msgs import Twist
+
+ROOT = Path(__file__).parents[2]
+PATIENCE = 20.0  # [s]
+FAR = "{pose: {header: {frame_id: map}, pose: {position: {x: 50}, orientation: {w: 1}}}}"
+NEAR = "{pose: {header: {frame_id: map}, pose: {orientation: {w: 1}}}}"
+
+
+class Robot:
+    """A turtlebot without a mission, so that it does only what it is told."""
+
+    def __init__(self, base: Path) -> None:
+        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(base), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
+        self.file = base / "robot.yaml"
+        text = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
+        self.file.write_text(text.partition("\nmissions:")[0] + "\n", encoding="utf-8")
+
+    def command(self, *words: str) -> list[str]:
+        return [sys.executable, "-m", "rbxcompose", *words]
+
+    def do(self, *words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            self.command(*words), env=self.environment, capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT
+        )
+
+    def told(self, *words: str) -> Any:
+        """Return what a command answers in JSON."""
+        done = self.do(*words, "--json")
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    def place(self) -> BusPlace:
+        endpoint = self.told("ps")["router"]["endpoint"]
+        return find_place(Namespace(router=endpoint, domain=None))
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[Robot]:
+    base = Path(tempfile.mkdtemp(prefix="rbx"))
+    made = Robot(base)
+    up = made.do("up", "-d", str(made.file), "--set", "bus.port=7890")
+    assert up.returncode == 0, up.stderr
+    yield made
+    assert made.do("down").returncode == 0
+    shutil.rmtree(base)
+
+
+def test_topics_are_listed_with_their_types(robot: Robot) -> None:
+    listed = {one["name"]: one for one in robot.told("topic", "ls")}
+    assert listed["/odom"]["types"] == ["nav_msgs/msg/Odometry"]
+    assert listed["/cmd_vel/teleop"] == {
+        "name": "/cmd_vel/teleop",
+        "types": ["geometry_msgs/msg/Twist"],
+        "clash": "",
+        "publishers": 0,
+        "subscriptions": 1,
+    }
+    assert not any("_action" in name for name in listed)
+    assert "/go_to/_action/feedback" in robot.do("topic", "ls", "--all").stdout
+
+
+def test_a_topic_is_shown_with_its_ends(robot: Robot) -> None:
+    shown = robot.told("topic", "show", "odom")
+    assert [end["node"] for end in shown["publishers"]] == ["/base"]
+    assert "publisher  /base  nav_msgs/msg/Odometry  reliable, newest 10" in robot.do("topic", "show", "odom").stdout
+
+
+def test_a_misspelt_topic_is_told_what_was_probably_meant(robot: Robot) -> None:
+    done = robot.do("topic", "echo", "/odo")
+    assert (done.returncode, "RBX9022" in done.stderr, "did you mean '/odom'?" in done.stderr) == (1, True, True)
+
+
+def test_messages_are_printed(robot: Robot) -> None:
+    lines = robot.do("topic", "echo", "/odom", "-n", "2", "--json").stdout.splitlines()
+    assert [json.loads(line)["header"]["frame_id"] for line in lines] == ["odom", "odom"]
+    assert "child_frame_id: base_footprint" in robot.do("topic", "echo", "/odom", "--once").stdout
+
+
+def test_what_was_latched_is_printed_to_who_comes_later(robot: Robot) -> None:
+    assert robot.told("topic", "echo", "/tf_static", "--once")["transforms"][0]["child_frame_id"] == "odom"
+
+
+def test_the_rate_of_a_topic_is_measured(robot: Robot) -> None:
+    pace = robot.told("topic", "hz", "/odom", "--for", "0.6s")
+    assert 30.0 < pace["rate"] < 70.0
+    assert pace["shortest"] <= 1 / pace["rate"] <= pace["longest"]
+
+
+def test_what_is_published_arrives(robot: Robot) -> None:
+    with Guest(robot.place()) as guest:
+        topic = find(guest.graph().topics, "/cmd_vel/teleop")
+        assert topic is not None
+        heard: list[Heard] = []
+        guest.listen(topic, heard.append)
+        words = ("/cmd_vel/teleop", "geometry_msgs/Twist", "{angular: {z: 0.25}}", "--rate", "50Hz", "-n", "3")
+        assert robot.told("topic", "pub", *words)["sent"] == 3
+        assert guest.run(lambda: len(heard) == 3, PATIENCE)
+    assert {decode(Twist, one.arrival.payload).angular.z for one in heard} == {0.25}
+
+
+def test_who_publishes_to_nobody_is_told_so(robot: Robot) -> None:
+    done = robot.do("topic", "pub", "/nobody", "std_msgs/Empty", "--timeout", "0.2s")
+    assert "RBX9025]: nobody subscribes to '/nobody'" in done.stderr
+    done = robot.do("topic", "pub", "/odom", "std_msgs/Empty", "--timeout", "0.2s")
+    assert done.returncode == 1
+    done = robot.do("topic", "pub", "/cmd_vel/teleop", "std_msgs/Empty", "--timeout", "0.2s")
+    assert "is not of type std_msgs/msg/Empty, but geometry_msgs/msg/Twist" in done.stderr
+
+
+def test_a_service_is_called(robot: Robot) -> None:
+    listed = {one["name"]: one["types"] for one in robot.told("service", "ls")}
+    assert listed["/set_battery_level"] == ["rbxcompose_msgs/srv/SetBatteryLevel"]
+    assert robot.told("service", "call", "set_battery_level", "{value: 55}") == {}
+    assert 50.0 < robot.told("topic", "echo", "/battery_level", "--once")["data"] <= 55.0
+    done = robot.do("service", "call", "set_battery_level", "{value: many}")
+    assert (done.returncode, "RBX9024" in done.stderr) == (1, True)
+
+
+def test_a_goal_is_sent_and_its_result_printed(robot: Robot) -> None:
+    assert [one["name"] for one in robot.told("action", "ls")] == ["/go_to", "/recharge"]
+    done = robot.do("action", "send", "go_to", NEAR, "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout.splitlines()[-1])["result"]["error_code"] == 0
+
+
+def test_an_interrupt_cancels_the_goal(robot: Robot) -> None:
+    words = robot.command("action", "send", "/go_to", FAR, "--json")
+    with subprocess.Popen(words, env=robot.environment, stdout=subprocess.PIPE, text=True, cwd=ROOT) as sending:
+        assert sending.stdout is not None
+        assert "feedback" in json.loads(sending.stdout.readline())
+        sending.send_signal(signal.SIGINT)
+        rest = sending.stdout.read()
+        assert sending.wait(PATIENCE) == 130
+    assert "result" in json.loads(rest.splitlines()[-1])
+
+
+def test_the_tree_of_frames_is_shown(robot: Robot) -> None:
+    links = {one["frame"]: one for one in robot.told("tf", "tree")}
+    assert (links["odom"]["parent"], links["odom"]["is_static"]) == ("map", True)
+    assert (links["base_footprint"]["parent"], links["base_footprint"]["is_static"]) == ("odom", False)
+    assert robot.do("tf", "tree").stdout.startswith("map\n  odom  (static: x 0 m")
+    assert len(robot.told("tf", "echo", "map", "base_footprint", "--once")["translation"]) == 3
+    assert (
+        "did you mean 'base_footprint'?" in robot.do("tf", "echo", "map", "base_footprin", "--timeout", "0.5s").stderr
+    )
+
+
+def test_without_a_router_that_is_a_finding(robot: Robot) -> None:
+    assert "RBX9020" in robot.do("topic", "ls", "--router", "tcp/127.0.0.1:1").stderr
+    assert "RBX9020" in robot.do("service", "ls", "--router", "nonsense").stderr
+    assert robot.told("topic", "ls", "--domain", "7") == []
+
+
+class Keyboard:
+    """`drive` at a terminal of its own."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.ours, self.theirs = pty.openpty()
+        self.before = termios.tcgetattr(self.theirs)
+        self.process = subprocess.Popen(
+            robot.command("drive", "--speed", "0.1 m/s"),
+            env=robot.environment,
+            cwd=ROOT,
+            stdin=self.theirs,
+            stdout=self.theirs,
+            stderr=self.theirs,
+            start_new_session=True,
+        )
+        shown = ""
+        while "q: quit" not in shown:
+            assert select.select([self.ours], [], [], PATIENCE)[0], shown
+            shown += os.read(self.ours, 4096).decode()
+
+    def press(self, keys: str) -> None:
+        os.write(self.ours, keys.encode())
+
+    def end(self) -> int:
+        """Wait for the end; the terminal must be what it was."""
+        code = self.process.wait(PATIENCE)
+        assert termios.tcgetattr(self.theirs) == self.before
+        os.close(self.ours)
+        os.close(self.theirs)
+        return code
+
+
+def test_the_robot_moves_only_while_a_key_is_pressed(robot: Robot) -> None:
+    with Guest(robot.place()) as guest:
+        topic = find(guest.graph().topics, "/cmd_vel/teleop")
+        assert topic is not None
+        speeds: list[float] = []
+        guest.listen(topic, lambda heard: speeds.append(decode(Twist, heard.arrival.payload).linear.x))
+        keyboard = Keyboard(robot)
+        keyboard.press("\x1b[A")
+        assert guest.run(lambda: 0.0 in speeds, PATIENCE)
+        assert not guest.run(lambda: speeds[-1] != 0.0 or speeds.count(0.0) > 1, 0.5)
+        assert set(speeds[:-1]) == {0.1}
+        keyboard.press("sq")
+        assert keyboard.end() == 0
+        assert guest.run(lambda: speeds[-2:] == [-0.1, 0.0], PATIENCE)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_the_terminal_is_what_it_was_after_every_end(robot: Robot, number: signal.Signals) -> None:
+    keyboard = Keyboard(robot)
+    keyboard.process.send_signal(number)
+    assert keyboard.end() == 0
+
+
+def test_driving_needs_a_terminal(robot: Robot) -> None:
+    done = subprocess.run(
+        robot.command("drive"),
+        env=robot.environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+    )
+    assert (done.returncode, "RBX9027" in done.stderr) == (1, True)

@@ -1,0 +1,265 @@
+"""`record` and `replay`: on a bus, on a robot that is up, killed in the middle, and with files that are no good."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from mcap.reader import SeekingReader, make_reader
+
+from rbxcompose.bus.zenoh_session import open_router
+from rbxcompose.cli import main as command
+from rbxcompose.recording.message import Recorded
+from rbxcompose.recording.reader import RecordingReader
+from rbxcompose.recording.topics import Topic
+from rbxcompose.runtime.processes import titled
+from tests.recording.samples import some, written
+
+ROOT = Path(__file__).parents[2]
+PATIENCE = 20.0  # [s]
+NAME = "recorded_bot"
+MESSAGES = some(10)
+
+
+class Shell:
+    """Starts commands in a folder of their own."""
+
+    def __init__(self, folder: Path, runtime: Path) -> None:
+        self.folder = folder
+        self._environment = {**os.environ, "XDG_RUNTIME_DIR": str(runtime), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
+
+    def start(self, *words: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "rbxcompose", *words],
+            env=self._environment,
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    def do(self, *words: str) -> str:
+        process = self.start(*words)
+        output, _ = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0, output
+        return output
+
+    def messages(self, name: str) -> tuple[list[Recorded], str]:
+        reader = RecordingReader(io.BytesIO((self.folder / name).read_bytes()))
+        return list(reader.messages()), reader.damage
+
+    def until(self, condition: Callable[[], object]) -> None:
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < deadline, "it did not happen in time"
+            os.sched_yield()
+
+
+@pytest.fixture
+def shell(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Shell:
+    return Shell(tmp_path, tmp_path_factory.mktemp("runtime"))
+
+
+@pytest.fixture
+def router() -> Iterator[str]:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    session = open_router(port)
+    yield f"tcp/127.0.0.1:{port}"
+    session.close()  # type: ignore[no-untyped-call]
+
+
+@pytest.fixture
+def robot(shell: Shell) -> Iterator[Shell]:
+    text = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
+    (shell.folder / "robots/turtlebot").mkdir(parents=True)
+    (shell.folder / "missions").mkdir()
+    (shell.folder / "robots/turtlebot/robot.yaml").write_text(text.replace("name: turtlebot", f"name: {NAME}"))
+    (shell.folder / "missions/patrol.yaml").write_bytes((ROOT / "missions/patrol.yaml").read_bytes())
+    shell.do("up", "-d", "robots/turtlebot")
+    try:
+        yield shell
+    finally:
+        shell.do("down")
+        assert [one for one in titled(f"rbxcompose {NAME}: ") if one.is_running] == []
+
+
+def payloads(messages: list[Recorded], topic: Topic) -> list[bytes]:
+    return [one.payload for one in messages if one.topic == topic]
+
+
+def test_what_is_replayed_on_a_bus_is_what_was_recorded(shell: Shell, router: str) -> None:
+    (shell.folder / "a.mcap").write_bytes(written(MESSAGES))
+    bus = ["--router", router, "--domain", "7"]
+    recorder = shell.start("record", *bus, "-o", "b.mcap")
+    assert recorder.stdout
+    assert recorder.stdout.readline().startswith("recording to b.mcap")
+    assert "replayed 21 messages" in shell.do("replay", "a.mcap", *bus, "--rate", "2x", "--topics", "*")
+    recorder.send_signal(signal.SIGINT)
+    output, _ = recorder.communicate(timeout=PATIENCE)
+    assert recorder.returncode == 0
+    assert "recorded 21 messages to b.mcap" in output
+    found, damage = shell.messages("b.mcap")
+    assert damage == ""
+    for topic in {one.topic for one in MESSAGES}:  # each has a priority of its own, so that one may overtake another
+        assert payloads(found, topic) == payloads(MESSAGES, topic)
+    lasted = (found[-1].log_time - found[0].log_time) / 1e9
+    assert lasted > 0.4  # of 0.91 s, twice as fast
+    assert all(one.publish_time <= one.log_time for one in found)
+
+
+def test_a_loop_goes_on_until_it_is_interrupted_and_commands_are_left_out(shell: Shell, router: str) -> None:
+    (shell.folder / "a.mcap").write_bytes(written(MESSAGES))
+    recorder = shell.start("record", "--router", router, "-o", "b.mcap")
+    player = shell.start("replay", "a.mcap", "--router", router, "--loop", "--rate", "20x")
+    part = shell.folder / "b.mcap.part"
+    shell.until(lambda: part.exists() and part.stat().st_size > 3_000)
+    player.send_signal(signal.SIGINT)
+    output, _ = player.communicate(timeout=PATIENCE)
+    assert player.returncode == 0
+    assert "warning[RBX9206]: topics that make a robot move: /cmd_vel" in output
+    recorder.send_signal(signal.SIGTERM)
+    recorder.communicate(timeout=PATIENCE)
+    found, _ = shell.messages("b.mcap")
+    assert len([one for one in found if one.topic.name == "/odom"]) > 10
+    assert {one.topic.name for one in found} == {"/odom", "/map"}
+
+
+def test_a_full_disk_ends_the_recording_with_a_finding_and_what_was_written_is_recovered(
+    shell: Shell, router: str
+) -> None:
+    (shell.folder / "a.mcap").write_bytes(written(MESSAGES))
+    recorder = shell.start("record", "--router", router, "-o", "b.mcap")
+    assert recorder.stdout
+    assert recorder.stdout.readline().startswith("recording to b.mcap")
+    resource.prlimit(recorder.pid, resource.RLIMIT_FSIZE, (6_000, 6_000))
+    player = shell.start("replay", "a.mcap", "--router", router, "--loop", "--rate", "20x")
+    output, _ = recorder.communicate(timeout=PATIENCE)
+    player.send_signal(signal.SIGINT)
+    player.communicate(timeout=PATIENCE)
+    assert recorder.returncode == 1
+    assert "error[RBX9203]: 'b.mcap' cannot be written: File too large" in output
+    assert "b.mcap' was unfinished" in shell.do("replay", "b.mcap", "--info")
+    found, damage = shell.messages("b.mcap")
+    assert damage == ""
+    assert found
+
+
+@pytest.mark.timeout(60)
+def test_two_seconds_of_a_robot_and_a_recorder_that_is_killed(robot: Shell) -> None:
+    output = robot.do("record", "--for", "2s", "-o", "whole.mcap", "--topics", "odom", "/cmd_vel*", "tf_static")
+    assert "recorded" in output
+    whole, damage = robot.messages("whole.mcap")
+    assert damage == ""
+    assert {"/odom", "/tf_static"} <= {one.topic.name for one in whole}
+    assert len([one for one in whole if one.topic.name == "/odom"]) > 60  # of 100
+
+    recorder = robot.start("record", "-o", "cut.mcap")
+    part = robot.folder / "cut.mcap.part"
+    robot.until(lambda: part.exists() and part.stat().st_size > 10_000)
+    assert "no recording" not in robot.do("replay", "whole.mcap", "--info")  # leaves alone what is being written
+    assert part.exists()
+    recorder.kill()
+    recorder.communicate(timeout=PATIENCE)
+    left, _ = robot.messages("cut.mcap.part")
+    output = robot.do("replay", "cut.mcap.part", "--info", "--json")
+    assert f"{len(left):,} messages are recovered" in output
+    info = json.loads(output[output.index("{") :])
+    assert info["messages"] == len(left) > 10
+    assert robot.messages("cut.mcap") == (left, "")
+    reader = make_reader(io.BytesIO((robot.folder / "cut.mcap").read_bytes()))
+    assert isinstance(reader, SeekingReader)
+    assert len(list(reader.iter_messages())) == len(left)
+    assert not part.exists()
+
+
+def refused(words: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    assert command.main(words) == 1
+    return capsys.readouterr().err
+
+
+def test_info_shows_topics_types_counts_and_duration(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(written(MESSAGES))
+    assert command.main(["replay", str(path), "--info"]) == 0
+    first, _, *rows = capsys.readouterr().out.splitlines()
+    assert first.endswith("a.mcap: 21 messages, 0.910 s")
+    assert [row.split() for row in rows] == [
+        ["/cmd_vel", "geometry_msgs/msg/Twist", "command", "10"],
+        ["/map", "std_msgs/msg/String", "latched", "1"],
+        ["/odom", "nav_msgs/msg/Odometry", "state", "10"],
+    ]
+
+
+@pytest.mark.parametrize("cut", range(0, len(written(MESSAGES)), 97 * 3))
+def test_a_file_that_was_cut_is_a_warning_and_shows_what_is_left(
+    cut: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(written(MESSAGES)[:cut])
+    assert command.main(["replay", str(path), "--info", "--json"]) == 0
+    shown = capsys.readouterr()
+    assert "warning[RBX9202]" in shown.err
+    assert json.loads(shown.out)["messages"] <= 21
+    assert path.read_bytes() == written(MESSAGES)[:cut]
+
+
+def test_what_cannot_be_read_is_a_finding(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "a.txt").write_text("a text")
+    assert "error[RBX9201]" in refused(["replay", str(tmp_path / "gone.mcap")], capsys)
+    assert "no recording" in refused(["replay", str(tmp_path / "a.txt")], capsys)
+    assert "no recording" in refused(["replay", str(tmp_path)], capsys)
+
+
+def test_nothing_to_replay_is_a_finding(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(written(MESSAGES))
+    assert "error[RBX9205]" in refused(["replay", str(path), "--topics", "nothing"], capsys)
+    assert "error[RBX9205]" in refused(["replay", str(path), "--from", "10s"], capsys)
+
+
+def test_a_file_that_is_there_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(b"mine")
+    assert "error[RBX9203]" in refused(["record", "--router", "tcp/127.0.0.1:1", "-o", str(path)], capsys)
+    assert path.read_bytes() == b"mine"
+    assert "error[RBX9203]" in refused(
+        ["record", "--router", "tcp/127.0.0.1:1", "-o", str(tmp_path / "no/a.mcap")], capsys
+    )
+
+
+def test_without_a_router_nothing_is_left_behind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wanted = str(tmp_path / "a.mcap")
+    assert "error[RBX9020]" in refused(["record", "--router", "tcp/127.0.0.1:1", "-o", wanted], capsys)
+    assert "error[RBX9020]" in refused(["record", "--router", "nonsense", "-o", wanted], capsys)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "words", [["--split", "5 apples"], ["--class", "fast"], ["--for", "-1s"], ["--topics"], ["--domain", "x"]]
+)
+def test_wrong_options_are_wrong_usage(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        command.main(["record", *words])
+    assert "usage: rbxcompose record" in capsys.readouterr().err
+
+
+def test_no_other_command_loads_what_recordings_need() -> None:
+    script = (
+        "import sys; import rbxcompose.cli.main as m\n"
+        "[m.load(verb) for verb in m.verbs() if verb not in ('record', 'replay')]\n"
+        "print(*sys.modules)\n"
+    )
+    found = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert not {"mcap", "zstandard", "lz4"} & set(found.stdout.split())

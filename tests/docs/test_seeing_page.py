@@ -1,0 +1,32 @@
+"""The page on seeing a robot shows what its commands really print."""
+
+from __future__ import annotations
+
+import shlex
+from itertools import pairwise
+
+import pytest
+
+from rbxcompose.cli import main as command
+from tests.docs.examples import ROOT, Block, blocks_of
+
+PAGE = ROOT / "docs/seeing.md"
+BLOCKS = list(blocks_of(PAGE.read_text(encoding="utf-8"), PAGE.name))
+SHOWN = [(one, other) for one, other in pairwise(BLOCKS) if (one.language, other.language) == ("sh", "text")]
+SKIPS = "..."
+
+
+@pytest.mark.usefixtures("repository")
+@pytest.mark.parametrize(("asked", "shown"), SHOWN, ids=str)
+def test_a_command_prints_what_stands_below_it(asked: Block, shown: Block, capsys: pytest.CaptureFixture[str]) -> None:
+    [line] = asked.text.splitlines()
+    program, *words = shlex.split(line)
+    assert program == "rbxcompose"
+    assert command.main(words) == 0
+    printed = iter(capsys.readouterr().out.splitlines())
+    for wanted in shown.text.splitlines():
+        assert wanted == SKIPS or wanted in printed, wanted  # in their order; others may lie between
+
+
+def test_each_verb_has_an_example() -> None:
+    assert {shlex.split(asked.text)[1] for asked, _ in SHOWN} == {"expand", "why", "graph", "plan"}

@@ -1,0 +1,40 @@
+"""What is fuzzed: each target takes any bytes and may raise nothing."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+
+from rbxcompose.findings import Report
+from rbxcompose.formats import renderer
+from rbxcompose.manifest.reader import read_text
+from rbxcompose.plan.dump import PlanTextError, dump, load
+from tests.properties.random_expressions import Trap, attempt
+
+FILE = "robot.yaml"
+
+
+def loader(data: bytes) -> None:
+    """Read a manifest's text, and write down what is wrong with it."""
+    root, findings = read_text(data, FILE)
+    assert root is not None or findings
+    assert all(finding.span for finding in findings)
+    report = Report(list(findings))
+    for form in ("text", "json"):
+        renderer(form)(report, {FILE: data.decode("utf-8", "replace")}, False)
+
+
+def expressions(data: bytes) -> None:
+    """Read, check and compute an expression."""
+    attempt(data.decode("utf-8", "replace"))
+    assert not Trap.touched, Trap.touched
+
+
+def plan(data: bytes) -> None:
+    """Read a plan; one that can be read is written down alike."""
+    with contextlib.suppress(PlanTextError):
+        read = load(data.decode("utf-8", "replace"))
+        assert load(dump(read)) == read
+
+
+TARGETS: dict[str, Callable[[bytes], None]] = {"loader": loader, "expressions": expressions, "plan": plan}

@@ -1,0 +1,204 @@
+"""Projects of several files that are made to do harm: cases by name, each the files and the code that must be told."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+HEAD = "rbx: 1\nkind: Robot\nname: bad\n"
+PART = "rbx: 1\nkind: Part\nname: part\n"
+MISSION = "rbx: 1\nkind: Mission\nname: bad\n"
+BATTERY = "components:\n  battery: {type: battery_sim, runtime: 45 s}\nvalues:\n  battery: battery.battery_level\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Project:
+    """Files by their path, what else is to be made in the folder, and what must be told of `robots/bad/robot.yaml`."""
+
+    code: str
+    files: Mapping[str, str | bytes]
+    prepare: Callable[[Path], object] = lambda folder: None
+    environment: Mapping[str, str] = field(default_factory=dict)
+
+
+def robot(text: str) -> dict[str, str | bytes]:
+    return {"robots/bad/robot.yaml": HEAD + text}
+
+
+def mission(text: str) -> dict[str, str | bytes]:
+    there = robot(BATTERY + "missions:\n  bad: ../../missions/bad.yaml\nstart: bad\n")
+    return {**there, "missions/bad.yaml": MISSION + text}
+
+
+def named(path: str) -> dict[str, str | bytes]:
+    return {**robot(f"missions:\n  bad: {path}\n"), "missions/good.yaml": MISSION + "do: [{wait: 1 s}]\n"}
+
+
+def linked(target: str, name: str = "missions/bad.yaml") -> Callable[[Path], object]:
+    def prepare(folder: Path) -> None:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).symlink_to(target)
+
+    return prepare
+
+
+def pipe(folder: Path) -> None:
+    (folder / "missions").mkdir(exist_ok=True)
+    (folder / "missions/bad.yaml").unlink(missing_ok=True)
+    os.mkfifo(folder / "missions/bad.yaml")
+
+
+def included(*names: str) -> str:
+    return "include:\n" + "".join(f"  i{number}: {{part: {name}}}\n" for number, name in enumerate(names))
+
+
+def chain(length: int) -> dict[str, str | bytes]:
+    """Return a robot that includes a part that includes a part and so on."""
+    parts = {f"parts/p{n}.yaml": PART + included(f"p{n + 1}.yaml") for n in range(length)}
+    last = {f"parts/p{length}.yaml": PART + BATTERY}
+    return {**robot(included("../../parts/p0.yaml")), **parts, **last}
+
+
+def doubling(levels: int) -> dict[str, str | bytes]:
+    """Return a robot whose parts each include two parts: few files, many instances."""
+    parts = {f"parts/p{n}.yaml": PART + included(f"p{n + 1}.yaml", f"p{n + 1}.yaml") for n in range(levels)}
+    return {**robot(included("../../parts/p0.yaml")), **parts, f"parts/p{levels}.yaml": PART + BATTERY}
+
+
+def many(count: int, text: str) -> dict[str, str | bytes]:
+    parts: dict[str, str | bytes] = {f"parts/p{n}.yaml": PART + text for n in range(count)}
+    return {**robot(included(*(f"../../parts/p{n}.yaml" for n in range(count)))), **parts}
+
+
+def strangers(count: int) -> str:
+    """Return many names that are nearly, but not quite, those that exist."""
+    components = "".join(f"  battery_{n}: {{type: battery_sim, runtime: 45 s}}\n" for n in range(count))
+    return (
+        "components:\n"
+        + components
+        + "values:\n"
+        + "".join(f"  v{n}: batery_{n}x.battery_level\n" for n in range(count))
+    )
+
+
+ARGUMENT = "args:\n  long: {type: text, default: " + "x" * 60_000 + "}\n"
+PROJECTS: dict[str, Project] = {
+    # Files: which, how many, how large
+    "a link to a device": Project("RBX1301", {}, linked("/dev/zero", "robots/bad/robot.yaml")),
+    "a link to a file of the system": Project("RBX1306", named("../../missions/bad.yaml"), linked("/etc/passwd")),
+    "a link to itself": Project("RBX1306", named("../../missions/bad.yaml"), linked("bad.yaml")),
+    "a path out of the project": Project("RBX1306", named("../../../../../../../../etc/passwd")),
+    "an absolute path": Project("RBX1306", named("/etc/passwd")),
+    "a path out of the library": Project("RBX1306", named("rbx:../../../../etc/passwd")),
+    "a device as a mission": Project("RBX1306", named("/dev/zero")),
+    "a folder as a mission": Project("RBX1301", named("../../missions")),
+    "the robot as its own mission": Project("RBX1304", named("robot.yaml")),
+    "a name too long for the system": Project("RBX1306", named("x" * 5000)),
+    "a zero byte in a path": Project("RBX1106", named('"a\\0b"')),
+    "a part that includes itself": Project(
+        "RBX1308", {**robot(included("../../parts/p.yaml")), "parts/p.yaml": PART + included("p.yaml")}
+    ),
+    "a long chain of parts": Project("RBX1103", chain(40)),
+    "doubling parts": Project("RBX1103", doubling(14)),
+    "600 parts": Project("RBX1103", many(600, BATTERY)),
+    "many large parts": Project("RBX1103", many(6, "about: x\n" + "# x\n" * 450_000)),
+    "a pipe as a mission": Project(
+        "RBX1301",
+        named("../../missions/bad.yaml"),
+        pipe,
+    ),
+    "a part behind a link that leads out": Project(
+        "RBX1306", robot(included("../../parts/p.yaml")), linked("/etc/hostname", "parts/p.yaml")
+    ),
+    "a secret behind a link that leads out": Project(
+        "RBX1207",
+        robot("components:\n  b: {type: battery_sim, runtime: '${secret.key}'}\n"),
+        linked("/etc/passwd", "secrets/key"),
+    ),
+    "a mission in utf-16": Project(
+        "RBX1111", {**mission(""), "missions/bad.yaml": (MISSION + "do: [{wait: 1 s}]\n").encode("utf-16")}
+    ),
+    "a mission of 3 MB": Project("RBX1103", mission("# x\n" * 800_000)),
+    "aliases that double in a part": Project(
+        "RBX1108",
+        {
+            **robot(included("../../parts/p.yaml")),
+            "parts/p.yaml": PART
+            + "a0: &a0 [x]\n"
+            + "".join(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]\n" for n in range(1, 12)),
+        },
+    ),
+    "a direction override in a part": Project(
+        "RBX1106", {**robot(included("../../parts/p.yaml")), "parts/p.yaml": PART + 'about: "a\u202eb"\n'}
+    ),
+    # Filling in
+    "a long argument in many texts": Project(
+        "RBX1103", robot(ARGUMENT + "about: [" + '"b${args.long}",' * 9000 + "]\n")
+    ),
+    "a long list filled in many times": Project(
+        "RBX1103",
+        robot("args:\n  l: {type: list, default: [" + "1," * 90_000 + "]}\nabout: [" + "'${args.l}'," * 10_000 + "]\n"),
+    ),
+    "an argument of itself": Project("RBX1202", robot("args:\n  a: {type: text, default: '${args.a}${args.a}'}\n")),
+    "a long variable in many texts": Project(
+        "RBX1103", robot("about: [" + '"b${env.LONG}",' * 9000 + "]\n"), environment={"LONG": "x" * 60_000}
+    ),
+    "a variable that names itself": Project("RBX1102", robot("about: [${env.A}]\n"), environment={"A": "${env.A}"}),
+    "a variable with an escape": Project("RBX1001", robot("${env.A}: 1\n"), environment={"A": "\x1b[2J"}),
+    # Expressions
+    "an expression of 1,001 characters": Project("RBX4111", mission("do: [{check: " + "1 + " * 249 + "1 < 20000}]\n")),
+    "51 brackets": Project("RBX4111", mission("do: [{check: '" + "(" * 51 + "1" + ")" * 51 + " < 2'}]\n")),
+    "many minuses": Project("RBX4111", mission("do: [{check: '" + "-" * 900 + "1 < 2'}]\n")),
+    "a power": Project("RBX4111", mission("do: [{check: '9 ** 9 ** 9 < 2'}]\n")),
+    "an attribute": Project("RBX4111", mission("do: [{check: '().__class__ == 1'}]\n")),
+    "a function of Python": Project("RBX4111", mission("do: [{check: 'eval(1) == 1'}]\n")),
+    # Missions
+    "100 levels of nodes": Project("RBX1103", mission("do: " + "[" * 100 + "go" + "]" * 100 + "\n")),
+    "10,000 unknown skills": Project("RBX4102", mission("do:\n" + "  - fly_away\n" * 10_000)),
+    "5,000 unknown skills, each another": Project(
+        "RBX4102", mission("do:\n" + "".join(f"  - recharg{n}e\n" for n in range(5000)))
+    ),
+    "5,000 interrupts": Project(
+        "RBX4102",
+        mission(
+            "do: [{wait: 1 s}]\ninterrupts:\n"
+            + "".join(f"  i{n}: {{when: $battery < 1 %, do: x}}\n" for n in range(5000))
+        ),
+    ),
+    "a loop over 100,000 items": Project("RBX4102", mission("do: [{for: x, in: [" + "1," * 100_000 + "], do: fly}]\n")),
+    # Names
+    "1,000 names that are nearly right": Project("RBX3005", robot(strangers(1000))),
+    "5,000 unknown keys": Project("RBX1001", robot("".join(f"componentz{n}: 1\n" for n in range(5000)))),
+    "a pattern that matches in many ways": Project(
+        "RBX5001",
+        robot(
+            BATTERY
+            + "diagnostics:\n  analyzers:\n"
+            + "".join(f'    a{n}: {{match: ["{"*a" * 90}b"]}}\n' for n in range(300))
+        ),
+    ),
+    "components that start after each other": Project(
+        "RBX3008",
+        robot(
+            "components:\n"
+            + "".join(
+                f"  c{n}: {{type: battery_sim, runtime: 45 s, starts_after: [c{(n + 1) % 1000}]}}\n"
+                for n in range(1000)
+            )
+        ),
+    ),
+}
+
+
+def write(project: Project, folder: Path) -> Path:
+    """Write down the files and return that of the robot."""
+    robot_file = folder / "robots/bad/robot.yaml"
+    robot_file.parent.mkdir(parents=True)
+    for name, text in project.files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    project.prepare(folder)
+    return robot_file

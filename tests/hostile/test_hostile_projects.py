@@ -1,0 +1,89 @@
+"""Projects made to do harm end as findings, within time and memory: one row of the table of limits after the other."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.hostile.projects import PROJECTS, Project, write
+from tests.hostile.test_hostile_manifests import HOSTILE, WORST
+from tests.soak import Soak
+
+ROOT = Path(__file__).parents[2]
+DEADLINE = 6.0  # [s] of processor time: three times what it may take, since machines differ by that factor
+RESIDENT = 200_000  # [kB]
+PLACELESS = {"RBX1103", "RBX1301"}  # what is wrong with a whole file, before there is a text to point into
+# A process counts the memory of the one that it was forked from, so a small one comes between.
+LAUNCHER = """
+import json, os, subprocess, sys
+child = subprocess.Popen(sys.argv[1:], stderr=subprocess.STDOUT)
+_, status, used = os.wait4(child.pid, 0)
+told = {"seconds": used.ru_utime + used.ru_stime, "resident": used.ru_maxrss}
+sys.stderr.write(json.dumps(told | {"exit": os.waitstatus_to_exitcode(status)}))
+sys.stderr.flush()
+os._exit(0)
+"""
+THE_WORST = ("20 MB", "500,000 nodes", "doubling aliases", "a long list filled in many times", "doubling parts")
+WORST_OF_ALL = (*THE_WORST, "5,000 interrupts")
+
+
+@pytest.fixture(scope="module")
+def compiler() -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, "-m", "tests.hostile.child"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
+        yield process
+        assert process.stdin
+        process.stdin.close()
+
+
+def told_of(compiler: subprocess.Popen[str], path: Path, environment: dict[str, str]) -> Any:
+    assert compiler.stdin
+    assert compiler.stdout
+    compiler.stdin.write(json.dumps({"path": str(path), "environment": environment}) + "\n")
+    compiler.stdin.flush()
+    return json.loads(compiler.stdout.readline())
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("project", PROJECTS.values(), ids=PROJECTS)
+def test_a_hostile_project_ends_in_a_finding_within_time_and_memory(
+    compiler: subprocess.Popen[str], project: Project, tmp_path: Path
+) -> None:
+    told = told_of(compiler, write(project, tmp_path), dict(project.environment))
+    assert told["exit"] == 0
+    assert project.code in told["codes"]
+    assert set(told["nowhere"]) <= PLACELESS
+    assert told["controls"] == []
+    assert told["seconds"] < DEADLINE
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("name", WORST_OF_ALL)
+def test_the_command_itself_stays_within_time_and_memory(name: str, tmp_path: Path) -> None:
+    if name in WORST:
+        text, code = WORST[name]
+        project = Project(code, {"robots/bad/robot.yaml": text})
+    else:
+        project = PROJECTS[name]
+    path = write(project, tmp_path)
+    command = [sys.executable, "-c", LAUNCHER, sys.executable, "-m", "rbxcompose", "check", str(path)]
+    environment = {"PATH": os.environ["PATH"], "PYTHONPATH": str(ROOT), **project.environment}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    used = json.loads(done.stderr)
+    assert used["exit"] == 1
+    assert f"[{project.code}]" in done.stdout
+    assert used["seconds"] < DEADLINE
+    assert used["resident"] < RESIDENT
+
+
+def test_every_row_of_the_limits_is_tried(soak: Soak) -> None:
+    cases = len(PROJECTS) + len(WORST) + len(HOSTILE)
+    soak.tell("hostile manifests", cases, 0, f"all refused; {len(WORST_OF_ALL)} of them by the command itself as well")
+    assert cases >= 60

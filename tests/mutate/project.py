@@ -1,0 +1,111 @@
+"""A copy of the shipped manifests in which one file is changed, and what must hold of each robot in it."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.findings import Severity, Span
+from rbxcompose.formats import format_names, renderer
+from rbxcompose.plan.dump import dump, load
+from tests.mutate.mutants import Mutant, mutant, originals
+
+SLOW = 6.0  # [s] of processor time: three times what any manifest may take, since machines differ by that factor
+PLACELESS = {"RBX1103", "RBX1301"}  # what is wrong with a whole file, before there is a text to point into
+
+
+@dataclass(slots=True)
+class Found:
+    """What became of some mutants: how many were refused, how many are robots, and the first failure of each kind."""
+
+    examples: int = 0
+    refused: int = 0
+    codes: Counter[str] = field(default_factory=Counter)
+    failures: dict[str, tuple[Mutant, str]] = field(default_factory=dict)
+
+    def add(self, other: Found) -> None:
+        """Count what another process has found."""
+        self.examples += other.examples
+        self.refused += other.refused
+        self.codes.update(other.codes)
+        self.failures = {**other.failures, **self.failures}
+
+
+class Project:
+    """The manifests in a folder of their own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.files = originals()
+        for name, data in self.files.items():
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        self.robots = [name for name in self.files if name.endswith("robot.yaml")]
+
+    def judge(self, changed: dict[str, bytes]) -> list[Compilation]:
+        """Compile every robot that the change may concern.
+
+        Raises:
+            AssertionError: if one of them is neither a robot nor refused, or a finding points nowhere.
+        """
+        for name, data in changed.items():
+            (self.folder / name).write_bytes(data)
+        try:
+            mine = [robot for robot in self.robots if robot in changed] or self.robots
+            return [self.compile(robot) for robot in mine]
+        finally:
+            for name in changed:
+                (self.folder / name).write_bytes(self.files[name])
+
+    def compile(self, robot: str) -> Compilation:
+        """Compile one robot, and write its findings in every format, or its plan."""
+        started = time.process_time()
+        out = compile_robot(str(self.folder / robot), environment={})
+        assert (out.plan is None) == out.report.has_errors
+        for finding in out.report:
+            assert finding.message, finding
+            assert finding.span or finding.code in PLACELESS, finding
+            for span in (finding.span, *(related.span for related in finding.related)):
+                assert span is None or is_in_text(span, out.sources), (finding.code, span)
+        for name in format_names():
+            renderer(name)(out.report, out.sources, False)
+        if out.plan is not None:
+            text = dump(out.plan)
+            again = load(text)
+            assert again == out.plan
+            assert dump(again) == text
+        taken = time.process_time() - started
+        assert taken < SLOW, f"{taken:.1f} s"
+        return out
+
+    def try_all(self, seeds: Iterable[int]) -> Found:
+        """Return what became of the mutants with these seeds."""
+        found = Found()
+        for seed in seeds:
+            one = mutant(seed, self.files)
+            found.examples += 1
+            try:
+                outs = self.judge({one.file: one.data})
+            except Exception as error:  # any at all is what is looked for
+                last = traceback.extract_tb(error.__traceback__)[-1]
+                where = f"{type(error).__name__} at {Path(last.filename).name}:{last.lineno}"
+                found.failures.setdefault(where, (one, traceback.format_exc()))
+                continue
+            found.refused += any(out.report.has_errors for out in outs)
+            errors = (one.code for out in outs for one in out.report if one.severity is Severity.ERROR)
+            found.codes.update(set(errors))
+        return found
+
+
+def is_in_text(span: Span, sources: dict[str, str]) -> bool:
+    """Tell whether a place lies in one of the texts that were read; the end of a text counts."""
+    if span.file not in sources:
+        return False
+    lines = sources[span.file].count("\n") + 1
+    return 1 <= span.line <= span.end_line <= lines + 1 and span.column >= 1

@@ -1,0 +1,182 @@
+"""Configurations as parameters: names, values, descriptions, and what a change takes and refuses."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import Field, model_validator
+
+from rbxcompose.config import Angle, Config, Live, Place, PlaceName, Ratio, Secret, Speed, Time
+from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterType, ParameterValue
+from rbxcompose.params.core import UnsettableError, changed, differences, listed, settings, values_of
+from rbxcompose.params.values import from_message, to_message
+
+
+class Input(Config):
+    """One of several."""
+
+    priority: int
+    timeout: Time
+
+
+class Sample(Config):
+    """All kinds of fields."""
+
+    speed: Annotated[Speed, Live()] = Field(0.3, gt=0)
+    """Largest speed."""
+    heading: Annotated[Angle, Live()] = 0.5
+    """Where it looks."""
+    low: Annotated[Ratio, Live()] = Field(0.2, ge=0, le=1)
+    """Below this it warns."""
+    high: Annotated[Ratio, Live()] = Field(0.8, ge=0, le=1)
+    """Above this it warns."""
+    turns: Annotated[tuple[Angle, ...], Live()] = ()
+    """Angles."""
+    count: Annotated[int, Live()] = Field(3, ge=1, le=9)
+    """How many."""
+    mode: Annotated[Literal["calm", "wild"], Live()] = "calm"
+    """How it moves."""
+    fixed: float = 1.0
+    """Set at the start."""
+    inputs: dict[str, Input] = {}
+    """By name."""
+    nothing: Time | None = None
+    """May be left out."""
+    key: Secret | None = None
+    """Not to be seen."""
+    dock: PlaceName = Place("dock", 0.0, 0.0, 1.0)
+    """Where it charges."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Sample:
+        if self.low > self.high:
+            raise ValueError("'low' lies above 'high'")
+        return self
+
+
+SAMPLE = Sample(key=Secret("hush"), inputs={"door": Input(priority=7, timeout=0.5)})
+
+
+def parameter(name: str, value: object) -> Parameter:
+    message = to_message(value)
+    assert message is not None
+    return Parameter(name=name, value=message)
+
+
+def set_to(name: str, value: object) -> Sample:
+    new = changed(SAMPLE, [parameter(name, value)])
+    assert isinstance(new, Sample)
+    return new
+
+
+def test_fields_and_what_lies_below_them_are_parameters_but_no_secret_and_no_place() -> None:
+    names = "speed heading low high turns count mode fixed inputs.door.priority inputs.door.timeout nothing"
+    assert list(settings(SAMPLE)) == names.split()
+
+
+def test_what_is_unknown_has_no_value() -> None:
+    values = values_of(settings(SAMPLE), ["count", "no", "nothing"])
+    assert [(one.type, from_message(one)) for one in values] == [
+        (ParameterType.PARAMETER_INTEGER, 3),
+        (0, None),
+        (0, None),
+    ]
+
+
+def test_a_descriptor_tells_unit_range_and_whether_it_may_change() -> None:
+    known = settings(SAMPLE)
+    speed, count, mode = (known[name].descriptor for name in ("speed", "count", "mode"))
+    assert (speed.description, speed.read_only) == ("Largest speed. [m/s]", False)
+    assert speed.additional_constraints == "greater than 0 m/s"
+    assert [(one.from_value, one.to_value) for one in speed.floating_point_range] == [(0.0, math.inf)]
+    assert [(one.from_value, one.to_value) for one in count.integer_range] == [(1, 9)]
+    assert mode.additional_constraints == "one of calm, wild"
+    assert known["fixed"].descriptor.read_only
+    assert known["inputs.door.priority"].descriptor.read_only
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("speed", 0.5, 0.5),
+        ("speed", 1, 1.0),
+        ("speed", "20 cm/s", 0.2),
+        ("heading", 1.25, 1.25),
+        ("heading", "90 deg", math.pi / 2),
+        ("low", "40 %", 0.4),
+        ("turns", (0.5, 1.5), (0.5, 1.5)),
+        ("count", 4, 4),
+        ("mode", "wild", "wild"),
+    ],
+)
+def test_a_change_takes_si_and_text_with_units(name: str, value: object, expected: object) -> None:
+    new = set_to(name, value)
+    assert getattr(new, name) == pytest.approx(expected) if name != "mode" else getattr(new, name) == expected
+    assert [one.name for one in differences(SAMPLE, new)] == [name]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("sped", 0.5, "there is no parameter 'sped'; did you mean 'speed'?"),
+        ("fixed", 2.0, "'fixed' cannot change while the robot runs"),
+        ("inputs.door.priority", 2, "'inputs.door.priority' cannot change while the robot runs"),
+        ("speed", 0.0, "'speed' must be greater than 0"),
+        ("speed", "3 s", "'speed' must be a speed, such as '0.3 m/s'; this is a time"),
+        ("speed", True, "'speed' must be a speed, such as '0.3 m/s'"),
+        ("count", 2.5, "'count' must be a valid integer"),
+        ("count", 10, "'count' must be less than or equal to 9"),
+        ("mode", "mad", "'mode' must be 'calm' or 'wild'"),
+        ("low", 0.9, "'low' lies above 'high'"),
+        ("speed", None, "'speed' needs a value"),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_the_reason(name: str, value: object, reason: str) -> None:
+    with pytest.raises(UnsettableError) as refused:
+        set_to(name, value)
+    assert str(refused.value) == reason
+
+
+def test_parameters_that_fit_only_together_are_set_together() -> None:
+    new = changed(SAMPLE, [parameter("low", 0.9), parameter("high", 0.95)])
+    assert isinstance(new, Sample)
+    assert (new.low, new.high, new.key, new.dock) == (0.9, 0.95, SAMPLE.key, SAMPLE.dock)
+
+
+def test_names_are_listed_by_prefix_and_depth() -> None:
+    names = ["a", "b.c", "b.d.e", "bc.f"]
+    assert listed(names, [], 0).names == tuple(names)
+    assert listed(names, [], 0).prefixes == ("b", "b.d", "bc")
+    assert listed(names, [], 1).names == ("a",)
+    assert listed(names, ["b"], 0).names == ("b.c", "b.d.e")
+    assert listed(names, ["b"], 1).names == ("b.c",)
+    assert listed(names, ["a", "bc"], 0).names == ("a", "bc.f")
+    assert listed(names, ["x"], 0).names == ()
+
+
+WHOLE = st.integers(-(2**63), 2**63 - 1)
+NUMBERS = st.floats(allow_nan=False)
+VALUES = st.one_of(
+    st.booleans(),
+    WHOLE,
+    NUMBERS,
+    st.text(),
+    *(st.lists(one, min_size=1).map(tuple) for one in (st.booleans(), WHOLE, NUMBERS, st.text())),
+)
+
+
+@given(VALUES)
+def test_a_value_comes_back_from_its_message(value: object) -> None:
+    message = to_message(value)
+    assert message is not None
+    assert from_message(message) == value
+
+
+@given(st.builds(ParameterValue, type=st.integers(0, 255)))
+def test_a_message_of_any_type_but_of_no_speed_is_refused(message: ParameterValue) -> None:
+    with pytest.raises(UnsettableError, match="'speed' "):
+        changed(SAMPLE, [Parameter(name="speed", value=message)])

@@ -1,0 +1,133 @@
+"""Parameters over the bus: what the six services of a component answer, and what a change does to it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import pytest
+
+from rbxcompose.msgs import rcl_interfaces as rcl
+from rbxcompose.msgs.types import Message, Service
+from rbxcompose.params.values import to_message
+from rbxcompose.sdk import Component, Config, Live, Refused, component
+from rbxcompose.sdk.bound import Reply
+from rbxcompose.testing import Bench, instance
+
+
+class ToyConfig(Config):
+    """What can be set."""
+
+    size: Annotated[float, Live()] = 1.0
+    """How large it is."""
+    weight: Annotated[float, Live()] = 1.0
+    """How heavy it is."""
+    name: str = "toy"
+    """What it is called."""
+
+
+@component("toy_for_parameters")
+class Toy(Component[ToyConfig]):
+    """Takes what it is told, unless it is too large."""
+
+    rate = 10.0
+
+    def configure(self) -> None:
+        self.followed: list[tuple[float, float]] = []
+
+    def reconfigure(self, old: ToyConfig) -> None:
+        if self.config.size > 10.0:
+            raise Refused("there is no room")
+        if self.config.size < 0.0:
+            raise ValueError("planted")
+        self.followed.append((old.size, self.config.size))
+
+    def step(self, dt: float) -> None:
+        if self.config.size == 7.0 and self.now < 1.0:
+            raise ValueError("planted, too")
+
+
+def ask(bench: Bench, what: str, service: type[Service[Any, Any]], request: Message) -> Any:
+    replies: list[Reply[Any]] = []
+    bench.bus.client("bench", what, service)(request, replies.append)
+    bench.advance(0.0)
+    return replies[0].response or replies[0].error
+
+
+def set_each(bench: Bench, **values: object) -> list[tuple[bool, str]]:
+    request = rcl.SetParameters.Request(parameters=tuple(_parameter(*one) for one in values.items()))
+    answer = ask(bench, "toy/set_parameters", rcl.SetParameters, request)
+    return [(one.successful, one.reason) for one in answer.results]
+
+
+def _parameter(name: str, value: object) -> rcl.Parameter:
+    return rcl.Parameter(name=name, value=to_message(value) or rcl.ParameterValue())
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench(instance("toy", "toy_for_parameters"), instance("other", "toy_for_parameters"))
+
+
+def test_a_component_tells_its_parameters(bench: Bench) -> None:
+    listed = ask(bench, "/toy/list_parameters", rcl.ListParameters, rcl.ListParameters.Request())
+    assert listed.result.names == ("size", "weight", "name")
+    names = ("name", "size", "nothing")
+    values = ask(bench, "/toy/get_parameters", rcl.GetParameters, rcl.GetParameters.Request(names=names)).values
+    assert (values[0].string_value, values[1].double_value, values[2].type) == ("toy", 1.0, 0)
+    types = ask(bench, "/toy/get_parameter_types", rcl.GetParameterTypes, rcl.GetParameterTypes.Request(names=names))
+    assert types.types == bytes([4, 3, 0])
+    request = rcl.DescribeParameters.Request(names=names)
+    told = ask(bench, "/toy/describe_parameters", rcl.DescribeParameters, request).descriptors
+    assert [(one.name, one.read_only, one.description) for one in told] == [
+        ("name", True, "What it is called."),
+        ("size", False, "How large it is."),
+        ("nothing", False, ""),
+    ]
+
+
+def test_a_change_reaches_the_component_the_log_and_who_listens(bench: Bench) -> None:
+    events = bench.collect("/parameter_events", rcl.ParameterEvent)
+    assert set_each(bench, size=2.0) == [(True, "")]
+    toy: Any = bench.component("toy")
+    assert (toy.followed, toy.config.size) == ([(1.0, 2.0)], 2.0)
+    assert "toy: set: size = 2.0" in bench.texts()
+    changed = events[0].changed_parameters
+    assert (events[0].node, [(one.name, one.value.double_value) for one in changed]) == ("/toy", [("size", 2.0)])
+    assert bench.component("other").config.size == 1.0
+
+
+def test_each_parameter_of_a_list_is_set_for_itself(bench: Bench) -> None:
+    answers = set_each(bench, size=11.0, weight=3.0, name="x")
+    assert answers == [(False, "there is no room"), (True, ""), (False, "'name' cannot change while the robot runs")]
+    assert (bench.component("toy").config.size, bench.component("toy").config.weight) == (1.0, 3.0)
+
+
+def test_of_an_atomic_list_all_are_set_or_none(bench: Bench) -> None:
+    request = rcl.SetParametersAtomically.Request(parameters=(_parameter("weight", 3.0), _parameter("name", "x")))
+    answer = ask(bench, "toy/set_parameters_atomically", rcl.SetParametersAtomically, request)
+    assert (answer.result.successful, bench.component("toy").config.weight) == (False, 1.0)
+    request = rcl.SetParametersAtomically.Request(parameters=(_parameter("weight", 3.0), _parameter("size", 4.0)))
+    assert ask(bench, "toy/set_parameters_atomically", rcl.SetParametersAtomically, request).result.successful
+    assert (bench.component("toy").config.size, bench.component("toy").config.weight) == (4.0, 3.0)
+
+
+def test_what_stays_as_it_is_is_no_event(bench: Bench) -> None:
+    events = bench.collect("/parameter_events", rcl.ParameterEvent)
+    assert set_each(bench, size=1.0) == [(True, "")]
+    assert events == []
+
+
+def test_a_component_that_is_restarted_keeps_what_was_set(bench: Bench) -> None:
+    set_each(bench, size=7.0)
+    bench.advance(3.0)
+    assert bench.host.states()["toy"][0] == "active"
+    assert bench.host.states()["toy"][1] > 0
+    assert bench.component("toy").config.size == 7.0
+
+
+def test_a_component_that_breaks_by_a_change_comes_back_without_it(bench: Bench) -> None:
+    request = rcl.SetParameters.Request(parameters=(_parameter("size", -1.0),))
+    assert ask(bench, "toy/set_parameters", rcl.SetParameters, request) == "ValueError: planted"
+    bench.advance(1.0)
+    assert bench.host.states()["toy"] == ("active", 1)
+    assert bench.component("toy").config.size == 1.0
