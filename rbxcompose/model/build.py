@@ -158,5 +158,5 @@ def values_of(manifest: RobotManifest, parts: Mapping[str, Part]) -> dict[str, V
     """Return the values whose source is there."""
     ends = [end for part in parts.values() for end in part.ends]
     namespace = manifest.bus.namespace or ""
-    found = {name: value_of(entry, ends, namespace) for name, entry in manifest.values.items()}
+    found = {name: value_of(entry, parts, ends, namespace) for name, entry in manifest.values.items()}
     return {name: value for name, value in found.items() if value is not None}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, quantity_of
 from rbxcompose.manifest.models import Value as ValueEntry
 from rbxcompose.missions.sources import ValueSource
+from rbxcompose.model.robot import Part
 from rbxcompose.model.wiring import End, resolve
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.ports import In, Out
@@ -18,12 +19,11 @@ NUMBER = "std_msgs/msg/Float32"
 DATA = "data"  # the field of the standard messages
 
 
-def value_of(entry: ValueEntry, ends: Iterable[End], namespace: str) -> ValueSource | None:
+def value_of(entry: ValueEntry, parts: Mapping[str, Part], ends: Iterable[End], namespace: str) -> ValueSource | None:
     """Return what a value is, or None if its source is not there (a check says so)."""
-    ends = list(ends)
     if entry.port is not None:
         component, _, port = entry.port.partition(".")
-        end = next((end for end in ends if (end.instance, end.name) == (component, port)), None)
+        end = parts[component].end(port) if component in parts else None
         return _of_port(end, entry.unit) if end else None
     if entry.topic is None:
         return None
