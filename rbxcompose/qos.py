@@ -20,4 +20,4 @@ class Qos(StrEnum):
         return _DEPTH[self]
 
 
-_DEPTH = {Qos.COMMAND: 1, Qos.STATE: 10, Qos.LATCHED: 1, Qos.EVENT: 100, Qos.BULK: 2}
+_DEPTH = {Qos.COMMAND: 1, Qos.STATE: 10, Qos.LATCHED: 1, Qos.EVENT: 10_000, Qos.BULK: 2}

@@ -7,8 +7,9 @@ monotonic clock, in simulated time the instant of the next event. Events run by 
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import count
 
 Callback = Callable[[], None]
@@ -18,14 +19,11 @@ Observe = Callable[[str, Callback], None]  # runs the callback and may time it
 MOST_AT_ONCE = 100_000  # events at one instant before we call it a loop that never ends
 
 
-@dataclass(order=True, slots=True)
+@dataclass(eq=False, slots=True)
 class Event:
-    """A callback that is due at `time` [s]; `cancel` makes it none."""
+    """A callback that is due; `cancel` makes it none."""
 
-    time: float
-    owner: str
-    sequence: int
-    callback: Callback | None = field(compare=False)
+    callback: Callback | None
 
     def cancel(self) -> None:
         """Forget the callback; the event then passes unseen."""
@@ -47,13 +45,14 @@ class Scheduler:
         self.now = 0.0  # [s] of robot time, of the latest `advance`
         self.on_error = on_error
         self.observe = observe
-        self._events: list[Event] = []
+        # By time [s], owner, sequence: tuples, since comparing them is most of the work of a heap.
+        self._events: list[tuple[float, str, int, Event]] = []
         self._sequence = count()
 
     def at(self, time: float, owner: str, callback: Callback) -> Event:
         """Run `callback` for `owner` once at robot time `time` [s] (at once, if that is past)."""
-        event = Event(max(time, self.now), owner, next(self._sequence), callback)
-        heapq.heappush(self._events, event)
+        event = Event(callback)
+        heapq.heappush(self._events, (max(time, self.now), owner, next(self._sequence), event))
         return event
 
     def post(self, owner: str, callback: Callback) -> Event:
@@ -66,15 +65,15 @@ class Scheduler:
 
     def remove(self, owner: str) -> None:
         """Cancel all that is due for `owner`."""
-        for event in self._events:
-            if event.owner == owner:
+        for _, whose, _, event in self._events:
+            if whose == owner:
                 event.cancel()
 
     def next_due(self) -> float | None:
         """Return the time of the next event [s], or None if nothing is due ever."""
-        while self._events and self._events[0].callback is None:
+        while self._events and self._events[0][3].callback is None:
             heapq.heappop(self._events)
-        return self._events[0].time if self._events else None
+        return self._events[0][0] if self._events else None
 
     def advance(self, t: float) -> None:
         """Run everything that is due until `t` [s], also what comes up meanwhile.
@@ -87,17 +86,18 @@ class Scheduler:
             due = self.next_due()
             if due is None or due > self.now:
                 return
-            self._run_one(heapq.heappop(self._events))
+            _, owner, _, event = heapq.heappop(self._events)
+            self._run_one(owner, event)
         raise RuntimeError(f"more than {MOST_AT_ONCE} events at {self.now:.3f} s")
 
-    def _run_one(self, event: Event) -> None:
+    def _run_one(self, owner: str, event: Event) -> None:
         callback, event.callback = event.callback, None
         if callback is None:
             return
         try:
-            self.observe(event.owner, callback)
+            self.observe(owner, callback)
         except Exception as error:  # a component's mistake must not stop its neighbours
-            self.on_error(event.owner, error)
+            self.on_error(owner, error)
 
 
 class Periodic:
@@ -110,7 +110,9 @@ class Periodic:
             raise ValueError(f"a period must be positive, not {period} s")
         self.missed = 0
         self._scheduler, self._period, self._owner, self._callback = scheduler, period, owner, callback
-        self._start = self._last = scheduler.now
+        self._last = scheduler.now
+        # A grid that all timers of this period share, so that one waking of the process serves several of them.
+        self._start = math.floor(scheduler.now / period) * period
         self._cycle = 0
         self._event = self._schedule()
 

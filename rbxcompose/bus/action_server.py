@@ -11,7 +11,7 @@ from rbxcompose.bus.names import ActionNames
 from rbxcompose.bus.services import Request, Server, Services
 from rbxcompose.bus.topics import Publisher, Topics
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo, GoalStatus, GoalStatusArray
-from rbxcompose.msgs.stamps import NANOSECONDS, to_time
+from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.types import Action, Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
 from rbxcompose.qos import Qos
@@ -26,6 +26,7 @@ class ServedGoal(Generic[G, R, F]):
 
     def __init__(self, server: ActionServer[G, R, F], goal: Goal[G, R]) -> None:
         self._server, self._goal = server, goal
+        self.is_paused = False  # it is to be held as it is
 
     @property
     def request(self) -> G:
@@ -65,7 +66,10 @@ class ActionServer(Generic[G, R, F]):
         name: str,
         action: type[Action[G, R, F]],
         accept: Callable[[G], str],
+        *,
+        waits: bool = False,
     ) -> None:
+        """With `waits`, goals wait until the node is open."""
         names = ActionNames.of(name)
         self.current: ServedGoal[G, R, F] | None = None  # the goal to carry out; a newer one replaces it
         self._name, self._action, self._accept = name, action, accept
@@ -77,7 +81,7 @@ class ActionServer(Generic[G, R, F]):
         self._servers: list[Server[Any, Any]] = [
             Server(services, node, names.cancel_goal, CancelGoal, self._on_cancel),
             Server(services, node, names.get_result, action.GetResult, self._on_get_result),
-            Server(services, node, names.send_goal, action.SendGoal, self._on_send, self._on_client_left),
+            Server(services, node, names.send_goal, action.SendGoal, self._on_send, self._on_client_left, waits=waits),
         ]
 
     def cancel_all(self) -> None:
@@ -144,7 +148,7 @@ class ActionServer(Generic[G, R, F]):
 
     def _on_cancel(self, request: Request[CancelGoal.Request, CancelGoal.Response]) -> None:
         info = request.message.goal_info
-        code, goals = self._goals.cancel(info.goal_id.uuid, info.stamp.sec * NANOSECONDS + info.stamp.nanosec)
+        code, goals = self._goals.cancel(info.goal_id.uuid, to_nanoseconds(info.stamp))
         self._tell_status()
         request.reply(CancelGoal.Response(return_code=code, goals_canceling=tuple(map(_info, goals))))
 

@@ -6,6 +6,7 @@ import struct
 from typing import NamedTuple
 
 _LAYOUT = struct.Struct("<qqB16s")
+_READ = struct.Struct("<qqx16s")
 _GID_SIZE = 16
 
 
@@ -21,13 +22,16 @@ class Attachment(NamedTuple):
         return _LAYOUT.pack(self.sequence, self.stamp, _GID_SIZE, self.gid)
 
 
+class AttachmentError(ValueError):
+    """Raised when bytes are not an attachment."""
+
+
 def decode_attachment(data: bytes) -> Attachment:
     """Read an attachment.
 
     Raises:
-        ValueError: if `data` is not one.
+        AttachmentError: if `data` is not one.
     """
     if len(data) != _LAYOUT.size or data[16] != _GID_SIZE:
-        raise ValueError(f"expected an attachment of {_LAYOUT.size} bytes, got {len(data)}")
-    sequence, stamp, _, sender = _LAYOUT.unpack(data)
-    return Attachment(sequence, stamp, sender)
+        raise AttachmentError(f"expected an attachment of {_LAYOUT.size} bytes, got {len(data)}")
+    return Attachment._make(_READ.unpack(data))

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeVar
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 from rbxcompose.bus.action_client import ActionClient
 from rbxcompose.bus.action_server import ActionServer
+from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.local import Node, Process
-from rbxcompose.bus.services import Client, Server, Services
+from rbxcompose.bus.services import Client, Request, Server, Services
+from rbxcompose.bus.tokens import publishers_pattern
 from rbxcompose.bus.topics import Publisher, Subscription, Topics
 from rbxcompose.bus.transport import Closable, Nowhere, Transport
+from rbxcompose.bus.window import Window
 from rbxcompose.bus.wire import WIRE_PROFILES
+from rbxcompose.bus.witness import Witness
+from rbxcompose.bus.writers import Writers
 from rbxcompose.clock import Clock
 from rbxcompose.msgs.types import Action, Message, Service
 from rbxcompose.qos import Qos
@@ -29,7 +34,8 @@ class Bus:
     """Connects the components of a process with each other and, over `transport`, with all others.
 
     An owner is a component's name; ROS knows it as a node. Names of topics, services and actions are relative to
-    `namespace` unless they start with `/`. Everything is called, and calls back, in the scheduler's thread.
+    `namespace` unless they start with `/`. Everything is called, and calls back, in the scheduler's thread. A
+    `witness` is told of each request and each reply, also within the process.
     """
 
     def __init__(
@@ -41,12 +47,13 @@ class Bus:
         namespace: str = "",
         wire: str = "jazzy",
         transport: Transport | None = None,
+        witness: Witness | None = None,
         log: Callable[[str, str], None],
     ) -> None:
         self._transport = transport if transport is not None else Nowhere()
         space = f"/{namespace.strip('/')}" if namespace else ""
         self._process = Process(scheduler, clock, self._transport, WIRE_PROFILES[wire], domain, space, log)
-        self._topics, self._services = Topics(), Services()
+        self._topics, self._services = Topics(), Services(witness=witness)
         self._nodes: dict[str, Node] = {}
 
     def __len__(self) -> int:
@@ -60,11 +67,22 @@ class Bus:
         return _kept(node, Publisher(self._topics, node, topic, message, qos))
 
     def subscribe(
-        self, owner: str, topic: str, message: type[M], qos: Qos, handler: Callable[[M], None]
+        self,
+        owner: str,
+        topic: str,
+        message: type[M],
+        qos: Qos,
+        handler: Callable[[M], None],
+        *,
+        max_rate: float | None = None,
     ) -> Subscription[M]:
-        """Have `handler` called with each message of a topic."""
+        """Have `handler` called with each message of a topic.
+
+        At most `max_rate` [Hz] are taken from each publisher of another process; None stands for what the class
+        allows.
+        """
         node = self._node(owner)
-        return _kept(node, Subscription(self._topics, node, topic, message, qos, handler))
+        return _kept(node, Subscription(self._topics, node, topic, message, qos, handler, max_rate))
 
     def serve(self, owner: str, name: str, service: type[Service[Q, R]], handler: Callable[[Q], R]) -> None:
         """Answer requests with what `handler` returns; if it raises, the caller gets the error instead.
@@ -74,22 +92,68 @@ class Bus:
         node = self._node(owner)
         _kept(node, Server(self._services, node, name, service, lambda asked: asked.reply(handler(asked.message))))
 
+    def serve_later(
+        self,
+        owner: str,
+        name: str,
+        service: type[Service[Q, R]],
+        handle: Callable[[Request[Q, R]], None],
+        *,
+        waits: bool = False,
+    ) -> None:
+        """Have `handle` see to it that each request is answered, now or later; with `waits`, none before `open`."""
+        node = self._node(owner)
+        _kept(node, Server(self._services, node, name, service, handle, waits=waits))
+
     def client(self, owner: str, name: str, service: type[Service[Q, R]]) -> Client[Q, R]:
         """Declare a client of a service; call it with a request."""
         node = self._node(owner)
         return _kept(node, Client(self._services, node, name, service))
 
     def serve_action(
-        self, owner: str, name: str, action: type[Action[G, R, F]], accept: Callable[[G], str]
+        self,
+        owner: str,
+        name: str,
+        action: type[Action[G, R, F]],
+        accept: Callable[[G], str],
+        *,
+        waits: bool = False,
     ) -> ActionServer[G, R, F]:
-        """Carry out goals; `accept` returns why it refuses one, or nothing."""
+        """Carry out goals, with `waits` none before `open`; `accept` returns why it refuses one, or nothing."""
         node = self._node(owner)
-        return _kept(node, ActionServer(self._topics, self._services, node, name, action, accept))
+        return _kept(node, ActionServer(self._topics, self._services, node, name, action, accept, waits=waits))
 
     def action_client(self, owner: str, name: str, action: type[Action[G, R, F]]) -> ActionClient[G, R, F]:
         """Declare a client of an action; call it with a goal."""
         node = self._node(owner)
         return _kept(node, ActionClient(self._topics, self._services, node, name, action))
+
+    @property
+    def subscriptions(self) -> Sequence[Subscription[Any]]:
+        """Return all that is subscribed to."""
+        return list(self._topics.subscriptions)
+
+    def watch_writers(self, owner: str) -> Writers:
+        """Follow who publishes in other processes."""
+        process, transport, writers = self._process, self._transport, Writers(self._transport.session)
+
+        def take(change: tuple[str, bool]) -> None:
+            writers.heard(change[0], process.clock.now(), is_there=change[1])
+
+        inbox = Inbox(owner, None, take, process.scheduler.post)
+        pattern = publishers_pattern(process.domain)
+        watched = transport.watch(pattern, lambda key, is_there: inbox.put((key, is_there), transport.wake))
+        self._node(owner).keep(watched)
+        return writers
+
+    def window(self, owner: str, key: str, answer: Callable[[], str]) -> Window:
+        """Let tools outside see something of a component at a key; `answer` returns the whole as JSON."""
+        node = self._node(owner)
+        return _kept(node, Window(node, key, answer))
+
+    def open(self, owner: str) -> None:
+        """Let a component have the requests and goals that have waited for it."""
+        self._node(owner).open()
 
     def close_owner(self, owner: str) -> None:
         """Withdraw all that a component declared: its goals end as aborted, their clients hear that it is lost."""

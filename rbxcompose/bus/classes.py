@@ -9,6 +9,7 @@ from rbxcompose.qos import Qos
 
 SERVICE_QOS = RosQos(depth=10)  # ROS's default for services
 
+COMMAND_RATE = 1000.0  # [Hz]; more commands than this are no control loop but a mistake
 LATCHED_QUEUE = 100  # several publishers may each have a latched message for one subscriber
 
 
@@ -42,6 +43,16 @@ def sending(qos: Qos) -> Sending:
 def queue_depth(qos: Qos) -> int:
     """Return how many messages a subscription holds before the oldest is dropped."""
     return LATCHED_QUEUE if qos is Qos.LATCHED else qos.depth
+
+
+def most_per_second(qos: Qos) -> float | None:
+    """Return how many messages a second a subscription takes from other processes [Hz], unless it says so itself."""
+    return COMMAND_RATE if qos is Qos.COMMAND else None
+
+
+def expects_speech(qos: Qos) -> bool:
+    """Tell whether a publisher that is there should be heard of before long."""
+    return qos in (Qos.STATE, Qos.LATCHED)
 
 
 def ros_qos(qos: Qos) -> RosQos:

@@ -31,6 +31,16 @@ class Inbox(Generic[T]):
             self._is_posted = True
             post(self._owner, self._take)
 
+    def hold(self) -> None:
+        """Let what comes wait until `go_on`."""
+        self._is_posted = True  # as if it was about to be taken
+
+    def go_on(self) -> None:
+        """Have what waits handled, and what comes."""
+        self._is_posted = bool(self._items)
+        if self._is_posted:
+            self._post(self._owner, self._take)
+
     @property
     def dropped(self) -> int:
         """Return how many items had to make room for newer ones."""

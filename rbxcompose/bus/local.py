@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from itertools import count
+from itertools import chain, count
 from typing import Generic, TypeVar
 
 from rbxcompose.bus.names import data_key, dds_type, resolve
@@ -27,6 +27,9 @@ class Registry(Generic[T]):
 
     def __len__(self) -> int:
         return sum(map(len, self._ends.values()))
+
+    def __iter__(self) -> Iterator[T]:
+        return chain.from_iterable(self._ends.values())
 
     def at(self, route: Route) -> list[T]:
         """Return the ends of `route`."""
@@ -76,6 +79,7 @@ class Node:
         self.owner = owner
         self._token = NodeToken(process.domain, process.transport.session, next(process.ids), owner, process.namespace)
         self._declared: list[Closable] = [process.transport.announce(self._token.key)]
+        self._closed_doors: list[Callable[[], None]] = []  # what opens them
 
     def endpoint(self, kind: EntityKind, name: str, interface: type[Interface], qos: RosQos) -> Endpoint:
         """Return the identity of a new end of this node."""
@@ -100,6 +104,15 @@ class Node:
     def keep(self, end: Closable) -> None:
         """Have `end` closed with the node."""
         self._declared.append(end)
+
+    def when_open(self, callback: Callable[[], None]) -> None:
+        """Have `callback` called by `open`."""
+        self._closed_doors.append(callback)
+
+    def open(self) -> None:
+        """Take the requests that have waited, and those that come."""
+        while self._closed_doors:
+            self._closed_doors.pop(0)()
 
     def close(self) -> None:
         """Withdraw all that was declared, the last first."""

@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 
 LONGEST_NAME = 247  # rmw's limit: 255 bytes less the prefixes that some middleware adds
+ADMIN = "rbx/"  # begins the keys that are not of ROS 2
 
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _DDS = re.compile(r"(\w+)::(\w+)::dds_::(\w+)_")
@@ -47,6 +48,11 @@ def ros_type(dds: str) -> str:
     """Return the ROS type that has this name in DDS; another text as it is."""
     found = _DDS.fullmatch(dds)
     return "/".join(found.groups()) if found else dds
+
+
+def admin_key(robot: str, path: str) -> str:
+    """Return the Zenoh key of what a robot shows to tools, apart from the topics of ROS 2."""
+    return f"{ADMIN}{robot}/{path}"
 
 
 def data_key(domain: int, full_name: str, ros_type: str, type_hash: str) -> str:

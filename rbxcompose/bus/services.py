@@ -15,6 +15,7 @@ from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.local import Node, Registry
 from rbxcompose.bus.tokens import EntityKind, gid, session_of
 from rbxcompose.bus.transport import Answer, Closable, Question
+from rbxcompose.bus.witness import Call, Witness
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.scheduler import Event
@@ -36,14 +37,17 @@ class Services:
 
     servers: Registry[Server[Any, Any]] = field(default_factory=Registry)
     clients: Registry[Client[Any, Any]] = field(default_factory=Registry)
+    witness: Witness | None = None
 
 
 class Request(Generic[Q, R]):
     """A request as its server sees it; it is answered once, now or later."""
 
-    def __init__(self, message: Q, client: bytes, answer: Answered[R]) -> None:
+    def __init__(self, message: Q, client: bytes, sequence: int, answer: Answered[R]) -> None:
         self.message = message
         self.client = client  # GID
+        self.sequence = sequence  # among those of its client
+        self.witness: Answered[R] | None = None  # hears the answer first
         self._answer: Answered[R] | None = answer
 
     @property
@@ -62,6 +66,8 @@ class Request(Generic[Q, R]):
     def _end(self, reply: Reply[R]) -> None:
         if self._answer is not None:
             answer, self._answer = self._answer, None
+            if self.witness is not None:
+                self.witness(reply)
             answer(reply)
 
 
@@ -76,16 +82,22 @@ class Server(Generic[Q, R]):
         service: type[Service[Q, R]],
         handle: Callable[[Request[Q, R]], None],
         client_left: Callable[[bytes], None] | None = None,
+        *,
+        waits: bool = False,
     ) -> None:
+        """With `waits`, requests wait until the node is open."""
         endpoint = node.endpoint(EntityKind.SERVER, name, service, SERVICE_QOS)
         self.route = endpoint.route
         self.malformed = 0  # requests that could not be read
-        self._services, self._process, self._owner, self._request = services, node.process, node.owner, service.Request
+        self._services, self._process, self._owner, self._service = services, node.process, node.owner, service
         self._handle, self._client_left = handle, client_left
         self._open: list[Request[Q, R]] = []
         post, transport = self._process.scheduler.post, self._process.transport
         self._inbox: Inbox[Request[Q, R] | Question] = Inbox(node.owner, LONGEST_QUEUE, self._take, post)
         self._left: Inbox[bytes] = Inbox(node.owner, None, self._leave, post)
+        if waits:
+            self._inbox.hold()
+            node.when_open(self._inbox.go_on)
         self._declared: list[Closable] = [
             transport.serve(endpoint.key, lambda asked: self._inbox.put(asked, transport.wake))
         ]
@@ -132,6 +144,8 @@ class Server(Generic[Q, R]):
         if request is not None:
             self._open = [earlier for earlier in self._open if earlier.is_open]
             self._open.append(request)
+            if self._services.witness is not None:
+                request.witness = partial(self._tell, self._services.witness, request)
             try:
                 self._handle(request)
             except Refused as refusal:
@@ -143,13 +157,17 @@ class Server(Generic[Q, R]):
     def _read(self, question: Question) -> Request[Q, R] | None:
         try:
             asker = decode_attachment(question.attachment)
-            return Request(decode(self._request, question.payload), asker.gid, partial(self._answer, question, asker))
+            message, answer = decode(self._service.Request, question.payload), partial(self._answer, question, asker)
+            return Request(message, asker.gid, asker.sequence, answer)
         except ValueError as error:
             question.fail(f"malformed request: {error}")
             self.malformed += 1
             if self.malformed == 1:
                 self._process.log(self._owner, f"dropped a request to {self.route[0]}: {error}")
             return None
+
+    def _tell(self, witness: Witness, request: Request[Q, R], reply: Reply[R]) -> None:
+        witness(Call(self._owner, self.route[0], self._service, request.client, request.sequence, True, reply.response))
 
     def _answer(self, question: Question, asker: Attachment, reply: Reply[R]) -> None:
         if reply.response is None:
@@ -182,7 +200,7 @@ class Client(Generic[Q, R]):
         endpoint = node.endpoint(EntityKind.CLIENT, name, service, SERVICE_QOS)
         self.route, self.gid = endpoint.route, endpoint.gid
         self._services, self._process, self._owner = services, node.process, node.owner
-        self._key, self._response = endpoint.key, service.Response
+        self._key, self._service = endpoint.key, service
         self._sequence = count(1)
         self._waiting: dict[int, _Waiting[R]] = {}
         self._servers: set[str] = set()  # tokens of servers in other processes
@@ -211,9 +229,11 @@ class Client(Generic[Q, R]):
         if math.isfinite(timeout):
             late = partial(self._end, sequence, Reply(None, f"no reply within {timeout:g} s"))
             waiting.timer = self._process.scheduler.at(self._process.scheduler.now + timeout, self._owner, late)
+        if self._services.witness is not None:
+            self._services.witness(Call(self._owner, self.route[0], self._service, self.gid, sequence, False, request))
         if local := self._services.servers.at(self.route):
             waiting.servers = frozenset()
-            local[0].ask(Request(request, self.gid, partial(self._answered, sequence)))
+            local[0].ask(Request(request, self.gid, sequence, partial(self._answered, sequence)))
         elif self._servers:
             source = Attachment(sequence, self._process.clock.stamp(), self.gid)
             waiting.remote = self._process.transport.ask(
@@ -269,7 +289,7 @@ class Client(Generic[Q, R]):
             self._end(sequence, Reply(None, answer.error))
             return
         try:
-            self._end(sequence, Reply(decode(self._response, answer.payload)))
+            self._end(sequence, Reply(decode(self._service.Response, answer.payload)))
         except ValueError as error:
             self._end(sequence, Reply(None, f"malformed reply: {error}"))
 

@@ -39,10 +39,10 @@ class NodeToken:
     def endpoint_key(self, kind: EntityKind, id: int, name: str, dds_type: str, type_hash: str, qos: str) -> str:
         """Return the text of the token of one of the node's endpoints."""
         start = f"{SPACE}/{self.domain}/{self.session}/{self.id}/{id}/{kind}/{self._place()}"
-        return f"{start}/{_mangle(name)}/{dds_type}/{type_hash}/{qos}"
+        return f"{start}/{mangle(name)}/{dds_type}/{type_hash}/{qos}"
 
     def _place(self) -> str:
-        return f"{_mangle(self.enclave)}/{_mangle(self.namespace)}/{self.name}"
+        return f"{mangle(self.enclave)}/{mangle(self.namespace)}/{self.name}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,12 @@ def parse_token(key: str) -> NodeToken | EndpointToken | None:
 def endpoint_pattern(domain: int, kind: EntityKind, name: str, dds_type: str, type_hash: str) -> str:
     """Return the key expression of all endpoints of one kind for one name and type."""
     # `**` also takes what newer versions append after the quality of service.
-    return f"{SPACE}/{domain}/*/*/*/{kind}/*/*/*/{_mangle(name)}/{dds_type}/{type_hash}/**"
+    return f"{SPACE}/{domain}/*/*/*/{kind}/*/*/*/{mangle(name)}/{dds_type}/{type_hash}/**"
+
+
+def publishers_pattern(domain: int) -> str:
+    """Return the key expression of all publishers of a domain."""
+    return f"{SPACE}/{domain}/*/*/*/{EntityKind.PUBLISHER}/**"
 
 
 def session_of(key: str) -> str:
@@ -95,7 +100,8 @@ def gid(key: str) -> bytes:
     return xxhash.xxh3_128_intdigest(key.encode()).to_bytes(16, "little")
 
 
-def _mangle(name: str) -> str:
+def mangle(name: str) -> str:
+    """Return a name as one chunk of a token's key."""
     return name.replace("/", "%") or "%"  # no chunk of a key may be empty
 
 

@@ -6,23 +6,26 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import count
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
-from rbxcompose.bus.attachment import Attachment, decode_attachment
-from rbxcompose.bus.classes import queue_depth, ros_qos
+from rbxcompose.bus.allowance import Allowances
+from rbxcompose.bus.attachment import Attachment, AttachmentError, decode_attachment
+from rbxcompose.bus.classes import expects_speech, most_per_second, queue_depth, ros_qos
 from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.local import Node, Registry
+from rbxcompose.bus.refusals import Refusal, Refusals
 from rbxcompose.bus.tokens import EntityKind
 from rbxcompose.bus.transport import Arrival
-from rbxcompose.msgs.cdr import decode, encode
+from rbxcompose.bus.writers import Reader
+from rbxcompose.msgs.cdr import CdrError, CdrLengthError, decode, encode
+from rbxcompose.msgs.finite import NotFiniteError, require_finite
 from rbxcompose.msgs.types import Message
 from rbxcompose.qos import Qos
 
 M = TypeVar("M", bound=Message)
 
 
-@dataclass(frozen=True, slots=True)
-class Delivery(Generic[M]):
+class Delivery(NamedTuple, Generic[M]):
     """A message on its way within the process, and where it comes from."""
 
     message: M
@@ -79,19 +82,33 @@ class Publisher(Generic[M]):
 
 
 class Subscription(Generic[M]):
-    """Hands the messages of a topic to `handler` and remembers the newest."""
+    """Hands the messages of a topic to `handler` and remembers the newest.
+
+    Of what each publisher of another process sends, no more is taken than `max_rate` [Hz]; None stands for what the
+    class allows.
+    """
 
     def __init__(
-        self, topics: Topics, node: Node, topic: str, message: type[M], qos: Qos, handler: Callable[[M], None]
+        self,
+        topics: Topics,
+        node: Node,
+        topic: str,
+        message: type[M],
+        qos: Qos,
+        handler: Callable[[M], None],
+        max_rate: float | None = None,
     ) -> None:
         endpoint = node.endpoint(EntityKind.SUBSCRIPTION, topic, message, ros_qos(qos))
         self.route = endpoint.route
         self.value: M | None = None
         self.source: Attachment | None = None  # of the newest message
-        self.malformed = 0  # messages that could not be read
-        self._topics, self._process, self._owner = topics, node.process, node.owner
+        self.refusals = Refusals()
+        self._topics, self._process, self._owner, self._qos = topics, node.process, node.owner, qos
         self._message, self._handler = message, handler
+        rate = max_rate or most_per_second(qos)
+        self._allowances = Allowances(rate) if rate is not None else None
         self._arrived = -math.inf  # [s] of robot time
+        self._has_complained = False  # in the log; diagnostics go on counting
         self._inbox: Inbox[tuple[float, Delivery[M] | Arrival]] = Inbox(
             node.owner, queue_depth(qos), self._take, node.process.scheduler.post
         )
@@ -113,6 +130,14 @@ class Subscription(Generic[M]):
         """Return how many messages were replaced by newer ones before they were handled."""
         return self._inbox.dropped
 
+    @property
+    def reader(self) -> Reader:
+        """Return what is asked of who publishes the topic elsewhere."""
+        type_hash = self._process.wire.hash_of(self._message)
+        is_part_of_an_action = "/_" in self.route[0]  # nobody speaks there as long as there is no goal
+        speaks = expects_speech(self._qos) and not is_part_of_an_action
+        return Reader(self._owner, self.route, type_hash, self._arrived, speaks)
+
     def deliver(self, delivery: Delivery[M]) -> None:
         """Queue a message of this process; it is handled at the same instant."""
         self._inbox.put((self._process.clock.now(), delivery), self._process.scheduler.post)
@@ -126,7 +151,21 @@ class Subscription(Generic[M]):
 
     def _arrive(self, arrival: Arrival) -> None:
         # In a thread of the transport: the age counts from here, however busy the scheduler is.
-        self._inbox.put((self._process.clock.now(), arrival), self._process.transport.wake)
+        now = self._process.clock.now()
+        if self._allowances is None or self._is_allowed(self._allowances, arrival, now):
+            self._inbox.put((now, arrival), self._process.transport.wake)
+
+    def _is_allowed(self, allowances: Allowances, arrival: Arrival, now: float) -> bool:
+        # What is refused here is said by diagnostics: it displaces nothing, and the scheduler is not even woken.
+        try:
+            source = decode_attachment(arrival.attachment)
+        except AttachmentError:
+            self.refusals.add(Refusal.ATTACHMENT)
+            return False
+        if not allowances.takes(source.gid, now):
+            self.refusals.add(Refusal.TOO_MANY)
+            return False
+        return True
 
     def _take(self, item: tuple[float, Delivery[M] | Arrival]) -> None:
         arrived, content = item
@@ -138,11 +177,26 @@ class Subscription(Generic[M]):
     def _read(self, arrival: Arrival) -> Delivery[M] | None:
         try:
             source = decode_attachment(arrival.attachment)
-            if self._topics.published_here(self, source):
+            if self._qos is Qos.LATCHED and self._topics.published_here(self, source):
                 return None  # the history of a latched topic brings our own messages back
-            return Delivery(decode(self._message, arrival.payload), source)
-        except ValueError as error:
-            self.malformed += 1
-            if self.malformed == 1:
-                self._process.log(self._owner, f"dropped a message on {self.route[0]}: {error}")
+            message = decode(self._message, arrival.payload)
+            if self._qos is Qos.COMMAND:
+                require_finite(message)
+        except (AttachmentError, CdrError, NotFiniteError) as error:
+            self._refuse(_REASONS[type(error)], str(error))
             return None
+        return Delivery(message, source)
+
+    def _refuse(self, reason: Refusal, detail: str) -> None:
+        self.refusals.add(reason)
+        if not self._has_complained:
+            self._has_complained = True
+            self._process.log(self._owner, f"dropped a message on {self.route[0]}: {detail}")
+
+
+_REASONS: dict[type[ValueError], Refusal] = {
+    AttachmentError: Refusal.ATTACHMENT,
+    CdrLengthError: Refusal.LENGTH,
+    CdrError: Refusal.CONTENT,
+    NotFiniteError: Refusal.NOT_FINITE,
+}

@@ -11,22 +11,28 @@ from collections.abc import Mapping
 
 import zenoh
 
+from rbxcompose.bus import shared_memory
+
 LEASE = 2000  # [ms] until a link that went silent counts as lost
 PATIENCE = 1000  # [ms] of a visitor with a router that does not answer
 
-_COMMON: Mapping[str, object] = {
-    "scouting/multicast/enabled": False,
-    "scouting/gossip/enabled": True,  # without it, two peers of one router never exchange anything
-    "scouting/delay": 0,  # a router would wait for as long before it opens
-    "timestamping/enabled": True,  # the caches of latched topics need it
-    "transport/link/tx/lease": LEASE,
-}
+
+def _common() -> dict[str, object]:
+    return {
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": True,  # without it, two peers of one router never exchange anything
+        "scouting/delay": 0,  # a router would wait for as long before it opens
+        "timestamping/enabled": True,  # the caches of latched topics need it
+        "transport/link/tx/lease": LEASE,
+        "transport/shared_memory/enabled": not shared_memory.problem(),  # else no session opens without room for it
+        "transport/shared_memory/transport_optimization/pool_size": shared_memory.POOL,
+    }
 
 
 def peer_settings(router: str) -> dict[str, object]:
     """Return the configuration of a peer that finds others through `router` (`tcp/127.0.0.1:7447`)."""
     return {
-        **_COMMON,
+        **_common(),
         "mode": "peer",
         "listen/endpoints": ["tcp/127.0.0.1:0"],  # other peers connect to it once they know of each other
         "connect/endpoints": [router],
@@ -39,7 +45,7 @@ def peer_settings(router: str) -> dict[str, object]:
 def router_settings(port: int) -> dict[str, object]:
     """Return the configuration of a router on the loopback interface."""
     return {
-        **_COMMON,
+        **_common(),
         "mode": "router",
         "listen/endpoints": [f"tcp/127.0.0.1:{port}"],
         "listen/timeout_ms": 0,
@@ -51,7 +57,7 @@ def router_settings(port: int) -> dict[str, object]:
 def client_settings(router: str) -> dict[str, object]:
     """Return the configuration of a visitor, which hears through `router` of everything at once."""
     return {
-        **_COMMON,
+        **_common(),
         "mode": "client",
         "connect/endpoints": [router],
         "connect/timeout_ms": PATIENCE,

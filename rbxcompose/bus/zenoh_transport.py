@@ -11,6 +11,7 @@ from zenoh.handlers import Callback
 
 from rbxcompose.bus.classes import SERVICE_SENDING, Sending, sending
 from rbxcompose.bus.inbox import Post
+from rbxcompose.bus.threads import keep_attached
 from rbxcompose.bus.transport import Answer, Arrival, Closable, Question, RemotePublisher
 from rbxcompose.qos import Qos
 
@@ -203,7 +204,11 @@ def _answer(reply: zenoh.Reply) -> Answer:
 
 
 def _direct(callback: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Callback[Any]:
-    return Callback(callback, drop, indirect=False)  # no thread and no bounded channel in between
+    def called(value: Any) -> None:
+        keep_attached()
+        callback(value)
+
+    return Callback(called, drop, indirect=False)  # no thread and no bounded channel in between
 
 
 def _options(how: Sending, *without: str) -> dict[str, Any]:

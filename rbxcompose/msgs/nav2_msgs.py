@@ -147,3 +147,136 @@ class NavigateToPose(Action["NavigateToPose.Goal", "NavigateToPose.Result", "Nav
 
         goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
         feedback: NavigateToPose.Feedback = field(default_factory=lambda: NavigateToPose.Feedback())
+
+
+class Wait(Action["Wait.Goal", "Wait.Result", "Wait.Feedback"]):
+    """Spend a time on something."""
+
+    TYPE: ClassVar[str] = "nav2_msgs/action/Wait"
+    HASH: ClassVar[str] = "RIHS01_0c5d418b19d8d009bb5bce6dca27687d9d43659016a70dc08307e38a032af2c3"
+
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `Wait`."""
+
+        TYPE: ClassVar[str] = "nav2_msgs/action/Wait_Goal"
+        HASH: ClassVar[str] = "RIHS01_f97998c3733188e43ba93a54a60da2b22dfe4de349548428002305925246edd9"
+        FIELDS: ClassVar[Fields] = {
+            "time": "builtin_interfaces/msg/Duration",
+        }
+
+        time: builtin_interfaces.Duration = field(default_factory=builtin_interfaces.Duration)
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `Wait`."""
+
+        TYPE: ClassVar[str] = "nav2_msgs/action/Wait_Result"
+        HASH: ClassVar[str] = "RIHS01_69a41e8b1d51db3993da45303f69fedf117fcd807d36543212f792743a534386"
+        FIELDS: ClassVar[Fields] = {
+            "total_elapsed_time": "builtin_interfaces/msg/Duration",
+            "error_code": "uint16",
+            "error_msg": "string",
+        }
+
+        NONE: ClassVar[int] = 0
+        GOAL_REJECTED: ClassVar[int] = 1
+        SEND_GOAL_FAILURE: ClassVar[int] = 2
+        UNKNOWN: ClassVar[int] = 740
+        TIMEOUT: ClassVar[int] = 741
+
+        total_elapsed_time: builtin_interfaces.Duration = field(default_factory=builtin_interfaces.Duration)
+        error_code: int = 0
+        error_msg: str = ""
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `Wait`."""
+
+        TYPE: ClassVar[str] = "nav2_msgs/action/Wait_Feedback"
+        HASH: ClassVar[str] = "RIHS01_2a934be90be8dae603a970758be0d6247555e14bffac46b28aa220154f19f228"
+        FIELDS: ClassVar[Fields] = {
+            "time_left": "builtin_interfaces/msg/Duration",
+        }
+
+        time_left: builtin_interfaces.Duration = field(default_factory=builtin_interfaces.Duration)
+
+    class SendGoal(Service["Wait.SendGoal.Request", "Wait.SendGoal.Response"]):
+        """Sends a goal of `Wait`."""
+
+        TYPE: ClassVar[str] = "nav2_msgs/action/Wait_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_aa768b9f4248c70a9c68fcf3a52f10300d4b0d21cad3cf39f01f4f3d248c2490"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `Wait.SendGoal`."""
+
+            TYPE: ClassVar[str] = "nav2_msgs/action/Wait_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_2153054419debd2560f3b9514eeda1b14b31f029ff03383a519568b5f67ba18a"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "nav2_msgs/action/Wait_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: Wait.Goal = field(default_factory=lambda: Wait.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `Wait.SendGoal`."""
+
+            TYPE: ClassVar[str] = "nav2_msgs/action/Wait_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_c35d8e343b336397c42c603c919b870fdcd7aecf283b1012ee8f8a1b3fcde811"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["Wait.GetResult.Request", "Wait.GetResult.Response"]):
+        """Waits for the result of a goal of `Wait`."""
+
+        TYPE: ClassVar[str] = "nav2_msgs/action/Wait_GetResult"
+        HASH: ClassVar[str] = "RIHS01_6fa1323df11147db06a24a126119f542104f535108774b930b8047cfa34df466"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `Wait.GetResult`."""
+
+            TYPE: ClassVar[str] = "nav2_msgs/action/Wait_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_6d9a1c73066f5e71b9da18b59e7bc30730492f41694432562e692fcec6da4c23"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `Wait.GetResult`."""
+
+            TYPE: ClassVar[str] = "nav2_msgs/action/Wait_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_c89ac345ba5364c16099f24b1166e1ca1dd13a0b0f7c7df283cf36f8948759cb"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "nav2_msgs/action/Wait_Result",
+            }
+
+            status: int = 0
+            result: Wait.Result = field(default_factory=lambda: Wait.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `Wait` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "nav2_msgs/action/Wait_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_cb143310afa60cc18ef814ac127a730d4ee190828ce9b9a943fa8f0cb1a09f7c"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "nav2_msgs/action/Wait_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: Wait.Feedback = field(default_factory=lambda: Wait.Feedback())

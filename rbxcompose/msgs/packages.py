@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from rbxcompose.msgs.definitions import INTERFACES, KINDS, interface_names, read
+from rbxcompose.msgs.joined import joined, parts
 
 OWN = "rbxcompose_msgs"
 """The package that no ROS 2 installation has."""
 
-_SEPARATOR = "=" * 80
 _XML = """<?xml version="1.0"?>
 <package format="3">
   <name>{package}</name>
@@ -49,21 +49,12 @@ def text_of(name: str) -> str:
 
 def parts_of(name: str) -> list[str]:
     """Return the names of the messages that an interface is made of, each once, what holds them first."""
-    found: list[str] = []
-    left = [name]
-    while left:
-        fields = [field for structure in read(left.pop(0)) for field in structure.fields]
-        fresh = dict.fromkeys(field.type.base for field in fields if field.type.is_message)
-        new = [one for one in fresh if one not in found]
-        found += new
-        left += new
-    return found
+    return parts(name, lambda one: [field.type for structure in read(one) for field in structure.fields])
 
 
 def whole_text(name: str) -> str:
     """Return the text of an interface and, each below a line of `=`, those of the messages that it is made of."""
-    parts = [f"{_SEPARATOR}\nMSG: {one.replace('/msg/', '/')}\n{text_of(one)}" for one in parts_of(name)]
-    return "".join([text_of(name), *parts])
+    return joined(name, parts_of(name), text_of)
 
 
 def package_files(package: str, version: str, licence: str) -> dict[str, str]:

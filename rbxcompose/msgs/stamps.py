@@ -13,7 +13,17 @@ def to_time(nanoseconds: int) -> Time:
     return Time(sec=sec, nanosec=nanosec)
 
 
+def to_nanoseconds(time: Time) -> int:
+    """Return a stamp of a message in [ns]."""
+    return time.sec * NANOSECONDS + time.nanosec
+
+
 def to_duration(seconds: float) -> Duration:
     """Return a length of time [s] as a message."""
     sec, nanosec = divmod(round(seconds * NANOSECONDS), NANOSECONDS)
     return Duration(sec=sec, nanosec=nanosec)
+
+
+def to_seconds(duration: Duration) -> float:
+    """Return a length of time in a message in [s]."""
+    return duration.sec + duration.nanosec / NANOSECONDS

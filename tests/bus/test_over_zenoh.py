@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import os
 import signal
 import socket
@@ -12,10 +13,14 @@ from typing import Any
 import pytest
 import zenoh
 
+from rbxcompose.bus.allowance import BURST
 from rbxcompose.bus.attachment import Attachment, decode_attachment
+from rbxcompose.bus.refusals import Refusal
 from rbxcompose.bus.tokens import EndpointToken, NodeToken, parse_token
 from rbxcompose.bus.zenoh_session import open_peer, open_router
+from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.example_interfaces import AddTwoInts
+from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.std_msgs import Float32, String
 from rbxcompose.msgs.unique_identifier_msgs import UUID
@@ -123,17 +128,58 @@ def test_a_slow_handler_does_not_stall_another_topic(network: Network, one: Conn
     assert flooded.dropped > 0
 
 
-def test_what_cannot_be_read_is_counted_and_logged_once(network: Network, one: Connected, other: Connected) -> None:
-    got: list[Float32] = []
-    heard = other.bus.subscribe("there", "level", Float32, Qos.EVENT, got.append)
-    publish = one.bus.publisher("battery", "level", Float32, Qos.EVENT)
+def test_bad_input_is_refused_counted_by_reason_and_logged_once(
+    network: Network, one: Connected, other: Connected
+) -> None:
+    got: list[Twist] = []
+    heard = other.bus.subscribe("base", "cmd_vel", Twist, Qos.COMMAND, got.append)
+    publish = one.bus.publisher("teleop", "cmd_vel", Twist, Qos.COMMAND)
     network.until(lambda: publish._remote.has_match)
-    publish._remote.put(b"\x00\x01\x00\x00", Attachment(1, 0, bytes(16)).encode())
-    publish._remote.put(b"\x00\x01\x00\x00\x00\x00\x00\x00", b"")
-    publish(Float32(data=1.0))
+    source, good = Attachment(1, 0, bytes(16)).encode(), encode(Twist())
+    bad = [
+        (good[:-1], source),
+        (good + bytes(8), source),
+        (good, b""),
+        (good, source + b"x"),
+        (b"\x07" + good, source),
+        (encode(Twist(linear=Vector3(x=math.nan))), source),
+        (encode(Twist(angular=Vector3(z=math.inf))), source),
+    ]
+    for number, (payload, attachment) in enumerate(bad, 1):  # one by one, since a command keeps only the newest
+        publish._remote.put(payload, attachment)
+        network.until(lambda number=number: heard.refusals.total == number)  # type: ignore[misc]
+    publish(Twist(linear=Vector3(x=0.1)))
     network.until(lambda: got)
-    assert (heard.malformed, len(other.log)) == (2, 1)
-    assert other.log[0][1].startswith("dropped a message on /level: ")
+    assert got == [Twist(linear=Vector3(x=0.1))]
+    assert heard.refusals.news() == {
+        Refusal.LENGTH: 2,
+        Refusal.ATTACHMENT: 2,
+        Refusal.CONTENT: 1,
+        Refusal.NOT_FINITE: 2,
+    }
+    assert [text.partition(":")[0] for _, text in other.log] == ["dropped a message on /cmd_vel"]
+
+
+def test_a_flood_of_commands_is_capped_before_anything_is_decoded_and_other_topics_go_on(
+    network: Network, one: Connected, other: Connected
+) -> None:
+    got: list[Twist] = []
+    levels: list[Float32] = []
+    heard = other.bus.subscribe("base", "cmd_vel", Twist, Qos.COMMAND, got.append, max_rate=50.0)
+    other.bus.subscribe("charger", "level", Float32, Qos.STATE, levels.append)
+    flood = one.bus.publisher("teleop", "cmd_vel", Twist, Qos.COMMAND)
+    level = one.bus.publisher("battery", "level", Float32, Qos.STATE)
+    network.until(lambda: flood._remote.has_match and level._remote.has_match)
+    payload, source = encode(Twist()), Attachment(1, 0, bytes(16)).encode()
+    started = other.clock.now()
+    for _ in range(5000):
+        flood._remote.put(payload, source)
+    level(Float32(data=0.5))
+    network.until(lambda: levels and got)
+    lasted = other.clock.now() - started
+    assert heard.refusals.total >= 5000 * 0.5  # what a congested link has dropped by itself does not count
+    assert heard._inbox._arrived <= 50.0 * (lasted + BURST)
+    assert set(heard.refusals.news()) == {Refusal.TOO_MANY}
 
 
 def test_another_type_on_the_same_topic_is_never_delivered(network: Network, one: Connected, other: Connected) -> None:

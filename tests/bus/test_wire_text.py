@@ -1,10 +1,14 @@
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.bus.attachment import Attachment, decode_attachment
+from rbxcompose.bus import wire
+from rbxcompose.bus.attachment import Attachment, AttachmentError, decode_attachment
 from rbxcompose.bus.classes import SERVICE_QOS, queue_depth, ros_qos, sending
 from rbxcompose.bus.names import ActionNames, data_key, dds_type, name_problem, resolve
 from rbxcompose.bus.tokens import (
@@ -190,3 +194,23 @@ def test_only_events_wait_on_a_congested_link_and_nothing_else_shares_their_prio
 def test_a_latched_queue_has_room_for_several_publishers() -> None:
     assert [queue_depth(qos) for qos in (Qos.COMMAND, Qos.STATE)] == [1, 10]
     assert queue_depth(Qos.LATCHED) > 1
+
+
+def test_only_the_profile_knows_in_what_distributions_differ() -> None:
+    files = [file for file in Path(wire.__file__).parent.glob("*.py") if file.name != "wire.py"]
+    known = re.compile(r"humble|kilted|lyrical|TypeHashNotSupported|\.HASH\b|DEFAULT_DEPTH")
+    assert [file.name for file in files if known.search(file.read_text(encoding="utf-8"))] == []
+
+
+@given(st.binary(max_size=40) | st.binary(min_size=33, max_size=33))
+def test_random_bytes_are_an_attachment_that_is_written_alike_or_an_error(data: bytes) -> None:
+    try:
+        attachment = decode_attachment(data)
+    except AttachmentError:
+        return
+    assert attachment.encode() == data
+
+
+@given(st.text(max_size=100) | st.lists(st.text(max_size=6) | st.sampled_from(SUBSCRIPTION.split("/"))).map("/".join))
+def test_any_text_is_a_token_or_none(key: str) -> None:
+    parse_token(key)

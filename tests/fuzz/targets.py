@@ -5,9 +5,15 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 
+from rbxcompose.bus.attachment import AttachmentError, decode_attachment
+from rbxcompose.bus.tokens import parse_token
 from rbxcompose.findings import Report
 from rbxcompose.formats import renderer
 from rbxcompose.manifest.reader import read_text
+from rbxcompose.msgs.cdr import HEADER, CdrError, decode
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.plan.dump import PlanTextError, dump, load
 from tests.properties.random_expressions import Trap, attempt
 
@@ -37,4 +43,14 @@ def plan(data: bytes) -> None:
         assert load(dump(read)) == read
 
 
-TARGETS: dict[str, Callable[[bytes], None]] = {"loader": loader, "expressions": expressions, "plan": plan}
+def wire(data: bytes) -> None:
+    """Read what another process may send: a message, an attachment, a token."""
+    for message in (Twist, DiagnosticArray, Odometry):
+        with contextlib.suppress(CdrError):
+            decode(message, HEADER + data)
+    with contextlib.suppress(AttachmentError):
+        assert decode_attachment(data).encode() == data
+    parse_token(data.decode("utf-8", "replace"))
+
+
+TARGETS: dict[str, Callable[[bytes], None]] = {"loader": loader, "expressions": expressions, "plan": plan, "wire": wire}

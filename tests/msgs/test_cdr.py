@@ -111,6 +111,11 @@ def test_up_to_three_bytes_of_filling_are_accepted_and_no_more() -> None:
         decode(String, payload + bytes(4))
 
 
+@given(any_message(), st.integers(0, 3))
+def test_a_message_is_the_same_with_and_without_filling(message: Message, filling: int) -> None:
+    assert encode(decode(type(message), encode(message) + bytes(filling))) == encode(message)
+
+
 def test_a_text_of_length_zero_is_read_as_empty() -> None:
     assert decode(String, HEADER + bytes(4)) == String()
 

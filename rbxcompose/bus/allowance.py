@@ -1,0 +1,55 @@
+"""How many messages a second an input takes. Pure: time is an argument."""
+
+from __future__ import annotations
+
+import math
+
+BURST = 0.1  # [s]; as much as may come in this time may also come at once
+MOST_SOURCES = 16  # with an allowance of their own
+QUIET = 1.0  # [s] of silence after which a source makes room for another one
+
+
+class Allowance:
+    """A token bucket: at most `rate` messages a second [Hz] in the long run."""
+
+    def __init__(self, rate: float) -> None:
+        self.rate = rate
+        self._most = max(1.0, rate * BURST)
+        self._left = self._most
+        self._filled = -math.inf
+
+    def is_quiet(self, now: float) -> bool:
+        """Tell whether nothing has come for a while."""
+        return now - self._filled > QUIET
+
+    def takes(self, now: float) -> bool:
+        """Tell whether a message that comes at `now` [s] is taken."""
+        self._left = min(self._most, self._left + max(0.0, now - self._filled) * self.rate)
+        self._filled = now
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
+class Allowances:
+    """An allowance for each source, so that one that sends too much costs the others nothing.
+
+    Beyond `MOST_SOURCES`, those that are new share one: else a name for each message would be a way around it.
+    """
+
+    def __init__(self, rate: float) -> None:
+        self._rate = rate
+        self._strangers = Allowance(rate)
+        self._own: dict[bytes, Allowance] = {}
+
+    def takes(self, source: bytes, now: float) -> bool:
+        """Tell whether a message of a source that comes at `now` [s] is taken."""
+        return (self._own.get(source) or self._of_new(source, now)).takes(now)
+
+    def _of_new(self, source: bytes, now: float) -> Allowance:
+        if len(self._own) >= MOST_SOURCES:
+            self._own = {name: one for name, one in self._own.items() if not one.is_quiet(now)}
+        if len(self._own) >= MOST_SOURCES:
+            return self._strangers
+        return self._own.setdefault(source, Allowance(self._rate))

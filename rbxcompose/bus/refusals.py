@@ -1,0 +1,49 @@
+"""Messages from outside that are not taken, counted by reason."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from itertools import count
+
+
+class Refusal(StrEnum):
+    """Why a message is refused; the words complete the sentence `12 messages were refused: ...`."""
+
+    TOO_MANY = "too many at once"
+    ATTACHMENT = "without the attachment of ROS"
+    LENGTH = "wrong length"
+    CONTENT = "unreadable content"
+    NOT_FINITE = "a number is not finite"
+
+
+class Refusals:
+    """Counts refusals. `add` may be called by any thread, all else only by the scheduler's."""
+
+    def __init__(self) -> None:
+        self._numbers = {reason: count(1) for reason in Refusal}  # `next` is one step even with several threads
+        self._counted = dict.fromkeys(Refusal, 0)
+        self._told = dict.fromkeys(Refusal, 0)
+
+    def add(self, reason: Refusal) -> None:
+        """Count one more."""
+        self._counted[reason] = next(self._numbers[reason])
+
+    @property
+    def total(self) -> int:
+        """Return how many messages have been refused."""
+        return sum(self._counted.values())
+
+    def news(self) -> dict[Refusal, int]:
+        """Return how many were refused since the last call, by reason."""
+        counted = dict(self._counted)
+        new = {reason: counted[reason] - self._told[reason] for reason in Refusal}
+        self._told = counted
+        return {reason: number for reason, number in new.items() if number > 0}
+
+
+def sentence(topic: str, news: dict[Refusal, int]) -> str:
+    """Say what has been refused on a topic."""
+    total = sum(news.values())
+    messages = "1 message was" if total == 1 else f"{total} messages were"
+    reasons = [reason if len(news) == 1 else f"{number} {reason}" for reason, number in news.items()]
+    return f"{messages} refused on {topic}: {', '.join(reasons)}"

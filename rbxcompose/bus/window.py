@@ -1,0 +1,68 @@
+"""Windows: what tools outside may see of a component, at a key of the robot's own and not as a topic of ROS 2.
+
+Who listens at the key hears what is new, who asks there gets the whole. Both are JSON of one shape (`SCHEMA`):
+`source` names the window, `sequence` counts the news from one, so that a listener notices what it missed, and `value`
+is what the component tells. A whole has the sequence of the last news that it contains. `missions/replica.py` is the
+other side.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+from rbxcompose.bus.inbox import Inbox
+from rbxcompose.bus.local import Node
+from rbxcompose.bus.transport import Question
+from rbxcompose.qos import Qos
+from rbxcompose.sdk.bound import Refused
+
+SCHEMA = 1
+GRACE = 2.0  # [s] after a question in which somebody counts as listening: the transport may know of it later
+
+
+class Window:
+    """Tells news to those who listen; `answer` returns the whole as JSON, or raises Refused with the reason."""
+
+    def __init__(self, node: Node, key: str, answer: Callable[[], str]) -> None:
+        process, transport = node.process, node.process.transport
+        self._source = f"{transport.session}/{next(process.ids)}"
+        self._clock, self._answer = process.clock, answer
+        self._sequence = 0
+        self._asked_at: float | None = None  # [s]
+        self._remote = transport.publisher(key, Qos.STATE)  # a viewer that is slow must not hold us up
+        inbox: Inbox[Question] = Inbox(node.owner, None, self._asked, process.scheduler.post)
+        self._server = transport.serve(key, lambda question: inbox.put(question, transport.wake))
+
+    @property
+    def is_watched(self) -> bool:
+        """Tell whether anybody would hear news."""
+        if self._remote.has_match:
+            return True
+        return self._asked_at is not None and self._clock.now() - self._asked_at <= GRACE
+
+    def put(self, value: object) -> None:
+        """Tell news, as data for JSON."""
+        self._sequence += 1
+        self._remote.put(self._message(value), b"")
+
+    def close(self) -> None:
+        """Withdraw it."""
+        self._server.close()
+        self._remote.close()
+
+    def _asked(self, question: Question) -> None:
+        self._asked_at = self._clock.now()
+        try:
+            value = json.loads(self._answer())
+        except Refused as refusal:
+            question.fail(str(refusal))
+        except Exception as error:
+            question.fail(f"{type(error).__name__}: {error}")
+            raise
+        else:
+            question.reply(self._message(value), b"")
+
+    def _message(self, value: object) -> bytes:
+        message = {"schema": SCHEMA, "source": self._source, "sequence": self._sequence, "value": value}
+        return json.dumps(message).encode()

@@ -1,0 +1,82 @@
+"""Who publishes elsewhere, read from tokens, and why nothing comes from there. Pure: time is an argument."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rbxcompose.bus.local import Route
+from rbxcompose.bus.names import ros_type
+from rbxcompose.bus.tokens import EndpointToken, EntityKind, parse_token
+
+SILENCE = 5.0  # [s] after which a publisher of a state, or of something latched, should have been heard
+
+
+@dataclass(frozen=True, slots=True)
+class Writer:
+    """A publisher in another process, and since when it is known [s]."""
+
+    token: EndpointToken
+    since: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """A subscription of this process as far as its writers matter; `arrived` [s] is when a message came last."""
+
+    owner: str
+    route: Route
+    type_hash: str
+    arrived: float
+    expects_speech: bool  # a writer that is there should be heard, as it is not with events and commands
+
+
+class Writers:
+    """The publishers of all other sessions, by topic."""
+
+    def __init__(self, session: str) -> None:
+        self._session = session
+        self._by_topic: dict[str, dict[str, Writer]] = {}
+
+    def heard(self, key: str, now: float, *, is_there: bool) -> None:
+        """Take a token that came or went."""
+        token = parse_token(key)
+        if not isinstance(token, EndpointToken) or token.kind is not EntityKind.PUBLISHER:
+            return
+        if token.node.session == self._session:
+            return
+        known = self._by_topic.setdefault(token.name, {})
+        if is_there:
+            known.setdefault(key, Writer(token, now))
+        else:
+            known.pop(key, None)
+        if not known:
+            del self._by_topic[token.name]
+
+    def trouble(self, reader: Reader, now: float, started: float) -> str:
+        """Say why `reader` gets nothing at `now` from a writer of its topic; empty if all is well.
+
+        Silence counts from `started` [s], when the whole robot had become active.
+        """
+        (topic, message), writers = reader.route, self._of(reader.route[0])
+        for writer in writers:
+            theirs = ros_type(writer.token.dds_type)
+            if theirs != message:
+                return f"'{_name(writer)}' publishes {theirs} on {topic}, '{reader.owner}' reads {message}"
+            if writer.token.type_hash != reader.type_hash:
+                version = f"another version of {message} on {topic}"
+                return f"'{_name(writer)}' publishes {version} than '{reader.owner}' reads"
+        if not writers or not reader.expects_speech:
+            return ""
+        since = max(started, min(writer.since for writer in writers))
+        if reader.arrived >= since or now - since <= SILENCE:
+            return ""
+        names = " and ".join(dict.fromkeys(f"'{_name(writer)}'" for writer in writers))
+        return f"'{reader.owner}' has heard nothing on {topic} for {now - since:.0f} s, though {names} publishes it"
+
+    def _of(self, topic: str) -> list[Writer]:
+        known = self._by_topic.get(topic, {})
+        return [known[key] for key in sorted(known)]
+
+
+def _name(writer: Writer) -> str:
+    return f"{writer.token.node.namespace}/{writer.token.node.name}".removeprefix("/")

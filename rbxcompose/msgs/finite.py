@@ -1,0 +1,82 @@
+"""Whether all numbers of a message are finite, as those of a command must be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+from operator import attrgetter
+from typing import Any
+
+from rbxcompose.msgs.arrays import holds_numbers
+from rbxcompose.msgs.definitions import FLOATS, FieldType, Shape, attribute, parse_type
+from rbxcompose.msgs.types import Message, declared
+
+Get = Callable[[Any], Any]
+Test = Callable[[Any], bool]
+Tests = tuple[tuple[Get, Test], ...]
+
+
+class NotFiniteError(ValueError):
+    """Raised when a number of a command is NaN or infinite."""
+
+
+def is_finite(message: Message) -> bool:
+    """Tell whether `message` holds neither NaN nor an infinity, however deep."""
+    tests = _tests.get(type(message))
+    if tests is None:
+        tests = _tests[type(message)] = _tests_of(type(message))
+    return all(test(get(message)) for get, test in tests)
+
+
+def require_finite(message: Message) -> None:
+    """Do nothing if all numbers of `message` are finite.
+
+    Raises:
+        NotFiniteError: if one is not.
+    """
+    if not is_finite(message):
+        raise NotFiniteError(f"a number in {message.TYPE} is not finite")
+
+
+_tests: dict[type[Message], Tests] = {}
+
+
+def _tests_of(message: type[Message]) -> Tests:
+    """Return the values that must be looked at, and how; single numbers, also of nested messages, at once."""
+    singles: list[str] = []
+    others: list[tuple[Get, Test]] = []
+    _collect(message, "", singles, others)
+    if len(singles) == 1:
+        others.append((attrgetter(*singles), isfinite))
+    elif singles:
+        others.append((attrgetter(*singles), _all_finite))
+    return tuple(others)
+
+
+def _collect(message: type[Message], prefix: str, singles: list[str], others: list[tuple[Get, Test]]) -> None:
+    for name, text in message.FIELDS.items():
+        type_, path = parse_type(text), prefix + attribute(name)
+        if type_.shape is Shape.SINGLE and type_.is_message:
+            _collect(declared[type_.base], f"{path}.", singles, others)
+        elif type_.shape is Shape.SINGLE and type_.base in FLOATS:
+            singles.append(path)
+        elif type_.shape is not Shape.SINGLE and (test := _test_of_many(type_)) is not None:
+            others.append((attrgetter(path), test))
+
+
+def _test_of_many(type_: FieldType) -> Test | None:
+    if type_.is_message:
+        return lambda values: all(map(is_finite, values))
+    if holds_numbers(type_) and type_.base in FLOATS:
+        return _is_finite_array
+    return None
+
+
+def _all_finite(values: tuple[float, ...]) -> bool:
+    return all(map(isfinite, values))
+
+
+def _is_finite_array(values: Any) -> bool:
+    import numpy as np
+
+    return bool(np.isfinite(values).all())
