@@ -1,4 +1,4 @@
-"""Robot time: the one clock that everything else is given, real or stepped.
+"""Robot time: the one clock that everything else is given: real, stepped, or told from outside.
 
 Robot time counts seconds from the start of the robot, on every host process alike. Motion deadlines use it and
 nothing else; wall-clock stamps are data for people and other programs, never a deadline.
@@ -7,9 +7,12 @@ nothing else; wall-clock stamps are data for people and other programs, never a 
 from __future__ import annotations
 
 import time
+from enum import Enum, auto
 from typing import Protocol
 
 NANOSECONDS = 1_000_000_000
+PATIENCE = 0.5  # [s] of real time without an advance, after which outside time stands still
+LEAP = 10.0  # [s] of outside time; a larger advance at once is a jump to another time
 
 
 class Clock(Protocol):
@@ -62,3 +65,65 @@ class SteppedClock:
         if t < self._now:
             raise ValueError(f"robot time cannot run backwards: {t} s is before {self._now} s")
         self._now = t
+
+
+class Turn(Enum):
+    """What has become of a time that is told from outside."""
+
+    GOES = auto()
+    STANDS = auto()
+    JUMPED = auto()
+
+
+class ExternalClock(SteppedClock):
+    """Follows a time told from outside, such as a simulator's `/clock`: a stepped clock that may go up to `limit`.
+
+    Robot time only goes forwards and by what the outside has advanced, wherever that begins to count; after a jump it
+    goes on from where it was. Real time [s] is an argument; it counts from when the clock begins to listen.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.limit = 0.0  # [s] of robot time that has been told
+        self.is_standing = True
+        self._outside: int | None = None  # [ns] as told last
+        self._shift = 0  # [ns] of outside time at robot time 0
+        self._moved_at = 0.0  # [s] of real time, of the last advance
+        self._has_told = False  # that time stands still
+
+    def stamp(self) -> int:
+        """Return outside time [ns] at this instant, as other programs that follow it write it."""
+        return super().stamp() + self._shift
+
+    def join(self, t: float) -> None:
+        """Begin at robot time `t` [s], which the other processes have reached."""
+        self.advance_to(t)
+        self.limit = t
+
+    def hear(self, outside: int, *, real: float) -> Turn | None:
+        """Take the time [ns] as the outside tells it; return what is new about it."""
+        before, self._outside = self._outside, outside
+        if before is None:
+            self._begin_here(outside)  # whether it goes is known from the next one
+            return None
+        if outside == before:
+            return None
+        was_standing, self.is_standing = self.is_standing, False
+        self._moved_at, self._has_told = real, False
+        if not 0 < outside - before <= LEAP * NANOSECONDS:
+            self._begin_here(outside)
+            return Turn.JUMPED
+        self.limit = max(self.limit, (outside - self._shift) / NANOSECONDS)
+        return Turn.GOES if was_standing else None
+
+    def look(self, *, real: float) -> Turn | None:
+        """Return `STANDS`, once, when the last advance lies too far back."""
+        if self._has_told or real - self._moved_at < PATIENCE:
+            return None
+        self._has_told = self.is_standing = True
+        return Turn.STANDS
+
+    def _begin_here(self, outside: int) -> None:
+        """Let the present instant be `outside` [ns]; what was told and has not been reached is left out."""
+        self.limit = self.now()
+        self._shift = outside - super().stamp()

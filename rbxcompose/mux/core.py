@@ -44,6 +44,7 @@ class MuxCore(Generic[M]):
         self._is_zero = is_zero
         self._stopped = stopped
         self._closed = False
+        self._held = False
         # Last moment at which a source is live. Who was talking before a restart is unknown, so then all count as live.
         self._input_until = dict.fromkeys(self._inputs, math.inf if stopped else -math.inf)
         self._lock_until = dict.fromkeys(self._locks, -math.inf)
@@ -52,6 +53,13 @@ class MuxCore(Generic[M]):
         self._active: str | None = None
         self._owes_zero = False  # something was let through, and no zero of our own has followed
         self._now = -math.inf
+
+    def take_over(self, old: MuxCore[M]) -> None:
+        """Know when the inputs and locks of the same names were heard last, and which must come to rest once."""
+        self._input_until |= {name: until for name, until in old._input_until.items() if name in self._inputs}
+        self._lock_until |= {name: until for name, until in old._lock_until.items() if name in self._locks}
+        self._neutral = old._neutral & self._inputs.keys()
+        self._waiting = old._waiting & self._inputs.keys()
 
     @property
     def active(self) -> str | None:
@@ -94,13 +102,14 @@ class MuxCore(Generic[M]):
     def next_deadline(self) -> float | None:
         """Return when `tick` must be called if nothing is heard before [s]; None if never.
 
-        It is the first moment after the timeout: exactly at its timeout a source still counts as live.
+        It is the first moment after a timeout: exactly at its timeout a source still counts as live.
         """
-        if self._active is None:
-            return self._now if self._owes_zero else None
-        priority = self._inputs[self._active].priority
-        ends = [self._lock_until[name] for name, lock in self._locks.items() if lock.priority > priority]
-        return math.nextafter(min([self._input_until[self._active], *ends]), math.inf)
+        if self._active is None and self._owes_zero:
+            return self._now
+        if self._is_shut:
+            return None
+        ends = (*self._input_until.values(), *self._lock_until.values())
+        return min((math.nextafter(end, math.inf) for end in ends if self._now <= end < math.inf), default=None)
 
     def stop(self, now: float) -> M:
         """Latch the lock `stop`; return the zero that is to be sent at once."""
@@ -122,6 +131,23 @@ class MuxCore(Generic[M]):
                     self._input_until[name] = min(self._input_until[name], now + source.timeout)
         self._settle(now)
 
+    def hold(self, now: float) -> M:
+        """Let nothing through until `resume`; return the zero that is to be sent at once."""
+        self._held = True
+        self._settle(now)
+        self._owes_zero = False
+        return self._zero
+
+    def resume(self, now: float) -> None:
+        """Let messages through again that come from now on: what was heard before counts as silent.
+
+        An input that must come to rest once still must.
+        """
+        self._held = False
+        self._input_until.update((name, -math.inf) for name in self._inputs if name not in self._waiting)
+        self._lock_until = dict.fromkeys(self._locks, -math.inf)
+        self._settle(now)
+
     def close(self, now: float) -> M:
         """Go down: return one last zero, after which neither `receive` nor `tick` lets anything out."""
         self._closed = True
@@ -129,37 +155,66 @@ class MuxCore(Generic[M]):
         self._owes_zero = False
         return self._zero
 
+    def locked_out(self, now: float) -> list[str]:
+        """Return the inputs that a lock holds back for want of a heartbeat; none where nothing may pass for a while.
+
+        Going down mends no lock, so that a mux which is closed tells them still.
+        """
+        if self._stopped or self._held:
+            return []
+        floor = self._floor(now)
+        return [name for name, one in self._inputs.items() if one.priority < floor]
+
+    def refused(self, now: float) -> list[str]:
+        """Return those that are locked out and speak nevertheless."""
+        locked = [] if self._closed else self.locked_out(now)
+        return [name for name in locked if self._is_live(name, now) and name not in self._waiting]
+
     def why(self, now: float) -> str:
         """Say in one sentence for people what holds the output at `now`."""
         if self._closed:
             return "closed: the robot is going down"
         if self._stopped:
             return "stopped"
+        if self._held:
+            return "held: robot time stands still"
+        told = [self._who_holds(now), *([self._who_locks(now)] if self.locked_out(now) else [])]
+        return "; ".join(filter(None, told)) or "no input"
+
+    def _who_holds(self, now: float) -> str:
         winner = self._winner(now)
         if winner is not None:
             return f"{winner} holds until {self._input_until[winner]:.2f} s"
-        live = [name for name in self._inputs if self._is_live(name, now)]
-        locked = [name for name in live if name not in self._waiting]
-        if locked:
-            return f"{' and '.join(self._silent_locks(now))} locked: no heartbeat"
-        if live:
-            return f"{' and '.join(live)} must come to rest once after the stop"
-        return "no input"
+        resting = [name for name in self._inputs if self._is_live(name, now) and name in self._waiting]
+        return f"{' and '.join(resting)} must come to rest once after the stop" if resting else ""
+
+    def _who_locks(self, now: float) -> str:
+        silent, out = self._silent_locks(now), self.locked_out(now)
+        locks = f"{' and '.join(silent)} give{'s' if len(silent) == 1 else ''} no heartbeat"
+        return f"{locks}: {' and '.join(out)} {'is' if len(out) == 1 else 'are'} locked out"
 
     def _settle(self, now: float) -> None:
         self._now = now
         self._active = self._winner(now)
 
     def _winner(self, now: float) -> str | None:
-        if self._stopped or self._closed:
+        if self._is_shut:
             return None
-        floor = max((self._locks[name].priority for name in self._silent_locks(now)), default=-math.inf)
+        floor = self._floor(now)
         candidates = [
             name
             for name, source in self._inputs.items()
             if source.priority >= floor and name not in self._waiting and self._is_live(name, now)
         ]
         return max(candidates, key=lambda name: self._inputs[name].priority, default=None)
+
+    @property
+    def _is_shut(self) -> bool:
+        return self._stopped or self._closed or self._held
+
+    def _floor(self, now: float) -> float:
+        """Return the least priority that passes."""
+        return max((self._locks[name].priority for name in self._silent_locks(now)), default=-math.inf)
 
     def _is_live(self, name: str, now: float) -> bool:
         return now <= self._input_until[name]

@@ -20,7 +20,7 @@ def build_plan(robot: Robot) -> Plan:
         robot=manifest.name,
         file=str(manifest.path),
         instances=tuple(_instance(robot.parts[name]) for name in order),
-        bus=BusPlan(bus.domain, bus.namespace or "", bus.port, bus.wire, bus.router),
+        bus=BusPlan(bus.domain, bus.namespace or "", bus.port, bus.wire, bus.router, bus.clock),
         start=manifest.start,
         is_simulated=manifest.is_simulated,
     )
@@ -28,4 +28,5 @@ def build_plan(robot: Robot) -> Plan:
 
 def _instance(part: Part) -> Instance:
     wires = tuple(Wire(end.name, end.port.kind, end.topic, end.type_name) for end in part.ends)
-    return Instance(part.name, part.type_name, part.config, part.process, part.starts_after, wires, part.restart)
+    after, restart = part.starts_after, part.restart
+    return Instance(part.name, part.type_name, part.config, part.process, after, wires, restart, part.log)

@@ -2,14 +2,14 @@
 
 The text is JSON. Types stand in no text: they are those of the plan's fields and of the components' configurations, so
 that loading a file makes nothing but plans. Configurations are validated again, missions are read again from their
-located tree. Maps are sorted by key, so that equal plans give equal texts.
+located tree. Maps are sorted by key, so that equal plans give equal texts, unless their order is to be kept.
 """
 
 from __future__ import annotations
 
 import json
 import types
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
@@ -26,6 +26,7 @@ from rbxcompose.missions.reading import read_program
 from rbxcompose.plan.located import node_of_data, node_to_data
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.plan.units import dimension_of_data, dimension_to_data
+from rbxcompose.plugins import BrokenPluginError
 from rbxcompose.sdk.registry import component_names, component_type
 from rbxcompose.units import Dimension, Quantity
 
@@ -33,13 +34,24 @@ VERSION = 1
 VERSION_KEY = "rbxcompose_plan"
 
 
+Order = Callable[[Iterable[tuple[str, Any]]], list[tuple[str, Any]]]  # brings the entries of a map in order
+
+
 class PlanTextError(ValueError):
     """Raised when a text is no plan that this installation can read."""
 
 
-def dump(plan: Plan) -> str:
-    """Return a plan as JSON; a secret is written as `***`."""
-    return json.dumps({VERSION_KEY: VERSION, **_encode(plan, Plan)}, ensure_ascii=False, indent=1) + "\n"
+def dump(plan: Plan, *, reveals_secrets: bool = False, keeps_order: bool = False) -> str:
+    """Return a plan as JSON; a secret is written as `***`, unless it is for the robot's own processes.
+
+    Components see the order of maps: that of analyzers is the order of groups in what is told of them.
+    """
+
+    def secret(value: Secret) -> str:
+        return value.reveal() if reveals_secrets else HIDDEN
+
+    data = {VERSION_KEY: VERSION, **_encode(plan, Plan, list if keeps_order else sorted)}
+    return json.dumps(data, ensure_ascii=False, indent=1, default=secret) + "\n"
 
 
 def load(text: str) -> Plan:
@@ -64,14 +76,14 @@ def load(text: str) -> Plan:
     return plan
 
 
-def _encode(value: Any, hint: Any) -> Any:
+def _encode(value: Any, hint: Any, order: Order) -> Any:
     """Return a value of a field's type as data for JSON."""
     hint = _plain_hint(hint)
     if hint in (Any, object):
         return _encode_free(value)
     match value:
         case Secret():
-            return HIDDEN
+            return value  # whoever writes the text decides what is shown of it
         case Program():
             return node_to_data(value.root)
         case Dimension():
@@ -79,14 +91,14 @@ def _encode(value: Any, hint: Any) -> Any:
         case Enum():
             return value.name
         case Mapping():
-            return {str(key): _encode(each, _item(hint)) for key, each in sorted(value.items())}
+            return {str(key): _encode(each, _item(hint), order) for key, each in order(value.items())}
         case frozenset() | set():
-            return sorted(_encode(each, _item(hint)) for each in value)
+            return sorted(_encode(each, _item(hint), order) for each in value)
         case tuple() | list():
-            return [_encode(each, _item(hint, index)) for index, each in enumerate(value)]
+            return [_encode(each, _item(hint, index), order) for index, each in enumerate(value)]
         case _ if isinstance(value, Config) or is_dataclass(value):
             cls: Any = type(value)
-            return {name: _encode(getattr(value, name), each) for name, each in _hints(cls).items()}
+            return {name: _encode(getattr(value, name), each, order) for name, each in _hints(cls).items()}
         case _:
             return to_jsonable_python(value)
 
@@ -95,7 +107,7 @@ def _encode_free(value: Any) -> Any:
     """Return a value of an expression as data: what is no plain value of JSON is a map with one key, its kind."""
     match value:
         case Place():
-            return {"place": _encode(value, Place)}
+            return {"place": _encode(value, Place, sorted)}
         case Mapping():
             return {"map": {str(key): _encode_free(each) for key, each in value.items()}}
         case list():
@@ -179,7 +191,10 @@ def _program(data: Any) -> Program:
 def _instance(data: Any) -> Instance:
     if data["type"] not in component_names():
         raise PlanTextError(f"no component type '{data['type']}' is installed")
-    config = _model(data["config"], component_type(data["type"]).config_type())
+    try:
+        config = _model(data["config"], component_type(data["type"]).config_type())
+    except BrokenPluginError as error:
+        raise PlanTextError(str(error)) from error
     others = {name: each for name, each in data.items() if name != "config"}
     return Instance(config=config, **_members(others, Instance))
 

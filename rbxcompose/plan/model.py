@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from rbxcompose.config import Config
+from rbxcompose.diagnostics.levels import Level
 from rbxcompose.restarts import DEFAULT, Restart
 
 STEPPED_GROUP = "robot"  # the one process group of a robot on a stepped clock
@@ -31,6 +32,7 @@ class Instance:
     starts_after: tuple[str, ...] = ()
     wires: tuple[Wire, ...] = ()
     restart: Restart = DEFAULT
+    log: Level = Level.OK  # the least of what goes to the log
 
     def topic(self, port: str) -> str:
         """Return the absolute name at a port.
@@ -53,6 +55,7 @@ class BusPlan:
     port: int = 7447
     wire: str = "jazzy"
     router: str | None = None
+    clock: str = "own"  # or `external`: robot time follows `/clock`
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +70,11 @@ class Plan:
     is_simulated: bool = True
 
     @property
+    def follows_clock(self) -> bool:
+        """Tell whether robot time is told from outside."""
+        return self.bus.clock == "external"
+
+    @property
     def groups(self) -> tuple[str, ...]:
         """Return the process groups, in the order in which their first instance starts."""
         return tuple(dict.fromkeys(instance.process for instance in self.instances))
@@ -78,3 +86,9 @@ class Plan:
     def in_one_process(self) -> Plan:
         """Return the same robot with all instances in one process group, as a stepped clock needs it."""
         return replace(self, instances=tuple(replace(one, process=STEPPED_GROUP) for one in self.instances))
+
+
+def extent(components: int, processes: int) -> str:
+    """Return in words how large a robot is: `2 components in 1 process`."""
+    component, process = "component" if components == 1 else "components", "process" if processes == 1 else "processes"
+    return f"{components} {component} in {processes} {process}"

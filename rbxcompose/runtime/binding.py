@@ -3,23 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from functools import partial
+from typing import Any, Protocol, cast
 
 from rbxcompose.body.transforms import TransformTree
+from rbxcompose.bus.action_server import ActionServer
 from rbxcompose.bus.bus import Bus
+from rbxcompose.bus.classes import queue_depth
+from rbxcompose.bus.services import Request
+from rbxcompose.missions.sources import PAUSE
+from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.plan.model import Instance
 from rbxcompose.runtime.frames import Lookup
+from rbxcompose.runtime.worker import Call, Worker
 from rbxcompose.sdk.bound import Refused
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction
 
-Refusal = Callable[[Port[Any]], str]  # why a goal or request cannot be taken now; empty if it can
+
+class Handling(Protocol):
+    """Who has a component do something."""
+
+    @property
+    def worker(self) -> Worker | None:
+        """Return the thread of the component, if it has one."""
+        ...
+
+    def refusal(self, port: Port[Any]) -> str:
+        """Return why a message, request or goal cannot be taken now; empty if it can."""
+        ...
+
+    def do(self, label: str, call: Callable[[], None], *, depth: int | None = None) -> None:
+        """Have `call` run by whichever thread the component belongs to."""
+        ...
 
 
-def bind(component: Component[Any], instance: Instance, bus: Bus, tree: TransformTree, refusal: Refusal) -> None:
-    """Fill `component.bound`; what arrives goes to its handlers unless `refusal` has a reason."""
+def bind(component: Component[Any], instance: Instance, bus: Bus, tree: TransformTree, handling: Handling) -> None:
+    """Fill `component.bound`; what arrives goes to its handlers unless there is a reason to refuse it."""
     for name, port in type(component).ports(component.config).items():
-        component.bound[name] = _end(component, instance, name, port, bus, tree, refusal)
+        component.bound[name] = _end(component, instance, name, port, bus, tree, handling)
 
 
 def _end(
@@ -29,7 +51,7 @@ def _end(
     port: Port[Any],
     bus: Bus,
     tree: TransformTree,
-    refusal: Refusal,
+    handling: Handling,
 ) -> object:
     owner, interface = instance.name, cast(Any, port.interface)
     match port:
@@ -38,46 +60,83 @@ def _end(
         case Out():
             return bus.publisher(owner, instance.topic(name), interface, port.qos)
         case In():
-            handler = _on_message(component, name, port, refusal)
-            return bus.subscribe(owner, instance.topic(name), interface, port.qos, handler)
+            handler = _on_message(component, name, port, handling)
+            return bus.subscribe(owner, instance.topic(name), interface, port.qos, handler, max_rate=port.max_rate)
         case Serves():
-            bus.serve(owner, instance.topic(name), interface, _on_request(component, name, port, refusal))
+            serve = _on_request(component, name, port, handling)
+            bus.serve_later(owner, instance.topic(name), interface, serve, waits=True)
             return None
         case Calls():
             return bus.client(owner, instance.topic(name), interface)
         case ServesAction():
-            return bus.serve_action(owner, instance.topic(name), interface, _on_goal(component, name, port, refusal))
+            topic = instance.topic(name)
+            accept = _on_goal(component, name, port, handling)
+            server = bus.serve_action(owner, topic, interface, accept, waits=True)
+            if port.pausable:
+                bus.serve(owner, f"{topic}/{PAUSE}", SetBool, partial(_pause, server, port, handling))
+            return server
         case CallsAction():
             return bus.action_client(owner, instance.topic(name), interface)
         case _:
             raise TypeError(f"'{instance.type}' has a port of an unknown kind: {port!r}")
 
 
-def _on_message(component: Component[Any], name: str, port: Port[Any], refusal: Refusal) -> Callable[[Any], None]:
+def _pause(
+    server: ActionServer[Any, Any, Any], port: Port[Any], handling: Handling, request: SetBool.Request
+) -> SetBool.Response:
+    """Hold the goal that is carried out, or let it go on; a robot that is stopped lets nothing go on."""
+    goal = server.current
+    if goal is None:
+        return SetBool.Response(success=False, message="no goal is being carried out")
+    if not request.data and (reason := handling.refusal(port)):
+        return SetBool.Response(success=False, message=reason)
+    goal.is_paused = request.data
+    return SetBool.Response(success=True)
+
+
+def _on_message(component: Component[Any], name: str, port: In[Any], handling: Handling) -> Callable[[Any], None]:
     own = getattr(component, f"on_{name}", None)
+    handler: Callable[[Any], None] = own if own is not None else partial(component.received, name)
+    label, depth = f"on_{name}", queue_depth(port.qos)
 
     def take(message: Any) -> None:
-        if refusal(port):
-            return  # it stays the newest value, for who asks
-        if own is not None:
-            own(message)
-        else:
-            component.received(name, message)
+        if not handling.refusal(port):  # if there is a reason, it stays the newest value, for who asks
+            handling.do(label, partial(handler, message), depth=depth)
 
     return take
 
 
-def _on_request(component: Component[Any], name: str, port: Port[Any], refusal: Refusal) -> Callable[[Any], Any]:
+def _on_request(
+    component: Component[Any], name: str, port: Port[Any], handling: Handling
+) -> Callable[[Request[Any, Any]], None]:
     answer = getattr(component, f"on_{name}")
 
-    def serve(request: Any) -> Any:
-        if reason := refusal(port):
+    def serve(request: Request[Any, Any]) -> None:
+        if reason := handling.refusal(port):
             raise Refused(reason)
-        return answer(request)
+        worker = handling.worker
+        send = worker.send if worker is not None else _at_once
+        handling.do(f"on_{name}", partial(_answer, request, answer, send))
 
     return serve
 
 
-def _on_goal(component: Component[Any], name: str, port: Port[Any], refusal: Refusal) -> Callable[[Any], str]:
+def _answer(request: Request[Any, Any], answer: Callable[[Any], Any], send: Callable[[Call], None]) -> None:
+    try:
+        response = answer(request.message)
+    except Refused as refusal:
+        send(partial(request.fail, str(refusal)))
+    except Exception as error:
+        send(partial(request.fail, f"{type(error).__name__}: {error}"))
+        raise
+    else:
+        send(partial(request.reply, response))
+
+
+def _at_once(call: Call) -> None:
+    call()
+
+
+def _on_goal(component: Component[Any], name: str, port: Port[Any], handling: Handling) -> Callable[[Any], str]:
     accept: Callable[[Any], str] = getattr(component, f"accept_{name}", lambda goal: "")
-    return lambda goal: refusal(port) or accept(goal)
+    return lambda goal: handling.refusal(port) or accept(goal)

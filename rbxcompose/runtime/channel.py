@@ -13,9 +13,10 @@ _CHUNK = 65536
 
 @dataclass(frozen=True, slots=True)
 class Configure:
-    """Open the bus (at this router, if any) and configure all components."""
+    """Open the bus (at this router, if any) and configure all components; robot time [s] is `time` or later."""
 
     router: str | None
+    time: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +64,54 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
+class Query:
+    """A question to one component, which changes nothing; `Answer` carries the same number."""
+
+    number: int
+    instance: str
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Adopt:
+    """Before `Configure`: this plan holds, as text, and not the one that the process was forked with."""
+
+    plan: str
+
+
+@dataclass(frozen=True, slots=True)
+class Retire:
+    """Bring these components to rest, in this order, and forget them; then say `Retired`."""
+
+    names: list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Prepare:
+    """Configure the components of this plan, as text, beside those that run; then say `Configured`."""
+
+    plan: str
+
+
+@dataclass(frozen=True, slots=True)
+class Reconfigure:
+    """Let components follow their settings in this plan, as text; then say `Reconfigured`.
+
+    `keys` are the settings that have changed, by component: what `param set` did to others stays.
+    """
+
+    plan: str
+    keys: dict[str, list[str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Blocked:
+    """What of this process cannot do its work, and why; whoever is not named, can."""
+
+    causes: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
 class Shutdown:
     """Send `Summary`, deactivate, clean up and end."""
 
@@ -96,7 +145,7 @@ class Notify:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What came of a `Command`."""
+    """What came of a `Command` or a `Query`."""
 
     number: int
     text: str
@@ -112,21 +161,51 @@ class Summary:
 
 
 @dataclass(frozen=True, slots=True)
+class Retired:
+    """What was to be retired has gone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reconfigured:
+    """Components follow their new settings, but for those that have `refused`, by name with the reason."""
+
+    refused: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
 class Alive:
-    """The loop of the process turns; its robot time [s]."""
+    """The loop of the process turns; its robot time [s], what moves the robot, and at what components are."""
 
     time: float
+    moves: list[str] = field(default_factory=list)
+    runs: dict[str, str] = field(default_factory=dict)
 
 
-Order = Configure | Activate | Start | Stop | Release | Brake | Lost | Command | Shutdown
-Word = Configured | States | AtRest | Notify | Answer | Summary | Alive
+Order = (
+    Configure
+    | Activate
+    | Start
+    | Stop
+    | Release
+    | Brake
+    | Lost
+    | Command
+    | Query
+    | Adopt
+    | Retire
+    | Prepare
+    | Reconfigure
+    | Blocked
+    | Shutdown
+)
+Word = Configured | States | AtRest | Notify | Answer | Summary | Retired | Reconfigured | Alive
 Message = Order | Word
 
 _TYPES: dict[str, type[Message]] = {
     one.__name__.lower(): one
     for one in (
-        Configure, Activate, Start, Stop, Release, Brake, Lost, Command, Shutdown,
-        Configured, States, AtRest, Notify, Answer, Summary, Alive,
+        Configure, Activate, Start, Stop, Release, Brake, Lost, Command, Query, Adopt, Retire, Prepare, Reconfigure,
+        Blocked, Shutdown, Configured, States, AtRest, Notify, Answer, Summary, Retired, Reconfigured, Alive,
     )
 }  # fmt: skip
 

@@ -16,9 +16,14 @@ from pathlib import Path
 
 from rbxcompose.runtime.folder import SOCKET, RobotFolder
 
-_MOST = 65536  # [B] of a request
-_BACKLOG = 16
+_MOST = 64_000_000  # [B] of a request; the plan of a large robot is one
+_CHUNK = 262144  # [B] that are read at once
+_BACKLOG = 128
+_MOST_OPEN = 64  # connections; a program that forgets to close its own must not shut out `stop`
+_TIMEVAL = struct.Struct("ll")  # seconds, microseconds
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
+
+ANSWER = 2.0  # [s] in which a supervisor that is there answers
 
 Handle = Callable[[dict[str, object], int], None]  # request, number of the connection
 
@@ -75,13 +80,15 @@ class ControlServer:
     def _accept(self) -> None:
         try:
             connection, _ = self._listener.accept()
-        except BlockingIOError:
-            return
+        except OSError:
+            return  # it has gone again
         credentials = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
         if _CREDENTIALS.unpack(credentials)[1] != os.getuid():
             connection.close()
             return
         connection.setblocking(False)
+        if len(self._connections) >= _MOST_OPEN:
+            self._drop(next(iter(self._connections)))  # the oldest
         self._count += 1
         number = self._count
         self._connections[number] = (connection, bytearray())
@@ -90,10 +97,10 @@ class ControlServer:
     def _read(self, number: int) -> None:
         connection, received = self._connections[number]
         try:
-            chunk = connection.recv(_MOST)
+            chunk = connection.recv(_CHUNK)
         except BlockingIOError:
             return
-        except ConnectionResetError:
+        except OSError:
             chunk = b""
         received += chunk
         if not chunk or len(received) > _MOST:
@@ -105,7 +112,7 @@ class ControlServer:
     def _request(self, number: int, line: bytes) -> None:
         try:
             request = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):  # no JSON, or nested without end
             request = None
         if isinstance(request, dict):
             self.handle(request, number)
@@ -127,7 +134,11 @@ class ControlServer:
         connection.close()
 
 
-def ask(folder: RobotFolder, request: dict[str, object], *, timeout: float = 2.0) -> object:
+def _micros(seconds: float) -> int:
+    return int(seconds % 1 * 1e6)
+
+
+def ask(folder: RobotFolder, request: dict[str, object], *, timeout: float = ANSWER) -> object:
     """Send a request to a robot's supervisor and return the answer.
 
     Raises:
@@ -136,8 +147,10 @@ def ask(folder: RobotFolder, request: dict[str, object], *, timeout: float = 2.0
     """
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection, _short_address(folder.path) as address:
-            connection.settimeout(timeout)
+            # Blocking, but for so long: without blocking, a door with others waiting before it is an error at once.
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _TIMEVAL.pack(int(timeout), _micros(timeout)))
             connection.connect(address)
+            connection.settimeout(timeout)
             connection.sendall(json.dumps(request).encode() + b"\n")
             with connection.makefile("rb") as file:
                 line = file.readline()

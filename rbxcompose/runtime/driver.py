@@ -1,18 +1,20 @@
-"""What turns the scheduler of a process: the real-time driver and the stepped driver, one thread each."""
+"""What turns the scheduler of a process: a driver for each way in which time goes, one thread each."""
 
 from __future__ import annotations
 
 import selectors
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from rbxcompose.clock import MonotonicClock, SteppedClock
+from rbxcompose.clock import Clock, ExternalClock, MonotonicClock, SteppedClock, Turn
 from rbxcompose.runtime.channel import Channel, Message
 from rbxcompose.runtime.inbox import Inbox
 from rbxcompose.scheduler import Scheduler
 
 BEAT = 0.25  # [s] of real time between signs of life
+LOOK = 0.1  # [s] of real time between looks whether outside time still goes
+SLICE = 0.05  # [s] of real time for catching up with outside time, before messages are heard again
 
 
 class Driven(Protocol):
@@ -165,6 +167,57 @@ class SteppedDriver(Driver):
     def _advance(self) -> None:
         if self._pause() <= 0 and (following := self._next()) is not None:
             self._clock.advance_to(max(following, self._clock.now()))
+        self._run_present()
+
+    def _run_present(self) -> None:
+        self._scheduler.advance(self._clock.now())
+
+
+class ExternalDriver(Driver):
+    """Robot time follows `hear`, event by event, so that a step is run for each instant at which it was due.
+
+    `turned` is told when that time stands still, goes, or has jumped.
+    """
+
+    def __init__(
+        self,
+        scheduler: Scheduler,
+        clock: ExternalClock,
+        inbox: Inbox,
+        channel: Channel,
+        driven: Driven,
+        turned: Callable[[Turn], None],
+    ) -> None:
+        super().__init__(scheduler, inbox, channel, driven)
+        self._clock, self._turned = clock, turned
+        self._real: Clock | None = None  # since it follows
+
+    def follow(self, real: Clock) -> None:
+        """Begin to listen: from now on `hear` is called, or time stands still. `real` counts from now."""
+        self._real = real
+
+    def hear(self, outside: int) -> None:
+        """Take outside time [ns]."""
+        if self._real is not None:
+            self._tell(self._clock.hear(outside, real=self._real.now()))
+
+    def _tell(self, turn: Turn | None) -> None:
+        if turn is not None:
+            self._turned(turn)
+
+    def _pause(self) -> float:
+        return 0.0 if self._clock.now() < self._clock.limit else LOOK
+
+    def _advance(self) -> None:
+        self._run_present()
+        if self._real is not None:
+            self._tell(self._clock.look(real=self._real.now()))
+        until = time.monotonic() + SLICE
+        while self._clock.now() < self._clock.limit and time.monotonic() < until:
+            due = self._scheduler.next_due()
+            following = self._clock.limit if due is None else min(due, self._clock.limit)
+            self._clock.advance_to(max(following, self._clock.now()))
+            self._run_present()
         self._run_present()
 
     def _run_present(self) -> None:

@@ -12,12 +12,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from rbxcompose.replacing import TEMPORARY, replace_file
 from rbxcompose.runtime.processes import Process, boot_id
 
 STATE, LOCK, SOCKET = "state.json", "lock", "control.sock"
 _VERSION = 1
-_TEMPORARY = ".new"
 _PASSING = (STATE, SOCKET, LOCK)  # what goes when the robot is down; the log stays
+
+
+SUSPENDED = "suspended"
+"""State in `ps` of a component whose process a signal keeps from running."""
+SILENT = "silent"
+"""State in `ps` of a component whose process gives no sign of life."""
 
 
 class UnsafeFolderError(OSError):
@@ -38,6 +44,7 @@ class ComponentState:
     process: str
     pid: int | None
     restarts: int
+    waits_for: str | None = None  # the failed component without which it cannot do its work
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,21 +167,7 @@ class RobotFolder:
 
     def write_state(self, state: State) -> None:
         """Replace the state file: whole or not at all, whatever happens meanwhile."""
-        temporary = self.path / f"{STATE}.{os.getpid()}{_TEMPORARY}"
-        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-        with open(descriptor, "w", encoding="utf-8") as file:
-            file.write(state.to_text())
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, self.path / STATE)
-        self._sync()
-
-    def _sync(self) -> None:
-        descriptor = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        replace_file(self.path / STATE, state.to_text().encode(), mode=0o600)
 
     def sweep(self) -> None:
         """Remove what a run that was killed has left: temporary files, outputs, its socket. Needs the lock."""
@@ -188,6 +181,6 @@ class RobotFolder:
             (self.path / name).unlink(missing_ok=True)
 
     def _leftovers(self) -> Iterator[Path]:
-        yield from self.path.glob(f"*{_TEMPORARY}")
+        yield from self.path.glob(f"*{TEMPORARY}")
         yield from self.path.glob("*.out")
         yield self.path / SOCKET

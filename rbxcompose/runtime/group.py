@@ -6,29 +6,47 @@ import faulthandler
 import gc
 import os
 import signal
-from collections.abc import Sequence
+import threading
+from collections.abc import Callable, Sequence
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from rbxcompose.bus.bus import Bus
-from rbxcompose.clock import MonotonicClock, SteppedClock
+from rbxcompose.clock import ExternalClock, MonotonicClock, SteppedClock, Turn
 from rbxcompose.diagnostics.levels import Level
+from rbxcompose.msgs.rosgraph_msgs import Clock as ClockMessage
+from rbxcompose.msgs.stamps import to_nanoseconds
+from rbxcompose.plan.dump import load
 from rbxcompose.plan.model import Plan
+from rbxcompose.qos import Qos
 from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.capture import Capture, take_printed
 from rbxcompose.runtime.connection import open_bus
-from rbxcompose.runtime.driver import Driver, RealTimeDriver, SteppedDriver
+from rbxcompose.runtime.driver import Driver, ExternalDriver, RealTimeDriver, SteppedDriver
 from rbxcompose.runtime.host import Host
 from rbxcompose.runtime.inbox import Inbox
+from rbxcompose.runtime.lifeline import Lifeline
 from rbxcompose.runtime.log import LogFile
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.bound import Refused
 
+if TYPE_CHECKING:
+    from rbxcompose.runtime.taping import Taping
+
 HANG = 2.0  # [s] without a turn of the loop after which the process ends itself
 LONGEST_CONFIGURE = 30.0  # [s]
 LONGEST_CLOSE = 1.0  # [s] to deactivate, clean up and leave the bus
 REST_BOUND = 1.0  # [s] of robot time to come to rest when the supervisor has gone
 STEPPED_REST_BOUND = 2.0  # [s] of robot time to come to rest on a stepped clock
+CLOCK_TOPIC = "/clock"
+CLOCK_STATUS = "bus.clock"  # what diagnostics call it: no component has a dot in its name
+_TOLD = {
+    Turn.GOES: (Level.OK, f"{CLOCK_TOPIC} goes: robot time goes with it, and each deadline counts anew"),
+    Turn.STANDS: (Level.STALE, f"{CLOCK_TOPIC} does not go on: robot time stands still, only rest is commanded"),
+    Turn.JUMPED: (Level.WARN, f"{CLOCK_TOPIC} has jumped: robot time goes on from here, each deadline counts anew"),
+}
 
 
 class Group:
@@ -50,10 +68,12 @@ class Group:
         self.is_over = False
         self._plan, self._name, self._options, self._log, self._channel = plan, name, options, log, channel
         self._is_restart, self._is_stopped = is_restart, is_stopped
-        self._clock = SteppedClock() if options.is_stepped else MonotonicClock(start)
+        self._clock = self._made_clock(start)
         self._scheduler = Scheduler()
         self._inbox = Inbox()
         self._bus: Bus | None = None
+        self._lifeline: Lifeline | None = None
+        self._taping: Taping | None = None
         self._host: Host | None = None
         self._driver = self._made_driver()
         self._has_begun = False  # something has been activated, and may move
@@ -67,10 +87,13 @@ class Group:
         signal.signal(signal.SIGTERM, self._on_sigterm)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGTERM])
         try:
-            self._driver.run()
+            with Capture(self._printed):
+                self._driver.run()
         finally:
             if self._bus is not None:
                 self._bus.close()
+            if self._taping is not None:
+                self._taping.finish()
 
     # What the driver asks
 
@@ -79,8 +102,8 @@ class Group:
         if isinstance(message, say.Stop | say.Release | say.Command):
             self._mind_outside(message)
         match message:
-            case say.Configure(str(router)):
-                self._configure(router)
+            case say.Configure(str(router), time):
+                self._configure(router, time)
             case say.Activate(names):
                 self._activate(names)
             case say.Start():
@@ -94,7 +117,15 @@ class Group:
             case say.Lost(names, cause):
                 self._made_host().lost(names, cause)
             case say.Command(number, instance, verb):
-                self._command(number, instance, verb)
+                self._answer(number, lambda host: host.command(instance, verb))
+            case say.Query(number, instance, words):
+                self._answer(number, lambda host: host.query(instance, words))
+            case say.Adopt(plan):
+                self._plan = load(plan)
+            case say.Retire() | say.Prepare() | say.Reconfigure():
+                self._change(self._made_host(), message)
+            case say.Blocked(causes):
+                self._made_host().statuses.block(causes)
             case say.Shutdown():
                 self._shutdown()
             case _:
@@ -108,9 +139,19 @@ class Group:
     def beat(self) -> None:
         """Tell the supervisor, and the watchdog, that the loop turns."""
         self._watch(HANG)
+        if self._taping is not None:
+            self._taping.keep()
+        if not self._options.is_stepped:  # its log must be the same in each run
+            for line in take_printed():
+                self._printed(Level.WARN, line, "")
+        if self._lifeline is not None and not self._options.is_stepped:  # then all is in this process
+            self._lifeline.beat()
+        if self._host is not None:
+            self._host.look_at_workers()
         self._channel.flush()
         if not self._channel.is_behind:
-            self._channel.send(say.Alive(self._clock.now()))
+            moves, runs = self._host.work() if self._host is not None else ([], {})
+            self._channel.send(say.Alive(self._clock.now(), moves, runs))
 
     def settle(self) -> None:
         """Look whether the run is to end, whether it has come to rest, and whether nobody leads it any more."""
@@ -126,10 +167,21 @@ class Group:
 
     # Messages
 
-    def _configure(self, router: str) -> None:
+    def _configure(self, router: str, time: float) -> None:
         self._watch(LONGEST_CONFIGURE)
+        if isinstance(self._clock, ExternalClock):
+            self._clock.join(time)
+            self._scheduler.advance(time)
         instances = self._plan.of_group(self._name)
-        self._bus = open_bus(self._plan, router, self._scheduler, self._clock, self._inbox, self._complain)
+        if self._options.record is not None:
+            from rbxcompose.runtime.taping import Taping  # only a recorded run needs MCAP
+
+            self._taping = Taping(
+                self._options.record, self._plan, self._clock, lambda text: self._complain("robot", text)
+            )
+        tape = self._taping.tape if self._taping else None
+        connection = open_bus(self._plan, router, self._scheduler, self._clock, self._inbox, self._complain, tape)
+        self._bus, self._lifeline = connection.bus, connection.lifeline
         self._host = Host(
             self._plan,
             instances,
@@ -140,7 +192,11 @@ class Group:
             self._notify,
             is_stopped=self._is_stopped,
             is_restart=self._is_restart,
+            **({"told": tape.order} if tape else {}),
+            post=self._inbox.put if isinstance(self._clock, MonotonicClock) else None,
         )
+        if isinstance(self._driver, ExternalDriver):
+            self._follow(self._driver, self._host)
         self._host.configure()
         self._watch(HANG)
         self._channel.send(say.Configured())
@@ -157,11 +213,24 @@ class Group:
         if isinstance(self._driver, SteppedDriver):
             self._driver.go(self._options.duration)
 
-    def _command(self, number: int, instance: str, verb: str) -> None:
+    def _answer(self, number: int, ask: Callable[[Host], str]) -> None:
         try:
-            self._channel.send(say.Answer(number, self._made_host().command(instance, verb)))
+            self._channel.send(say.Answer(number, ask(self._made_host())))
         except Refused as refusal:
             self._channel.send(say.Answer(number, str(refusal), is_refused=True))
+
+    def _change(self, host: Host, message: say.Retire | say.Prepare | say.Reconfigure) -> None:
+        self._watch(LONGEST_CONFIGURE)
+        match message:
+            case say.Retire(names):
+                host.retire(names)
+                self._channel.send(say.Retired())
+            case say.Prepare(plan):
+                host.prepare(load(plan).instances)
+                self._channel.send(say.Configured())
+            case say.Reconfigure(plan, keys):
+                self._channel.send(say.Reconfigured(host.follow(load(plan).instances, keys)))
+        self._watch(HANG)
 
     def _shutdown(self) -> None:
         self._watch(LONGEST_CLOSE)  # nothing moves any more: what hangs now is cut off
@@ -195,16 +264,51 @@ class Group:
             self._driver.go(self._rest_deadline)
 
     def _look_for_rest(self, host: Host, deadline: float) -> None:
-        if not host.is_at_rest and self._clock.now() < deadline:
+        stands_still = isinstance(self._clock, ExternalClock) and self._clock.is_standing
+        if not host.is_at_rest and self._clock.now() < deadline and not stands_still:
             return
         self._is_settled = True
         if isinstance(self._driver, SteppedDriver):
             self._driver.halt()
         self._channel.send(say.AtRest())
 
+    # Time from outside
+
+    def _follow(self, driver: ExternalDriver, host: Host) -> None:
+        """Take robot time from the bus; until it goes, everything is held."""
+        host.hold()
+        host.bus.subscribe(
+            host.owner,
+            CLOCK_TOPIC,
+            ClockMessage,
+            Qos.COMMAND,
+            lambda message: driver.hear(to_nanoseconds(message.clock)),
+        )
+        driver.follow(MonotonicClock())
+
+    def _turned(self, turn: Turn) -> None:
+        """Hold, or go on, with a time that is told from outside; one process tells it for all."""
+        if self._host is None:
+            return
+        if turn is not Turn.GOES:
+            self._host.hold()
+        if turn is not Turn.STANDS:
+            self._host.go_on()
+        if self._name == self._plan.groups[0]:
+            level, text = _TOLD[turn]
+            self._host.log("robot", level, text)
+            self._host.statuses.set(CLOCK_STATUS, Level.OK if turn is Turn.JUMPED else level, text, {})
+
     # Parts
 
+    def _made_clock(self, start: float) -> MonotonicClock | SteppedClock:
+        if self._options.is_stepped:
+            return SteppedClock()
+        return ExternalClock() if self._plan.follows_clock else MonotonicClock(start)
+
     def _made_driver(self) -> Driver:
+        if isinstance(self._clock, ExternalClock):
+            return ExternalDriver(self._scheduler, self._clock, self._inbox, self._channel, self, self._turned)
         if isinstance(self._clock, SteppedClock):
             rate = self._options.rate
             return SteppedDriver(self._scheduler, self._clock, self._inbox, self._channel, self, rate=rate)
@@ -216,10 +320,28 @@ class Group:
         return self._host
 
     def _notify(self, event: str, data: dict[str, object]) -> None:
+        if event == "mission_waits":  # on a stepped clock nothing comes from outside: it would wait for ever
+            if self._options.is_stepped:
+                self._notify("mission_ended", {**data, "outcome": "failure"})
+            return
         self._channel.send(say.Notify(event, data))
         is_the_end = event == "mission_ended" and data["mission"] == self._plan.start
         if is_the_end and self._options.is_stepped and not self._options.is_detached:
             self._is_ending = True  # here and not by a message, which would come at another instant in each run
+
+    def _printed(self, level: Level, text: str, detail: str) -> None:
+        """Log what was printed, as told by the component that runs in the thread that printed, else by the process."""
+        host, thread = self._host, threading.current_thread()
+        if host is None:
+            self._log.write(Record(self._clock.now(), level, self._name, text, detail))
+            return
+        is_here = thread is threading.main_thread()
+        name = host.at_work if is_here else thread.name
+        source = name if name in host.hosted else self._name
+        if is_here:
+            host.log(source or self._name, level, text, detail)
+        else:
+            self._inbox.put("", lambda: host.log(source or self._name, level, text, detail))
 
     def _complain(self, owner: str, text: str) -> None:
         self._log.write(Record(self._clock.now(), Level.WARN, owner, text))

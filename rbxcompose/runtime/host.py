@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import Clock
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.runtime.deliveries import Deliveries
 from rbxcompose.runtime.faults import RestartPolicy, explain
 from rbxcompose.runtime.frames import Frames
 from rbxcompose.runtime.hosted import Hosted, State
@@ -16,12 +18,21 @@ from rbxcompose.runtime.parameters import Parameters
 from rbxcompose.runtime.records import Log, Record
 from rbxcompose.runtime.rosout import Rosout
 from rbxcompose.runtime.statuses import Statuses
+from rbxcompose.runtime.worker import Post, Worker
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.bound import Refused
+from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Looks
 from rbxcompose.sdk.registry import component_type
 
+SLOW = 0.005  # [s] in one callback, after which diagnostics name it: meanwhile nothing else of the process runs
+
 Notify = Callable[[str, dict[str, object]], None]
+Told = Callable[..., None]  # takes the name of a method of the host, and words
+
+
+def _nobody(verb: str, *words: str) -> None:
+    """Keep no record of orders."""
 
 
 class Host:
@@ -39,23 +50,35 @@ class Host:
         *,
         is_stopped: bool = False,
         is_restart: bool = False,
+        told: Told = _nobody,
+        post: Post | None = None,
     ) -> None:
+        """Have `told` hear of each order that is carried out, by which a recording can be done again.
+
+        By `post` other threads reach the scheduler's; without it, components that may block run in the scheduler's.
+        """
         self.plan, self.clock, self.bus, self.scheduler = plan, clock, bus, scheduler
         self.notify = notify
+        self._told = told
         self.is_stopped = is_stopped
         self.is_restart = is_restart
         self.has_started = False
         self.is_braking = False
-        self._log = log
+        self.is_held = False  # robot time stands still
+        self._log, self._post = log, post
         self.owner = f"host_{instances[0].process}" if instances else "host"
         self._wanted: set[str] = set()  # to be active, as soon as they can
         self.statuses = Statuses(self.owner, bus, scheduler, clock)
+        self._deliveries = Deliveries(self.owner, bus, scheduler, clock, self.statuses)
         self.parameters = Parameters(self.owner, bus, clock, plan.bus.namespace)
         self._rosout = Rosout(self.owner, bus, clock)
         self.tree = self._frames(instances)
         self.hosted = {one.name: Hosted(self, one) for one in instances}
         self._policies = {one.name: RestartPolicy(one.restart) for one in instances}
-        scheduler.on_error = self.failed
+        self._retired: dict[str, Component[Any]] = {}  # whose place another one may take
+        self.at_work: str | None = None  # the component that runs in the scheduler's thread
+        self.doing = ""  # what it does
+        scheduler.on_error, scheduler.observe = self.failed, self._observed
 
     def _frames(self, instances: Sequence[Instance]) -> Frames | None:
         looking = (port for one in instances for port in component_type(one.type).ports(one.config).values())
@@ -71,6 +94,7 @@ class Host:
 
     def activate(self, names: Sequence[str]) -> None:
         """Activate components in this order."""
+        self._told("activate", *names)
         for name in names:
             self._wanted.add(name)
             if self.hosted[name].state is State.INACTIVE:
@@ -78,11 +102,14 @@ class Host:
 
     def start(self) -> None:
         """Begin what waits for the whole robot to be active."""
+        self._told("start")
         self.has_started = True
-        self._each_active(lambda one: one.start())
+        self._deliveries.start()
+        self._each_active("start")
 
     def shutdown(self) -> None:
         """Deactivate and clean up in reverse order; a component that raises does not keep the others."""
+        self._told("shutdown")
         self.is_braking = True
         for name in reversed(self.hosted):
             self._guarded(name, self.hosted[name].close)
@@ -91,26 +118,40 @@ class Host:
 
     def stop(self) -> None:
         """Hold everything that moves and cancel the goals that claim it."""
+        self._told("stop")
         self.is_stopped = True
         for hosted in self.hosted.values():
             hosted.cancel_claimed()
-        self._each_active(lambda one: one.stop())
+        self._each_active("stop")
 
     def release(self) -> None:
         """Allow motion again."""
+        self._told("release")
         self.is_stopped = False
-        self._each_active(lambda one: one.release())
+        self._each_active("release")
+
+    def hold(self) -> None:
+        """Let nothing but rest be commanded while robot time stands still."""
+        self.is_held = True
+        self._each_active("hold")
+
+    def go_on(self) -> None:
+        """Allow commands again, each deadline anew."""
+        self.is_held = False
+        self._each_active("go_on")
 
     def brake(self) -> None:
         """Bring everything to rest for good: the robot goes down."""
+        self._told("brake")
         self.is_braking = True
         for hosted in self.hosted.values():
             hosted.cancel_claimed()
-        self._each_active(lambda one: one.brake())
+        self._each_active("brake")
 
     def lost(self, names: Sequence[str], cause: str) -> None:
         """Tell the components that those of another process have gone."""
-        self._each_active(lambda one: one.lost(tuple(names), cause))
+        self._told("lost", cause, *names)
+        self._each_active("lost", tuple(names), cause)
 
     def command(self, instance: str, verb: str) -> str:
         """Give a person's command to a component and return its answer.
@@ -118,10 +159,92 @@ class Host:
         Raises:
             Refused: if it cannot be carried out, with the reason.
         """
+        self._told("command", instance, verb)
+        return self._idle(instance).command(verb)
+
+    def query(self, instance: str, words: str) -> str:
+        """Return a component's answer to a question, which changes nothing.
+
+        Raises:
+            Refused: if it has none, with the reason.
+        """
+        return self._idle(instance).query(words)
+
+    def _idle(self, instance: str) -> Component[Any]:
+        """Return a component that can be asked now."""
         hosted = self.hosted.get(instance)
         if hosted is None or hosted.component is None or hosted.state is not State.ACTIVE:
             raise Refused(f"'{instance}' is not active")
-        return hosted.component.command(verb)
+        if hosted.is_busy:
+            raise Refused(f"'{instance}' is busy")
+        return hosted.component
+
+    # Another plan
+
+    def retire(self, names: Sequence[str]) -> None:
+        """Bring components to rest, in this order, and forget them."""
+        for name in names:
+            if (hosted := self.hosted.get(name)) is None:
+                continue
+            hosted.cancel_claimed()
+            if hosted.component is not None and hosted.state is State.ACTIVE:
+                self._guarded(name, hosted.component.brake)
+            if hosted.component is not None:
+                self._retired[name] = hosted.component
+            self._guarded(name, hosted.close)
+            self._wanted.discard(name)
+            self.statuses.forget(name)
+            del self.hosted[name], self._policies[name]
+
+    def prepare(self, instances: Sequence[Instance]) -> None:
+        """Configure components beside those that run, or in their place."""
+        self.retire([one.name for one in instances])
+        self.tree = self.tree or self._frames(instances)
+        for one in instances:
+            self.hosted[one.name] = Hosted(self, one)
+            self._policies[one.name] = RestartPolicy(one.restart)
+            self._guarded(one.name, self.hosted[one.name].configure)
+            old, made = self._retired.pop(one.name, None), self.hosted[one.name].component
+            if made is not None and type(old) is type(made):
+                self._guarded(one.name, partial(self.hosted[one.name].do, "take_over", partial(made.take_over, old)))
+        self._retired.clear()
+        self.statuses.publish()
+
+    def follow(self, instances: Sequence[Instance], keys: Mapping[str, Sequence[str]]) -> dict[str, str]:
+        """Let components follow the settings of `keys`; return the reasons of those that refuse, by name."""
+        refused: dict[str, str] = {}
+        for one in instances:
+            if (hosted := self.hosted.get(one.name)) is None:
+                continue
+            if one.restart != hosted.instance.restart:
+                self._policies[one.name] = RestartPolicy(one.restart)
+            settings = {key.partition(".")[0] for key in keys[one.name]} & type(one.config).model_fields.keys()
+            config = hosted.config.model_copy(update={name: getattr(one.config, name) for name in settings})
+            try:
+                self.parameters.change(hosted, config)
+            except Refused as refusal:
+                refused[one.name] = f"'{one.name}' refuses: {refusal}"
+                continue
+            except Exception as error:  # as in a step: the failure of the component alone
+                self.failed(one.name, error)
+            hosted.instance, hosted.config = one, config
+        return refused
+
+    def work(self) -> tuple[list[str], dict[str, str]]:
+        """Return what moves the robot, and at what components are that a restart would cut off, both in words."""
+        moves: list[str] = []
+        runs: dict[str, str] = {}
+
+        def look(name: str, hosted: Hosted) -> None:
+            if moving := hosted.moves:
+                moves.append(moving)
+            if hosted.component is not None and hosted.component.occupation:
+                runs[name] = hosted.component.occupation
+
+        for name, hosted in self.hosted.items():
+            if hosted.state is State.ACTIVE:
+                self._guarded(name, lambda name=name, hosted=hosted: look(name, hosted))  # type: ignore[misc]
+        return moves, runs
 
     # What is known of the components
 
@@ -140,7 +263,10 @@ class Host:
         return {name: (one.state.value, self._policies[name].restarts) for name, one in self.hosted.items()}
 
     def log(self, source: str, level: Level, text: str, detail: str = "") -> None:
-        """Write one record, for people and for who listens on the bus."""
+        """Write one record, for people and for who listens on the bus, unless its level is less than is wanted."""
+        hosted = self.hosted.get(source)
+        if hosted is not None and level < hosted.instance.log:
+            return
         self._rosout.publish(source, level, text)
         self._log(Record(self.clock.now(), level, source, text, detail))
 
@@ -148,6 +274,36 @@ class Host:
         """Tell the supervisor of a new state."""
         state, restarts = self.states()[name]
         self.notify("state", {"instance": name, "state": state, "restarts": restarts})
+
+    # Who works
+
+    def worker(self, name: str) -> Worker | None:
+        """Return a thread for a component that may block, or None if all have to run in one: on a stepped clock."""
+        return Worker(name, self.clock, self._post, partial(self.failed, name)) if self._post is not None else None
+
+    def ready(self, name: str) -> None:
+        """Activate a component that took its time to be configured, if it was to be active meanwhile."""
+        if name in self._wanted:
+            self._guarded(name, self.hosted[name].activate)
+
+    def look_at_workers(self) -> None:
+        """Tell diagnostics of components that do not return from a call, and take those that never do for failed."""
+        for name, hosted in list(self.hosted.items()):
+            if hosted.worker is not None:
+                self.statuses.busy(name, hosted.worker.look())
+
+    def _observed(self, owner: str, callback: Callable[[], None]) -> None:
+        began = self.clock.now()
+        self._working(owner, callback)
+        if (seconds := self.clock.now() - began) > SLOW and owner in self.hosted:
+            self.statuses.slow(owner, self.doing or "a callback", seconds)
+
+    def _working(self, name: str, action: Callable[[], None]) -> None:
+        before, self.at_work, self.doing = self.at_work, name, ""
+        try:
+            action()
+        finally:
+            self.at_work = before
 
     # Mistakes
 
@@ -164,7 +320,8 @@ class Host:
         delay = None if self.is_braking else self._policies[name].after_failure(self.clock.now())
         self.changed(name)
         if delay is not None:
-            self.scheduler.at(self.clock.now() + delay, self.owner, lambda: self._restart(name))
+            hosted = self.hosted[name]
+            self.scheduler.at(self.clock.now() + delay, self.owner, lambda: self._restart(name, hosted))
         elif not self.is_braking:
             self._give_up(name, text)
 
@@ -177,10 +334,9 @@ class Host:
             self.log(name, Level.WARN, "stays failed: it is never restarted")
         self.changed(name)
 
-    def _restart(self, name: str) -> None:
-        if self.is_braking:
-            return
-        hosted = self.hosted[name]
+    def _restart(self, name: str, hosted: Hosted) -> None:
+        if self.is_braking or self.hosted.get(name) is not hosted:
+            return  # another one may have taken its place
         self.log(name, Level.WARN, "restarted")
         self._guarded(name, hosted.configure)
         if name in self._wanted and hosted.state is State.INACTIVE:
@@ -188,12 +344,12 @@ class Host:
 
     def _guarded(self, name: str, action: Callable[[], None]) -> None:
         try:
-            action()
+            self._working(name, action)
         except Exception as error:  # whatever a plug-in raises is its own failure, and told as such
             self.failed(name, error)
 
-    def _each_active(self, action: Callable[[Any], None]) -> None:
+    def _each_active(self, method: str, *arguments: object) -> None:
         for name, hosted in self.hosted.items():
             component = hosted.component
             if component is not None and hosted.state is State.ACTIVE:
-                self._guarded(name, lambda component=component: action(component))  # type: ignore[misc]
+                self._guarded(name, partial(hosted.do, method, partial(getattr(component, method), *arguments)))

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from enum import StrEnum
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rbxcompose.body.transforms import TransformTree
+from rbxcompose.bus.names import admin_key
 from rbxcompose.clock import Clock
 from rbxcompose.config import Config
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Instance
 from rbxcompose.runtime.binding import bind
+from rbxcompose.runtime.handover import HandedOver, handed_over
+from rbxcompose.runtime.worker import Worker
+from rbxcompose.sdk.bound import Refused, Window
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Port, ServesAction
 from rbxcompose.sdk.registry import component_type
 
 if TYPE_CHECKING:
     from rbxcompose.runtime.host import Host
+
+LONGEST_GOODBYE = 0.3  # [s] to wait for a component's own thread when it is to end
 
 
 class State(StrEnum):
@@ -39,6 +46,9 @@ class Hosted:
         self.state = State.UNCONFIGURED
         self.config = instance.config  # as it is now: parameters may have changed it
         self.component: Component[Any] | None = None
+        self.worker: Worker | None = None  # the thread of a component that may block
+        self._ends: dict[str, Any] = {}  # of the ports, on the bus
+        self._commands: list[str] = []  # what it is told again after it was restarted in its place
         self._wakes: set[float] = set()  # robot times [s] at which the component is to be woken
 
     @property
@@ -50,17 +60,29 @@ class Hosted:
 
     def configure(self) -> None:
         """Make the component, bind its ports, let it get ready."""
-        made = component_type(self.instance.type)(self.instance.name, self.config, self)
+        cls = component_type(self.instance.type)
+        self.worker = self.host.worker(self.instance.name) if cls.blocking else None
+        made = cls(self.instance.name, self.config, self if self.worker is None else HandedOver(self, self.worker))
         tree = self.host.tree.tree if self.host.tree else TransformTree()
         self.component = made
-        bind(made, self.instance, self.host.bus, tree, self._refusal)
+        bind(made, self.instance, self.host.bus, tree, self)
+        self._ends = dict(made.bound)
+        if self.worker is not None:
+            ports = cls.ports(self.config)
+            made.bound = {name: handed_over(end, ports[name], self.worker) for name, end in self._ends.items()}
         self.host.parameters.serve(self)
-        made.configure()
+        self.do("configure", made.configure, then=self._configured)
+
+    def _configured(self) -> None:
         self._enter(State.INACTIVE)
         self.host.statuses.set(self.instance.name, Level.OK, "ready", {})
+        if self.worker is not None:
+            self.host.ready(self.instance.name)
 
     def reconfigure(self, config: Config) -> None:
         """Let the component follow another configuration; if it raises, the old one stays."""
+        if self.is_busy:
+            raise Refused(f"'{self.instance.name}' is busy")
         component, old = self._made(), self.config
         component.config = config
         try:
@@ -74,23 +96,34 @@ class Hosted:
         """Let the component work; it joins a robot that has started, is stopped or goes down as the others did."""
         component = self._made()
         self.host.statuses.set(self.instance.name, Level.OK, "active", {})
-        component.activate()
+        self.do("activate", component.activate, then=self._activated)
+
+    def _activated(self) -> None:
+        component = self._made()
         self._enter(State.ACTIVE)
         if component.rate:
-            self.host.scheduler.every(1.0 / component.rate, self.instance.name, component.step)
+            step = component.step
+            self.host.scheduler.every(
+                1.0 / component.rate, self.instance.name, lambda dt: self.do("step", lambda: step(dt), depth=1)
+            )
         if self.host.is_stopped:
-            component.stop()
+            self.do("stop", component.stop)
+        if self.host.is_held:
+            self.do("hold", component.hold)
         if self.host.has_started:
-            component.start()
+            self.do("start", component.start)
+            for words in self._commands:
+                self.do("command", partial(self._say_again, component, words))
+        self.host.bus.open(self.instance.name)  # who found it before it was active has waited
 
     def close(self) -> None:
         """Deactivate and clean up, as far as it got, and give back its ports."""
         self.host.scheduler.remove(self.instance.name)
         component, state = self.component, self.state
         try:
-            if component and state is State.ACTIVE:
+            if component and self._taken_back(component) and state is State.ACTIVE:
                 component.deactivate()
-            if component and state in (State.ACTIVE, State.INACTIVE):
+            if component and self.worker is None and state in (State.ACTIVE, State.INACTIVE):
                 component.cleanup()
         finally:
             self.abandon()
@@ -98,25 +131,79 @@ class Hosted:
 
     def abandon(self) -> None:
         """Forget the component as it is."""
-        self.component = None
+        if self.worker is not None:
+            self.worker.close(0.0)
+        self.component = self.worker = None
         self._wakes.clear()
         self.state = State.UNCONFIGURED
 
+    def _taken_back(self, component: Component[Any]) -> bool:
+        """Let the scheduler's thread use the component itself again; tell whether its own thread has let go of it."""
+        if self.worker is None:
+            return True
+        label, _ = self.worker.busy_for()
+        if not self.worker.close(LONGEST_GOODBYE):
+            self.host.log(self.instance.name, Level.WARN, f"does not return from {label}: it is left behind in it")
+            return False
+        self.worker, component.context, component.bound = None, self, self._ends
+        return True
+
+    def do(
+        self, label: str, call: Callable[[], None], *, depth: int | None = None, then: Callable[[], None] | None = None
+    ) -> None:
+        """Have the component do something, now or, if it has a thread, there; `then` follows in the scheduler's thread.
+
+        Of calls that wait with the same label, the newest `depth` are kept.
+        """
+        worker = self.worker
+        if worker is not None:
+            worker.submit(label, call if then is None else partial(_in_turn, call, partial(worker.send, then)), depth)
+            return
+        self.host.doing = label
+        call()
+        if then is not None:
+            then()
+
+    @property
+    def is_busy(self) -> bool:
+        """Tell whether the component is in a call in its own thread, so that no other may use it."""
+        return self.worker is not None and self.worker.is_busy
+
+    @property
+    def moves(self) -> str:
+        """Return in words what of it moves the robot or is about to; empty if nothing."""
+        component = self.component
+        if component is None or self.state is not State.ACTIVE:
+            return ""
+        if not component.is_at_rest:
+            return f"'{self.instance.name}' moves"
+        if any(server.current is not None for server in self._claiming()):
+            return f"'{self.instance.name}' carries out a goal"
+        return component.occupation if component.claims else ""
+
     def cancel_claimed(self) -> None:
         """Ask the goals that claim a part of the robot to end."""
+        for server in self._claiming():
+            server.cancel_all()
+
+    def _claiming(self) -> Iterator[Any]:
+        """Yield the servers of actions that claim a part of the robot."""
         if self.component is None:
             return
         for name, port in type(self.component).ports(self.instance.config).items():
-            if isinstance(port, ServesAction) and port.claims and name in self.component.bound:
-                self.component.bound[name].cancel_all()
+            if isinstance(port, ServesAction) and port.claims and name in self._ends:
+                yield self._ends[name]
 
-    def _refusal(self, port: Port[Any]) -> str:
+    def refusal(self, port: Port[Any]) -> str:
+        """Return why a message, request or goal cannot be taken now; empty if it can."""
         if self.state is not State.ACTIVE:
             return f"'{self.instance.name}' is not active"
         if isinstance(port, ServesAction) and port.claims and self.host.is_braking:
             return "the robot is going down"
         if isinstance(port, ServesAction) and port.claims and self.host.is_stopped:
             return "the robot is stopped"
+        if isinstance(port, ServesAction) and self.is_busy:
+            return f"'{self.instance.name}' is busy"
         return ""
 
     def _made(self) -> Component[Any]:
@@ -152,8 +239,27 @@ class Hosted:
 
     def _wake(self, time: float) -> None:
         self._wakes.discard(time)
-        self._made().wake()
+        self.do("wake", self._made().wake)
 
     def notify(self, event: str, **data: object) -> None:
         """Tell the supervisor of something that concerns the whole robot."""
+        if event == "commands":
+            self._commands = str(data["commands"]).splitlines()
         self.host.notify(event, data)
+
+    def window(self, path: str, question: str) -> Window:
+        """Open a window for tools outside at `path` of the robot's own keys."""
+        name = self.instance.name
+        key = admin_key(self.host.plan.robot, path)
+        return self.host.bus.window(name, key, lambda: self.host.query(name, question))
+
+    def _say_again(self, component: Component[Any], words: str) -> None:
+        try:
+            component.command(words)
+        except Refused as refusal:
+            self.log(Level.WARN, f"{words}: {refusal}")
+
+
+def _in_turn(*calls: Callable[[], None]) -> None:
+    for call in calls:
+        call()

@@ -30,12 +30,11 @@ class Inbox:
 
     def drain(self, scheduler: Scheduler) -> None:
         """Post everything that has come, in the order of arrival."""
-        if not self._is_signalled:
-            return
+        # Read whatever the flag says: of two threads that signal at once, one may write after the other was heard.
         try:
             os.eventfd_read(self._descriptor)
         except BlockingIOError:
-            return  # the flag is set, its write is still to come
+            return  # nothing has come, or its write is still to come
         self._is_signalled = False  # before the reading: what comes from now on signals again
         while self._callbacks:
             scheduler.post(*self._callbacks.popleft())

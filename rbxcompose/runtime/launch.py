@@ -14,12 +14,13 @@ from typing import NoReturn, TextIO
 
 import setproctitle
 
+from rbxcompose.bus import shared_memory
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.conductor import ROBOT_FAILED
 from rbxcompose.runtime.faults import explain
-from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, UnsafeFolderError
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder
 from rbxcompose.runtime.leftovers import end_leftovers
 from rbxcompose.runtime.log import start_new
 from rbxcompose.runtime.options import RunOptions
@@ -56,7 +57,7 @@ class AlreadyUp:
 
 @dataclass(frozen=True, slots=True)
 class Unsafe:
-    """The robot's folder cannot be trusted."""
+    """The robot's folder cannot be trusted, or not be written to."""
 
     reason: str
 
@@ -160,19 +161,20 @@ def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: 
     folder = RobotFolder.of(plan.robot)
     try:
         folder.make()
-    except UnsafeFolderError as error:
+        if folder.lock() is None:  # else it is ours until this process ends
+            _report(reports, AlreadyUp(_supervisor_of(folder)))
+            return FINDINGS
+        told = end_leftovers(folder)
+        folder.sweep()
+        log = start_new(folder.path)
+    except OSError as error:  # it is somebody else's, the disk is full
         _report(reports, Unsafe(str(error)))
         return FINDINGS
-    if folder.lock() is None:  # else it is ours until this process ends
-        _report(reports, AlreadyUp(_supervisor_of(folder)))
-        return FINDINGS
-    told = end_leftovers(folder)
-    folder.sweep()
-    log = start_new(folder.path)
     _report(reports, Begun())
     for text in told:
         log.write(Record(0.0, Level.WARN, "robot", text))
     ended = _run(Launch(plan, options, log, folder.path, clock), folder, reports)
+    shared_memory.remove_orphans()  # of processes that were killed
     folder.clear()
     _report(reports, ended)
     return ended.exit_code
@@ -201,7 +203,7 @@ def _run(launch: Launch, folder: RobotFolder, reports: TextIO) -> Ended:
         end_leftovers(folder)
         return Ended(ROBOT_FAILED, f"the supervisor failed: {text}", clock.now())
     conductor = supervisor.conductor
-    time = conductor.time if launch.options.is_stepped else clock.now()
+    time = clock.now() if conductor.is_real_time else conductor.time
     return Ended(conductor.exit_code, conductor.reason, time, conductor.facts)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Sequence
 
+from rbxcompose.bus import shared_memory
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder
 from rbxcompose.runtime.processes import Process, titled, wait_until_ended
 
@@ -29,6 +30,7 @@ def end_leftovers(folder: RobotFolder) -> list[str]:
     left = wait_until_ended(list(found.values()), ORDERLY)
     _kill(left)
     wait_until_ended(left, AT_ONCE)
+    shared_memory.remove_orphans()
     killed = [name for name, process in found.items() if process in (*deaf, *left)]
     if killed:
         told.append(f"processes left behind were killed: {', '.join(sorted(killed))}")

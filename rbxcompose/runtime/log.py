@@ -1,26 +1,38 @@
-"""The log file of a robot: one record per line, each written by one system call, by several processes."""
+"""The log file of a robot: one record per line, each written by one system call, by several processes.
+
+A file that has grown to `LARGEST` is set aside as `log.jsonl.1`, what was that before as `.2`, and so on; the oldest of
+`PARTS` goes. Whichever process finds the file full does it, the others notice at their next line.
+"""
 
 from __future__ import annotations
 
+import fcntl
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from itertools import pairwise
 from pathlib import Path
 
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.runtime.records import Record
 
 NAME, PREVIOUS = "log.jsonl", "log.1.jsonl"
+LARGEST = 4_000_000  # [B] of one file
+PARTS = 4  # files that are kept beside the one that is written
 
 
 class LogFile:
     """Appends records to a file. A full disk costs records, never a step; what was lost is told when there is room."""
 
-    def __init__(self, path: Path) -> None:
-        self._descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+    def __init__(self, path: Path, *, largest: int = LARGEST) -> None:
+        """Open the file; `largest` [B] is the size from which a new one is begun."""
+        self._path, self._largest = path.absolute(), largest
+        self._descriptor = _opened(self._path)
         self._lost = 0
         self._is_torn = False
 
     def fileno(self) -> int:
-        """Return its descriptor."""
+        """Return its descriptor, whose number stays the same."""
         return self._descriptor
 
     def write(self, record: Record) -> None:
@@ -38,19 +50,64 @@ class LogFile:
         line = record.to_json().encode(errors="backslashreplace") + b"\n"
         line = b"\n" + line if self._is_torn else line
         try:
+            if os.fstat(self._descriptor).st_size >= self._largest:
+                self._go_on()
             written = os.write(self._descriptor, line)
         except OSError:
             return False
         self._is_torn = written < len(line)
         return not self._is_torn
 
+    def _go_on(self) -> None:
+        """Write to the file that has the log's name now; set it aside first if it is full.
 
-def _loss(time: float, number: int) -> Record:
-    return Record(time, Level.WARN, "robot", f"{number} lines of the log could not be written")
+        If that fails, or a process that was stopped meanwhile has the lock, the file grows on.
+        """
+        with suppress(OSError), _closing(_opened(self._path)) as current:
+            fcntl.flock(current, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.fstat(current).st_size >= self._largest and os.path.samestat(os.fstat(current), self._path.stat()):
+                _set_aside(self._path)
+                with _closing(_opened(self._path)) as fresh:
+                    os.dup2(fresh, self._descriptor, inheritable=False)
+            else:
+                fcntl.flock(current, fcntl.LOCK_UN)  # a duplicate would go on holding it
+                os.dup2(current, self._descriptor, inheritable=False)
+
+
+def parts_of(path: Path) -> Iterator[Path]:
+    """Yield the files of a log from the newest to the oldest; they need not exist."""
+    yield path
+    for number in range(1, PARTS + 1):
+        yield path.with_name(f"{path.name}.{number}")
 
 
 def start_new(folder: Path) -> LogFile:
     """Begin a new log in `folder` and keep the previous one."""
-    if (folder / NAME).exists():
-        os.replace(folder / NAME, folder / PREVIOUS)
+    for part, kept in zip(parts_of(folder / NAME), parts_of(folder / PREVIOUS), strict=True):
+        kept.unlink(missing_ok=True)
+        if part.exists():
+            part.replace(kept)
     return LogFile(folder / NAME)
+
+
+def _set_aside(path: Path) -> None:
+    parts = list(parts_of(path))
+    for younger, older in reversed(list(pairwise(parts))):
+        if younger.exists():
+            younger.replace(older)
+
+
+@contextmanager
+def _closing(descriptor: int) -> Iterator[int]:
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def _opened(path: Path) -> int:
+    return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+
+
+def _loss(time: float, number: int) -> Record:
+    return Record(time, Level.WARN, "robot", f"{number} lines of the log could not be written")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -10,9 +11,11 @@ class RunOptions:
     """Real time (`is_stepped` false) or stepped time at `rate` times real time (None: as fast as it goes).
 
     `duration` [s] of robot time ends the run; a robot that is detached stays up when its mission has ended.
+    A stepped run can be recorded to the file `record` from within, so that it can be done again component by component.
     """
 
     is_stepped: bool = False
     rate: float | None = None
     duration: float | None = None
     is_detached: bool = False
+    record: Path | None = None

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import resolve
 from rbxcompose.clock import Clock
+from rbxcompose.config import Config
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.params import core
@@ -36,6 +37,14 @@ class Parameters:
         serve(name, f"{name}/describe_parameters", rcl.DescribeParameters, served.describe)
         serve(name, f"{name}/set_parameters", rcl.SetParameters, served.set_each)
         serve(name, f"{name}/set_parameters_atomically", rcl.SetParametersAtomically, served.set_all)
+
+    def change(self, hosted: Hosted, config: Config) -> None:
+        """Let a component follow other settings, and tell everybody.
+
+        Raises:
+            Refused: if it cannot be done now, with the reason.
+        """
+        _Served(self, hosted).follow(config)
 
     def tell(self, name: str, parameters: Sequence[rcl.Parameter]) -> None:
         """Publish that parameters of a component have changed."""
@@ -78,17 +87,19 @@ class _Served:
         return rcl.SetParametersAtomically.Response(result=self._set(request.parameters))
 
     def _set(self, parameters: Sequence[rcl.Parameter]) -> rcl.SetParametersResult:
-        old = self._hosted.config
         try:
-            new = core.changed(old, parameters)
-            self._hosted.reconfigure(new)
+            self.follow(core.changed(self._hosted.config, parameters))
         except (core.UnsettableError, Refused) as refusal:
             return rcl.SetParametersResult(successful=False, reason=str(refusal))
+        return rcl.SetParametersResult(successful=True)
+
+    def follow(self, new: Config) -> None:
+        old = self._hosted.config
+        self._hosted.reconfigure(new)
         others = core.differences(old, new)
         if others:
             self._say(others)
             self._parameters.tell(self._hosted.instance.name, others)
-        return rcl.SetParametersResult(successful=True)
 
     def _say(self, parameters: Sequence[rcl.Parameter]) -> None:
         component, known = self._hosted.component, self._settings

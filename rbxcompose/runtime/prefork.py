@@ -217,7 +217,7 @@ def run_process(launch: Launch, order: Fork, channel: Channel) -> None:
     if order.group == ROUTER:
         from rbxcompose.runtime.router import Router
 
-        Router(launch.plan.bus, launch.clock, channel).run()
+        Router(launch.plan, launch.clock, channel).run()
         return
     from rbxcompose.runtime.group import Group
 

@@ -14,7 +14,9 @@ from pathlib import Path
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 _LIBC = ctypes.CDLL(None, use_errno=True)
-_STATE, _START_TIME = 0, 19  # fields of /proc/<pid>/stat, counted after the last bracket
+_STATE, _USER_TIME, _SYSTEM_TIME, _START_TIME, _RESIDENT = 0, 11, 12, 19, 21
+"""Fields of /proc/<pid>/stat, counted after the last bracket."""
+_TICK, _PAGE = os.sysconf("SC_CLK_TCK"), os.sysconf("SC_PAGE_SIZE")  # [1/s], [B]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +47,14 @@ class Process:
     def is_stopped(self) -> bool:
         """Tell whether a signal has stopped it, so that it can hear no other but SIGKILL."""
         return self._state() in ("T", "t")
+
+    @property
+    def usage(self) -> tuple[float, int] | None:
+        """Return the time it had of processors so far [s], and the memory that it holds [B]; None if it has ended."""
+        fields = _stat(self.pid)
+        if fields is None or int(fields[_START_TIME]) != self.started:
+            return None
+        return (int(fields[_USER_TIME]) + int(fields[_SYSTEM_TIME])) / _TICK, int(fields[_RESIDENT]) * _PAGE
 
     def open(self) -> int | None:
         """Return a pidfd for it, or None if it has ended. The caller closes it."""

@@ -7,14 +7,15 @@ import os
 import signal
 from types import FrameType
 
-import zenoh
-
+from rbxcompose.bus.probe import probe_key
 from rbxcompose.bus.zenoh_session import open_router
+from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import MonotonicClock
-from rbxcompose.plan.model import BusPlan
+from rbxcompose.plan.model import Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.driver import RealTimeDriver
 from rbxcompose.runtime.inbox import Inbox
+from rbxcompose.runtime.lifeline import answer
 from rbxcompose.scheduler import Scheduler
 
 TRIES = 20  # ports from `bus.port` on
@@ -22,20 +23,21 @@ HANG = 2.0  # [s] without a turn of the loop after which the process ends itself
 
 
 class Router:
-    """Listens on the robot's port, or the next free one, until the supervisor says so or has gone."""
+    """Listens on the robot's port, or the next free one, until the supervisor says so or has gone; answers probes."""
 
-    def __init__(self, bus: BusPlan, clock: MonotonicClock, channel: say.Channel) -> None:
+    def __init__(self, plan: Plan, clock: MonotonicClock, channel: say.Channel) -> None:
         self.is_over = False
-        self._bus, self._clock, self._channel = bus, clock, channel
-        self._session: zenoh.Session | None = None
+        self._plan, self._clock, self._channel = plan, clock, channel
+        self._inbox = Inbox()
+        self._transport: ZenohTransport | None = None
 
     def run(self) -> None:
         """Run until it is over."""
         signal.signal(signal.SIGTERM, _end)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGTERM])
-        RealTimeDriver(Scheduler(), self._clock, Inbox(), self._channel, self).run()
-        if self._session is not None:
-            self._session.close()  # type: ignore[no-untyped-call]
+        RealTimeDriver(Scheduler(), self._clock, self._inbox, self._channel, self).run()
+        if self._transport is not None:
+            self._transport.close()
 
     def handle(self, message: say.Message) -> None:
         """Open the router, or end."""
@@ -63,13 +65,15 @@ class Router:
 
     def _open(self, endpoint: str | None) -> None:
         """Open a session, at `endpoint` if the others have been told of one."""
-        first = self._bus.port
+        first = self._plan.bus.port
         ports = range(first, first + TRIES) if endpoint is None else [int(endpoint.rpartition(":")[2])]
         for port in ports:
             try:
-                self._session = open_router(port)
+                session = open_router(port)
             except OSError:
                 continue  # taken: perhaps by another robot
+            self._transport = ZenohTransport(session, self._inbox.put)
+            self._transport.serve(probe_key(self._plan.robot), answer)
             self._channel.send(say.Configured(f"tcp/127.0.0.1:{port}"))
             return
         reason = f"no port is free for the router, from {ports[0]} to {ports[-1]}"

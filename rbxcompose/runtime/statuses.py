@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import Clock
@@ -17,6 +18,19 @@ PERIOD = 1.0  # [s] between two reports
 TOPIC = "/diagnostics"
 
 
+@dataclass(frozen=True, slots=True)
+class _Slow:
+    """How many callbacks of a component have held up its process, and the longest of them [s]."""
+
+    number: int = 0
+    longest: float = 0.0
+    callback: str = ""
+
+    def values(self) -> tuple[KeyValue, ...]:
+        slowest = f"{self.callback}, {1000 * self.longest:.0f} ms"
+        return KeyValue(key="slow_callbacks", value=str(self.number)), KeyValue(key="slowest_callback", value=slowest)
+
+
 class Statuses:
     """What each component of a process said last about itself."""
 
@@ -24,6 +38,9 @@ class Statuses:
         self._owner, self._scheduler, self._clock = owner, scheduler, clock
         self._publisher = bus.publisher(owner, TOPIC, DiagnosticArray, Qos.STATE)
         self._statuses: dict[str, DiagnosticStatus] = {}
+        self._blocked: dict[str, str] = {}
+        self._busy: dict[str, str] = {}
+        self._slow: dict[str, _Slow] = {}
         self._is_due = False
         scheduler.every(PERIOD, owner, lambda dt: self.publish())
 
@@ -32,13 +49,52 @@ class Statuses:
         before = self._statuses.get(name)
         pairs = tuple(KeyValue(key=key, value=str(value)) for key, value in values.items())
         self._statuses[name] = DiagnosticStatus(level=int(level), name=name, message=message, values=pairs)
-        if (before is not None and before.level == level) or self._is_due:
+        if before is None or before.level != level:
+            self._publish_soon()
+
+    def forget(self, name: str) -> None:
+        """Tell nothing more of a component that is there no more."""
+        for known in (self._statuses, self._busy, self._slow):
+            known.pop(name, None)
+
+    def block(self, causes: Mapping[str, str]) -> None:
+        """Show those components as not well that cannot do their work, whatever they say; replaces who was blocked."""
+        self._blocked = dict(causes)
+        self._publish_soon()
+
+    def busy(self, name: str, text: str) -> None:
+        """Show a component as not well that does not return from a call, in words; without any it is well again."""
+        if text == self._busy.get(name, ""):
             return
-        self._is_due = True
-        self._scheduler.post(self._owner, self.publish)
+        if bool(text) is not (name in self._busy):
+            self._publish_soon()
+        if text:
+            self._busy[name] = text
+        else:
+            del self._busy[name]
+
+    def slow(self, name: str, callback: str, seconds: float) -> None:
+        """Count a callback that held up the process for `seconds`, and name the longest."""
+        before = self._slow.get(name, _Slow())
+        longest = max((before.longest, before.callback), (seconds, callback))
+        self._slow[name] = _Slow(before.number + 1, *longest)
+
+    def _publish_soon(self) -> None:
+        if not self._is_due:
+            self._is_due = True
+            self._scheduler.post(self._owner, self.publish)
+
+    def _shown(self, status: DiagnosticStatus) -> DiagnosticStatus:
+        cause = self._blocked.get(status.name) or self._busy.get(status.name)
+        slow = self._slow.get(status.name)
+        if cause is None and slow is None:
+            return status
+        level = status.level if cause is None else max(status.level, int(Level.WARN))
+        values = (*status.values, *(slow.values() if slow is not None else ()))
+        return DiagnosticStatus(level=level, name=status.name, message=cause or status.message, values=values)
 
     def publish(self) -> None:
         """Send all statuses."""
         self._is_due = False
         header = Header(stamp=to_time(self._clock.stamp()))
-        self._publisher(DiagnosticArray(header=header, status=tuple(self._statuses.values())))
+        self._publisher(DiagnosticArray(header=header, status=tuple(map(self._shown, self._statuses.values()))))

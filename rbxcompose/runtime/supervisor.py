@@ -17,19 +17,22 @@ from types import FrameType
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.conductor import INTERRUPTED, ROBOT_FAILED, Conductor, Phase
+from rbxcompose.runtime.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
 from rbxcompose.runtime.control import ControlServer
-from rbxcompose.runtime.folder import ComponentState, RobotFolder, State
+from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFolder, State
+from rbxcompose.runtime.members import Phase
 from rbxcompose.runtime.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
 from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.requests import Requests
+from rbxcompose.runtime.silence import DEAD, LOOK
 from rbxcompose.scheduler import Scheduler
 
 _TAIL = 8000  # [B] of what a process printed that go into the log
 _HANG_MARK = "Timeout (0:00:"  # what the self-watchdog of a process prints before the place where it hung
 _LONGEST_WAIT = 60.0  # [s]
 _ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_OWNER = "supervisor"
 
 
 @dataclass
@@ -46,13 +49,13 @@ class Supervisor:
     """Runs one robot to its end; `run` returns the exit code."""
 
     def __init__(self, launch: Launch, folder: RobotFolder, on_up: Callable[[], None]) -> None:
-        self.plan = launch.plan
         self._launch, self._folder, self._on_up = launch, folder, on_up
         self._clock: MonotonicClock = launch.clock
         self._scheduler = Scheduler()
         self._selector = selectors.DefaultSelector()
         self._children: dict[str, _Child] = {}
         self._interrupts = 0
+        self._is_state_old = False  # the state file tells what was
         router = None if launch.plan.bus.router else ROUTER
         self.conductor = Conductor(launch.plan, launch.options, self._scheduler, self, router=router)
         self._wake, self._wakened = socket.socketpair()
@@ -68,6 +71,8 @@ class Supervisor:
         adopt_orphans()
         self._parent: Parent | None = Parent(self._launch)
         self._parent_process = self._parent.process
+        self._parent_ran = self._clock.now()  # [s]
+        self._scheduler.every(LOOK, _OWNER, lambda dt: self._look_at_parent())
         self._selector.register(self._parent, selectors.EVENT_READ, self._hear_parent)
         self._selector.register(self._wakened, selectors.EVENT_READ, self._hear_signals)
         self._control = ControlServer(self._folder, self._selector)
@@ -88,6 +93,8 @@ class Supervisor:
             if self._selector.get_map().get(key.fd) is key:  # one callback may have closed another's descriptor
                 key.data()
         self._scheduler.advance(self._clock.now())
+        if self._is_state_old:
+            self._write_state()
 
     def _close(self) -> None:
         self._control.close()
@@ -122,7 +129,17 @@ class Supervisor:
     def send(self, process: str, message: say.Order) -> None:
         """Send a message to a process."""
         if process in self._children:
-            self._children[process].channel.send(message)
+            channel = self._children[process].channel
+            channel.send(message)
+            self._watch(channel)
+
+    def _watch(self, channel: say.Channel) -> None:
+        """Wait for what a process says, and for when it takes the rest of what is too long to be sent at once."""
+        if channel.is_open:
+            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if channel.is_behind else 0)
+            key = self._selector.get_key(channel)
+            if key.events != events:
+                self._selector.modify(channel, events, key.data)
 
     def end(self, process: str) -> None:
         """Ask a process to end."""
@@ -140,15 +157,24 @@ class Supervisor:
         if child.descriptor is not None:
             signal_descriptor(child.descriptor, number)
 
+    def is_suspended(self, process: str) -> bool:
+        """Tell whether a signal keeps a process from running."""
+        child = self._children.get(process)
+        return child is not None and child.process is not None and child.process.is_stopped
+
     def log(self, level: Level, text: str, detail: str = "") -> None:
         """Write a record of the whole robot."""
-        time = self.conductor.time if self._launch.options.is_stepped else self._clock.now()
+        time = self._clock.now() if self.conductor.is_real_time else self.conductor.time
         self._launch.log.write(Record(time, level, "robot", text, detail))
 
     def is_up(self) -> None:
         """Tell who waits that all is active."""
         self._write_state()
         self._on_up()
+
+    def states_changed(self) -> None:
+        """Have the state file written at the end of this turn, once."""
+        self._is_state_old = True
 
     def answer(self, number: int, text: str, *, is_refused: bool) -> None:
         """Answer a command."""
@@ -161,7 +187,10 @@ class Supervisor:
 
     def _hear(self, name: str, channel: say.Channel) -> None:
         messages = channel.receive()
-        if not channel.is_open:
+        channel.flush()
+        if channel.is_open:
+            self._watch(channel)
+        else:
             self._selector.unregister(channel)
         for message in messages:
             self.conductor.heard(name, message)  # type: ignore[arg-type]
@@ -205,8 +234,17 @@ class Supervisor:
     def _printed(self, name: str) -> str:
         try:
             return self._launch.output(name).read_text(encoding="utf-8", errors="replace")[-_TAIL:]
-        except FileNotFoundError:
+        except OSError:  # it has printed nothing, or the disk is at fault: the robot does not depend on it
             return ""
+
+    def _look_at_parent(self) -> None:
+        """End a parent that a signal keeps from running: it forks nothing, and tells of no end of a process."""
+        now = self._clock.now()
+        if self._parent is None or not self._parent.process.is_stopped:
+            self._parent_ran = now
+        elif now - self._parent_ran > DEAD:
+            self.log(Level.ERROR, "the pre-fork parent was suspended by a signal and is killed")
+            self._parent.process.send_signal(signal.SIGKILL)
 
     def _lose_parent(self) -> None:
         """Go on without the pre-fork parent: its processes are ours now, and have been asked to stop."""
@@ -239,10 +277,10 @@ class Supervisor:
     def state(self) -> State:
         """Return what the state file and `ps` tell."""
         running = {name: child.process for name, child in self._children.items() if child.process is not None}
-        components = tuple(self._component(one.name, one.type, one.process) for one in self._launch.plan.instances)
+        components = tuple(self._component(one.name, one.type, one.process) for one in self.conductor.plan.instances)
         return State(
             robot=self._launch.plan.robot,
-            file=os.path.realpath(self._launch.plan.file),
+            file=os.path.realpath(self.conductor.plan.file),
             supervisor=Process.of(os.getpid()),
             processes={"parent": self._parent_process, **running},
             components=components,
@@ -253,11 +291,18 @@ class Supervisor:
 
     def _component(self, name: str, type_name: str, process: str) -> ComponentState:
         state, restarts = self.conductor.states[name]
+        waits_for = self.conductor.blocked.get(name)
         child = self._children.get(process)
         pid = child.process.pid if child and child.process else None
-        return ComponentState(name, type_name, state, process, pid, restarts + self.conductor.members[process].restarts)
+        restarts += self.conductor.members[process].restarts
+        if self.is_suspended(process):
+            state = SUSPENDED
+        elif child is not None and self.conductor.members[process].is_told_lost:
+            state = SILENT
+        return ComponentState(name, type_name, state, process, pid, restarts, waits_for)
 
     def _write_state(self) -> None:
+        self._is_state_old = False
         try:
             self._folder.write_state(self.state())
         except OSError as error:  # the robot does not depend on it

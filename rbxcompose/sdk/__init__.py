@@ -24,9 +24,11 @@ from rbxcompose.sdk.bound import Ended, Outcome, Refused, Reply, SentGoal, Serve
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction
 from rbxcompose.sdk.registry import component
+from rbxcompose.sdk.skills import Activity, skill
 
 __all__ = [
     "Acceleration",
+    "Activity",
     "Angle",
     "AngularAcceleration",
     "AngularSpeed",
@@ -60,4 +62,5 @@ __all__ = [
     "Speed",
     "Time",
     "component",
+    "skill",
 ]

@@ -100,6 +100,11 @@ class ServedGoal(Protocol[G_co, R_contra, F_contra]):
         """Tell whether the goal should end soon, by `canceled`."""
         ...
 
+    @property
+    def is_paused(self) -> bool:
+        """Tell whether the goal is to be held as it is, until it goes on or is cancelled."""
+        ...
+
     def feedback(self, message: F_contra, /) -> None:
         """Tell the client how far it got."""
         ...
@@ -146,6 +151,19 @@ class ActionCaller(Protocol[G_contra, R, F_co]):
         self, goal: G_contra, then: Callable[[Ended[R]], None], feedback: Callable[[F_co], None] | None = None, /
     ) -> SentGoal:
         """Send `goal`; `then` gets its end exactly once."""
+        ...
+
+
+class Window(Protocol):
+    """Tells tools outside what is new."""
+
+    @property
+    def is_watched(self) -> bool:
+        """Tell whether anybody would hear news; nothing need be put together while nobody does."""
+        ...
+
+    def put(self, value: object, /) -> None:
+        """Tell news, as data for JSON."""
         ...
 
 

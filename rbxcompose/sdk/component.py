@@ -5,12 +5,12 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping
 from functools import cache
-from typing import Any, ClassVar, Generic, Protocol, TypeVar, get_args
+from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, get_args
 
 from rbxcompose.clock import Clock
 from rbxcompose.config import Config
 from rbxcompose.diagnostics.levels import Level
-from rbxcompose.sdk.bound import Refused
+from rbxcompose.sdk.bound import Refused, Window
 from rbxcompose.sdk.ports import Port
 
 C = TypeVar("C", bound=Config)
@@ -42,15 +42,24 @@ class Context(Protocol):
         """Tell the supervisor of something that concerns the whole robot."""
         ...
 
+    def window(self, path: str, question: str) -> Window:
+        """Open a window for tools outside at `path`; who asks there gets the component's answer to `question`."""
+        ...
+
 
 class Component(Generic[C]):
     """A running part of the robot: subclass it, declare ports, fill in what is needed.
 
-    The runtime calls every method from one thread. Time comes from `now`, never from Python's clocks.
+    The runtime calls one method at a time. Time comes from `now`, never from Python's clocks.
+
+    A component that is `blocking` is called in a thread of its own, so that it delays nobody. Meanwhile its messages
+    wait, as many as their class of quality allows; goals and commands are refused. `is_at_rest`, `occupation` and
+    `summary` are asked for at any time, also during a call: let them read plain attributes.
     """
 
     rate: ClassVar[float] = 0.0  # [Hz] of `step`; 0: no steps
     process: ClassVar[str] = "robot"  # default process group
+    blocking: ClassVar[bool] = False  # may wait or compute for long: runs in a thread of its own
     simulated: ClassVar[bool] = False  # exists only in simulation
     type_name: ClassVar[str] = ""  # set by the decorator
 
@@ -91,6 +100,16 @@ class Component(Generic[C]):
         """Tell whether nothing that this component moves is moving."""
         return True
 
+    @property
+    def occupation(self) -> str:
+        """Return what it is at that a restart would cut off, such as `mission patrol runs`; empty if nothing."""
+        return ""
+
+    @property
+    def claims(self) -> bool:
+        """Tell whether its occupation claims what moves the robot."""
+        return False
+
     def info(self, text: str) -> None:
         """Log an event of the robot's story."""
         self.context.log(Level.OK, text)
@@ -112,6 +131,9 @@ class Component(Generic[C]):
         Raises:
             Refused: if it cannot be done now, with the reason; `config` is `old` again then.
         """
+
+    def take_over(self, old: Self) -> None:
+        """Go on in the place of `old`, which had other settings and has been retired; comes after `configure`."""
 
     def activate(self) -> None:
         """Start to work; steps and messages come from now on."""
@@ -140,6 +162,12 @@ class Component(Generic[C]):
     def release(self) -> None:
         """Allow motion again; start none."""
 
+    def hold(self) -> None:
+        """Command nothing but rest until `go_on`: robot time stands still, and so do all deadlines."""
+
+    def go_on(self) -> None:
+        """Command again: robot time goes again. What was commanded before does not count any more."""
+
     def brake(self) -> None:
         """Come to rest for good: the robot is going down."""
 
@@ -153,6 +181,14 @@ class Component(Generic[C]):
             Refused: if it cannot be done, with the reason.
         """
         raise Refused(f"'{self.name}' does not know the command '{verb}'")
+
+    def query(self, words: str) -> str:
+        """Answer a question of a person or a tool; it changes nothing and is asked as often as they like.
+
+        Raises:
+            Refused: if there is no answer, with the reason.
+        """
+        raise Refused(f"'{self.name}' has no answer to '{words}'")
 
     def summary(self) -> dict[str, str]:
         """Return facts for the summary at the end, by their label."""

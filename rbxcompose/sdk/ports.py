@@ -5,6 +5,8 @@ On a class, a port is its declaration; on a component, it is the live thing that
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, overload
 
 from rbxcompose.msgs.types import Action, Message, Service
@@ -69,11 +71,22 @@ class In(Port[Latest[M]]):
     kind = "in"
 
     def __init__(
-        self, message: type[M], topic: str, *, qos: Qos | str = Qos.STATE, unit: str = "", is_open: bool = False
+        self,
+        message: type[M],
+        topic: str,
+        *,
+        qos: Qos | str = Qos.STATE,
+        unit: str = "",
+        is_open: bool = False,
+        max_rate: float | None = None,
     ) -> None:
-        """Take `is_open` for an input that may well be fed from outside the robot."""
+        """Take `is_open` for an input that may well be fed from outside the robot.
+
+        At most `max_rate` messages a second are taken from each publisher of another process [Hz]; a command has a
+        bound anyway.
+        """
         super().__init__(topic)
-        self.interface, self.qos, self.unit, self.is_open = message, Qos(qos), unit, is_open
+        self.interface, self.qos, self.unit, self.is_open, self.max_rate = message, Qos(qos), unit, is_open, max_rate
 
 
 class Serves(Port[None]):
@@ -99,17 +112,36 @@ class Calls(Port[Caller[Q, R]]):
 class ServesAction(Port[ActionServer[G, R, F]]):
     """Carries out goals, one at a time; a newer one replaces it. It is a skill of every mission under its topic's name.
 
-    `claims` names what of the robot a goal needs for itself (`base`, `arm`, `head`, `voice`). The optional method
-    `accept_<port>` may refuse a goal by returning the reason.
+    `claims` names what of the robot a goal needs for itself (`base`, `arm`, `head`, `voice`). `outcomes` are ends
+    beyond success and failure, each with which of the two it counts as; the result tells them in its text field
+    `outcome`. One that is `pausable` minds `current.is_paused`: goals are held by the service `<topic>/pause`. The
+    optional method `accept_<port>` may refuse a goal by returning the reason.
     """
 
     kind = "serves_action"
 
     def __init__(
-        self, action: type[Action[G, R, F]], topic: str, *, claims: str = "", restartable: bool = True
+        self,
+        action: type[Action[G, R, F]],
+        topic: str,
+        *,
+        claims: str = "",
+        restartable: bool = True,
+        pausable: bool = False,
+        outcomes: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
+        """Declare it.
+
+        Raises:
+            ValueError: if there are outcomes, but no field of the result for them, or one counts as something else.
+        """
         super().__init__(topic)
+        if outcomes and action.Result.FIELDS.get("outcome") != "string":
+            raise ValueError(f"{action.TYPE} has no text field 'outcome' in its result")
+        if wrong := set(outcomes.values()) - {"success", "failure"}:
+            raise ValueError(f"an outcome counts as success or failure, not as {', '.join(sorted(wrong))}")
         self.interface, self.claims, self.restartable = action, claims, restartable
+        self.pausable, self.outcomes = pausable, outcomes
 
 
 class CallsAction(Port[ActionCaller[G, R, F]]):

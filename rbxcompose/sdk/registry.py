@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from rbxcompose.plugins import Plugins
+from rbxcompose.plugins import BrokenPluginError, Plugins
 from rbxcompose.sdk.component import Component
 
 T = TypeVar("T", bound=type[Component[Any]])
@@ -18,10 +18,13 @@ def component(name: str) -> Callable[[T], T]:
     """Register a component class under its type's name.
 
     Raises:
+        TypeError: if it is no subclass of `Component`.
         ValueError: if another class has this name.
     """
 
     def register(cls: T) -> T:
+        if not issubclass(cls, Component):
+            raise TypeError(f"{cls.__module__}.{cls.__qualname__} is no subclass of Component")
         other = _TYPES.get(name)
         if other is not None and (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
             raise ValueError(f"two component types are named '{name}': {other.__module__} and {cls.__module__}")
@@ -42,7 +45,31 @@ def component_type(name: str) -> type[Component[Any]]:
 
     Raises:
         KeyError: if no type has this name.
+        BrokenPluginError: if it is that of another package and cannot be used.
     """
     if name not in _TYPES:
-        PLUGINS.load(name)
+        _load(name)
     return _TYPES[name]
+
+
+def usable_names() -> list[str]:
+    """Import all types and return their names, sorted, but for those of other packages that are broken."""
+    return [name for name in component_names() if _is_usable(name)]
+
+
+def _is_usable(name: str) -> bool:
+    try:
+        component_type(name)
+    except BrokenPluginError:  # told when a manifest uses it
+        return False
+    return True
+
+
+def _load(name: str) -> None:
+    try:
+        is_there = PLUGINS.load(name)
+    except BrokenPluginError:
+        _TYPES.pop(name, None)  # it may have come as far as that
+        raise
+    if is_there and name not in _TYPES:
+        raise PLUGINS.broken(name, f"its module declares no class by @component({name!r})")

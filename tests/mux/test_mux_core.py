@@ -210,15 +210,34 @@ def test_it_says_who_holds_the_output() -> None:
 
 def test_it_says_why_nothing_passes() -> None:
     core = mux(locks=LOCKS)
-    assert core.why(0.0) == "no input"
+    assert mux().why(0.0) == "no input"
+    silent = "door gives no heartbeat: teleop and navigation are locked out"
+    assert (core.why(0.0), core.refused(0.0)) == (silent, [])
     core.receive("teleop", 2.0, 0.0)
-    assert core.why(0.1) == "door locked: no heartbeat"
+    assert (core.why(0.1), core.refused(0.1)) == (silent, ["teleop"])
     core.stop(0.2)
     assert core.why(0.2) == "stopped"
     core.release(0.3)
-    assert core.why(0.3) == "teleop must come to rest once after the stop"
+    assert core.why(0.3) == f"teleop must come to rest once after the stop; {silent}"
     core.close(0.4)
     assert core.why(0.4) == "closed: the robot is going down"
+
+
+def test_an_input_above_a_silent_lock_holds_while_the_others_are_locked_out() -> None:
+    core = mux(locks=LOCKS)
+    core.receive("safety", 3.0, 0.1)
+    assert core.why(0.1).startswith("safety holds until 0.30 s; door gives no heartbeat: ")
+    core.heartbeat("door", 0.2)
+    assert (core.why(0.2), core.locked_out(0.2)) == ("safety holds until 0.30 s", [])
+
+
+def test_a_lock_that_falls_silent_is_told_in_time_though_nothing_moves() -> None:
+    core = mux(locks=LOCKS)
+    core.heartbeat("door", 1.0)
+    deadline = core.next_deadline()
+    assert deadline == math.nextafter(1.3, 2.0)
+    assert core.locked_out(1.3) == []
+    assert core.locked_out(deadline) == ["teleop", "navigation"]
 
 
 @pytest.mark.parametrize("name", ["moon", ""])

@@ -6,113 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.config import Config
 from rbxcompose.diagnostics.levels import Level
-from rbxcompose.plan.model import BusPlan, Instance, Plan
+from rbxcompose.plan.model import BusPlan, Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.conductor import Conductor, Phase
+from rbxcompose.runtime.members import Phase
 from rbxcompose.runtime.options import RunOptions
-from rbxcompose.scheduler import Scheduler
-
-ENDPOINT = "tcp/127.0.0.1:7447"
-
-
-def robot() -> Plan:
-    """Three processes; `base` starts first, `world` holds simulated truth."""
-    instances = (
-        Instance("base", "toy", Config(), "world"),
-        Instance("mux", "toy", Config(), "robot"),
-        Instance("go_to", "toy", Config(), "robot", starts_after=("base",)),
-        Instance("mission", "toy", Config(), "mission"),
-    )
-    return Plan("robot", "robot.yaml", instances, start="patrol")
-
-
-class Stage:
-    """Plays the processes: it records what the conductor does and answers as processes would."""
-
-    def __init__(
-        self, plan: Plan | None = None, options: RunOptions | None = None, router: str | None = "router"
-    ) -> None:
-        self.scheduler = Scheduler()
-        self.plan = plan or robot()
-        self.alive: set[str] = set()
-        self.forks: list[tuple[str, bool, bool]] = []
-        self.sent: list[tuple[str, say.Order]] = []
-        self.killed: list[str] = []
-        self.ended: list[str] = []
-        self.records: list[tuple[Level, str]] = []
-        self.answers: list[tuple[int, str, bool]] = []
-        self.ups = 0
-        self.beats: set[str] = set()
-        self.conductor = Conductor(self.plan, options or RunOptions(), self.scheduler, self, router=router)
-        self.conductor.begin()
-
-    # Effects
-
-    def fork(self, process: str, *, is_restart: bool, is_stopped: bool) -> None:
-        self.forks.append((process, is_restart, is_stopped))
-        self.alive.add(process)
-        self.beats.add(process)
-
-    def send(self, process: str, message: say.Order) -> None:
-        self.sent.append((process, message))
-
-    def end(self, process: str) -> None:
-        self.ended.append(process)
-
-    def kill(self, process: str) -> None:
-        self.killed.append(process)
-
-    def log(self, level: Level, text: str, detail: str = "") -> None:
-        self.records.append((level, text))
-
-    def is_up(self) -> None:
-        self.ups += 1
-
-    def answer(self, number: int, text: str, *, is_refused: bool) -> None:
-        self.answers.append((number, text, is_refused))
-
-    # Processes
-
-    def speak(self, process: str, message: say.Word) -> None:
-        self.conductor.heard(process, message)
-
-    def exit(self, process: str, how: str = "was killed by SIGKILL") -> None:
-        self.alive.discard(process)
-        self.conductor.exited(process, how)
-
-    def configure(self, *processes: str) -> None:
-        for process in processes:
-            self.speak(process, say.Configured(ENDPOINT if process == "router" else None))
-
-    def activate(self) -> None:
-        """Answer every order to activate, in turn, until there are no more."""
-        answered = 0
-        while answered < len(self.orders(say.Activate)):
-            process, message = self.orders(say.Activate)[answered]
-            assert isinstance(message, say.Activate)
-            self.speak(process, say.States(dict.fromkeys(message.names, ("active", 0))))
-            answered += 1
-
-    def start(self) -> Stage:
-        self.configure("router", "world", "robot", "mission")
-        self.activate()
-        return self
-
-    def orders(self, kind: type[say.Order]) -> list[tuple[str, say.Order]]:
-        return [(process, message) for process, message in self.sent if isinstance(message, kind)]
-
-    def told(self, kind: type[say.Order]) -> list[str]:
-        return [process for process, _ in self.orders(kind)]
-
-    def pass_time(self, seconds: float) -> None:
-        """Let time pass while the processes in `beats` give signs of life."""
-        for _ in range(round(seconds / 0.1)):
-            for process in sorted(self.alive & self.beats):
-                self.speak(process, say.Alive(self.scheduler.now))
-            self.scheduler.advance(self.scheduler.now + 0.1)
-
+from tests.runtime.stage import ENDPOINT, Stage, robot
 
 # The beginning
 
@@ -153,6 +52,15 @@ def test_the_robot_starts_once_all_are_active() -> None:
     stage.activate()
     assert (stage.ups, stage.told(say.Start)) == (1, ["world", "robot", "mission"])
     assert stage.conductor.phase is Phase.RUNNING
+
+
+def test_the_robot_is_told_to_be_up_before_anything_starts_that_could_tell_of_itself() -> None:
+    class Noting(Stage):
+        def is_up(self) -> None:
+            super().is_up()
+            assert self.told(say.Start) == []
+
+    assert Noting().start().ups == 1
 
 
 def test_a_component_that_is_restarted_in_place_delays_the_start() -> None:
@@ -372,6 +280,42 @@ def test_a_process_that_still_configures_may_be_silent() -> None:
     stage.beats.discard("robot")
     stage.pass_time(20.0)
     assert stage.killed == []
+
+
+def test_a_process_that_a_signal_suspends_is_told_at_once_and_ended_after_two_seconds() -> None:
+    stage = Stage().start()
+    stage.beats.discard("robot")
+    stage.suspended = {"robot"}
+    stage.pass_time(0.3)
+    assert {one.cause for _, one in stage.sent if isinstance(one, say.Lost)} == {
+        "process 'robot' was suspended by a signal"
+    }
+    assert stage.killed == []
+    stage.pass_time(2.0)
+    assert stage.killed == ["robot"]
+
+
+def test_a_process_that_is_suspended_while_it_gets_ready_is_ended_and_one_that_takes_long_is_not() -> None:
+    stage = Stage().start()
+    stage.exit("robot")
+    stage.pass_time(0.2)
+    assert stage.forks[-1][0] == "robot"
+    stage.beats.discard("robot")
+    stage.pass_time(5.0)
+    assert stage.killed == []
+    stage.suspended = {"robot"}
+    stage.pass_time(0.3)
+    assert stage.killed == ["robot"]
+
+
+def test_a_supervisor_that_was_held_up_blames_nobody_for_it() -> None:
+    stage = Stage().start()
+    stage.pass_time(1.0)
+    stage.scheduler.advance(stage.scheduler.now + 30.0)
+    assert (stage.killed, stage.told(say.Lost)) == ([], [])
+    stage.beats.discard("robot")
+    stage.pass_time(2.5)
+    assert stage.killed == ["robot"]
 
 
 def test_on_a_stepped_clock_nobody_looks_for_silence() -> None:

@@ -8,8 +8,8 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.restarts import Restart
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.conductor import Phase
-from tests.runtime.test_conductor import Stage, robot
+from rbxcompose.runtime.members import Phase
+from tests.runtime.stage import Stage, robot
 
 NEVER = Restart(when="never")
 

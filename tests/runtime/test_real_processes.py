@@ -252,6 +252,15 @@ def test_without_the_prefork_parent_the_robot_goes_down(robot: Robot) -> None:
     assert robot.last_words("first") == ["braking", "deactivated"]
 
 
+def test_a_suspended_process_is_shown_as_such_and_told_to_the_others_before_it_is_started_again(robot: Robot) -> None:
+    robot.up_detached()
+    robot.process_of("first").send_signal(signal.SIGSTOP)
+    assert [one["state"] for one in robot.ps()["components"]] == ["suspended", "active"]
+    eventually(lambda: robot.has_logged("lost first: process 'robot' was suspended by a signal"))
+    eventually(lambda: robot.texts("first").count("started") == 2)
+    robot.do("down")
+
+
 def test_down_ends_a_stopped_process(robot: Robot) -> None:
     robot.up_detached()
     robot.process_of("first").send_signal(signal.SIGSTOP)
@@ -313,8 +322,7 @@ def test_a_robot_beside_another_takes_the_next_port(robot: Robot) -> None:
 def test_what_a_component_prints_is_in_the_log(robot: Robot) -> None:
     process = robot.up(runs=0.3, prints="hello from a toy")
     process.communicate(timeout=PATIENCE)
-    printed = [one.detail for one in read_log(robot.folder.path / NAME) if "what it had printed" in one.text]
-    assert printed == ["hello from a toy\n"]
+    assert "hello from a toy" in robot.texts("second")
 
 
 @pytest.mark.parametrize("options", [[], ["--rate", "200"]], ids=["max", "paced"])
@@ -330,6 +338,13 @@ def test_on_a_stepped_clock_two_runs_write_the_same_log(robot: Robot, options: l
     assert robot.texts("second")[-2:] == ["braking", "deactivated"]
 
 
+def test_on_a_stepped_clock_a_mission_that_waits_in_vain_ends_the_run(robot: Robot) -> None:
+    process = robot.up("--stepped", runs=20.0, outcome="waiting")
+    told, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 3
+    assert "mission toy: failure: waits" in told
+
+
 def test_on_a_stepped_clock_the_duration_is_exact(robot: Robot) -> None:
     process = robot.up("--stepped", "--duration", "7")
     process.communicate(timeout=PATIENCE)
@@ -342,4 +357,16 @@ def test_a_command_to_a_stepped_robot_is_told_to_end_reproducibility(robot: Robo
     eventually(lambda: robot.has_logged("step 10"))
     assert robot.do("stop").returncode == 0
     eventually(lambda: robot.has_logged("from outside: stop; this run is not reproducible"))
+    robot.do("down")
+
+
+def test_a_supervisor_that_was_stopped_for_a_while_goes_on_with_a_sound_robot(robot: Robot) -> None:
+    robot.up_detached()
+    supervisor, before = robot.supervisor(), robot.processes()
+    supervisor.send_signal(signal.SIGSTOP)
+    heard = len(robot.texts("first"))
+    eventually(lambda: len(robot.texts("first")) >= heard + 6)  # 3 s of its steps
+    supervisor.send_signal(signal.SIGCONT)
+    assert [(one["state"], one["restarts"]) for one in robot.ps()["components"]] == [("active", 0), ("active", 0)]
+    assert robot.processes() == before
     robot.do("down")

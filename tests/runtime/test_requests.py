@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
-from rbxcompose.config import Config
+from rbxcompose.components.mission import MissionConfig
 from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plan.dump import dump
 from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.restarts import Restart
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.conductor import Conductor
 from rbxcompose.runtime.folder import State
@@ -15,14 +18,13 @@ from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import Requests
 from rbxcompose.scheduler import Scheduler
 
-PLAN = Plan("toys", "toys.yaml", (Instance("patrol", "mission", Config(), "mission"),))
+PLAN = Plan("toys", "toys.yaml", (Instance("patrol", "mission", MissionConfig(), "mission"),))
 
 
 class Desk:
     """A supervisor without processes: everything that it would do is noted."""
 
     def __init__(self, *, is_stepped: bool = False) -> None:
-        self.plan = PLAN
         self.sent: list[tuple[str, say.Order]] = []
         self.texts: list[str] = []
         self.replies: list[tuple[int, object, bool]] = []
@@ -54,6 +56,12 @@ class Desk:
 
     def kill(self, process: str) -> None:
         raise AssertionError("no process is to be killed")
+
+    def is_suspended(self, process: str) -> bool:
+        return False
+
+    def states_changed(self) -> None:
+        pass
 
     def is_up(self) -> None:
         raise AssertionError("it is not up")
@@ -111,3 +119,30 @@ def test_on_a_stepped_clock_the_process_tells_the_command_itself() -> None:
     desk = Desk(is_stepped=True)
     desk.ask(verb="stop")
     assert desk.texts == []
+
+
+def test_another_plan_is_compared_first_and_taken_only_if_nobody_was_faster() -> None:
+    desk = Desk()
+    desk.conductor._is_running = True
+    text = dump(replace(PLAN, instances=(replace(PLAN.instances[0], restart=Restart(when="never")),)))
+    desk.requests.handle({"verb": "changes", "plan": text}, 1)
+    _, answer, is_refused = desk.replies.pop()
+    assert isinstance(answer, dict)
+    assert (is_refused, answer["generation"], answer["why_not"]) == (False, 0, "")
+    assert [one["fate"] for one in answer["components"]] == ["changed live"]
+    assert desk.ask(verb="apply", plan=text, generation=7)[0].startswith("it was changed by someone else meanwhile")
+    assert desk.sent == []
+
+
+def test_a_text_that_is_no_plan_is_refused() -> None:
+    for verb in ("changes", "apply"):
+        assert Desk().ask(verb=verb, plan="{}", generation=0) == ("this is no plan of version 1", True)
+
+
+def test_what_cannot_be_done_now_is_refused_with_the_reason() -> None:
+    desk = Desk(is_stepped=True)
+    desk.conductor._is_running = True
+    text = dump(replace(PLAN, start="other"))
+    assert "'why_not': ''" in desk.ask(verb="changes", plan=text)[0]  # nothing that runs would be other
+    text = dump(replace(PLAN, instances=(replace(PLAN.instances[0], process="other"),)))
+    assert desk.ask(verb="apply", plan=text, generation=0)[0].startswith("it runs on a stepped clock")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from rbxcompose.diagnostics.levels import Level
@@ -24,3 +26,13 @@ def test_a_failure_is_told_on_rosout_too() -> None:
     bench.host.failed("battery", ValueError("planted"))
     bench.advance(0.0)
     assert (lines[0].level, lines[0].name, "planted" in lines[0].msg) == (Log.ERROR, "battery", True)
+
+
+def test_what_is_below_the_level_of_a_component_goes_nowhere() -> None:
+    bench = Bench(replace(instance("battery", "battery_sim", {"runtime": "45 s"}), log=Level.WARN))
+    lines = bench.collect("/rosout", Log)
+    for level in (Level.OK, Level.WARN, Level.ERROR):
+        bench.component("battery").context.log(level, level.name)
+    bench.advance(0.0)
+    assert [one.msg for one in lines] == ["WARN", "ERROR"]
+    assert [one.text for one in bench.records] == ["WARN", "ERROR"]

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import select
 import threading
 
@@ -45,4 +46,14 @@ def test_nothing_is_lost_between_threads(threads: int) -> None:
         scheduler.advance(0.0)
     for worker in workers:
         worker.join()
+    inbox.close()
+
+
+def test_a_signal_written_after_the_other_was_heard_is_read_as_well() -> None:
+    inbox, scheduler, ran = Inbox(), Scheduler(), list[int]()
+    inbox.put("x", lambda: ran.append(1))
+    inbox.drain(scheduler)
+    os.eventfd_write(inbox.fileno(), 1)  # of a thread that had looked at the flag before the first signal
+    inbox.drain(scheduler)
+    assert not is_readable(inbox), "the process would turn without end"
     inbox.close()

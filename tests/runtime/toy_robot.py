@@ -88,7 +88,11 @@ class Toy(Component[ToyConfig]):
             time.sleep(60.0)
         if self.config.runs and self.has_started and self.now >= self.config.runs:
             self.has_started = False
-            self.context.notify("mission_ended", mission="toy", outcome=self.config.outcome, message="")
+            is_waiting = self.config.outcome == "waiting"
+            event = "mission_waits" if is_waiting else "mission_ended"
+            self.context.notify(
+                event, mission="toy", outcome=self.config.outcome, message="waits" if is_waiting else ""
+            )
 
     def command(self, verb: str) -> str:
         if verb != "pause":

@@ -1,0 +1,127 @@
+"""What code prints, or tells Python's `logging`, becomes lines of the robot's log."""
+
+from __future__ import annotations
+
+import io
+import logging
+import os
+import stat
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import TextIO
+
+from rbxcompose.diagnostics.levels import Level
+
+Told = Callable[[Level, str, str], None]  # level, text, detail; called by whichever thread printed
+
+_OUTPUT = Path("/proc/self/fd/1")
+
+
+class Capture:
+    """Takes standard output, standard error and all loggers of this process while it is entered."""
+
+    def __init__(self, told: Told) -> None:
+        self._told = told
+        self._is_telling = threading.local()
+
+    def __enter__(self) -> Capture:
+        self._before = sys.stdout, sys.stderr
+        sys.stdout = _Lines(sys.__stdout__, lambda line: self._tell(Level.OK, line))
+        sys.stderr = _Lines(sys.__stderr__, lambda line: self._tell(Level.WARN, line))
+        self._handler = _Handler(self._tell)
+        root = logging.getLogger()
+        root.addHandler(self._handler)
+        self._level = root.level
+        root.setLevel(logging.INFO)
+        logging.captureWarnings(True)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, _Lines):
+                stream.end()
+        sys.stdout, sys.stderr = self._before
+        logging.captureWarnings(False)
+        logging.getLogger().removeHandler(self._handler)
+        logging.getLogger().setLevel(self._level)
+
+    def _tell(self, level: Level, text: str, detail: str = "") -> None:
+        if getattr(self._is_telling, "now", False):
+            os.write(2, f"{text}\n{detail}".encode(errors="backslashreplace"))  # the log itself has something to say
+            return
+        self._is_telling.now = True
+        try:
+            self._told(level, text, detail)
+        finally:
+            self._is_telling.now = False
+
+
+class _Lines(io.TextIOBase):
+    """A stream of whole lines; what a thread has not ended yet waits for the rest."""
+
+    def __init__(self, raw: TextIO | None, told: Callable[[str], None]) -> None:
+        self._raw, self._told = raw, told
+        self._begun: dict[int, str] = {}  # by thread
+
+    def writable(self) -> bool:
+        return True
+
+    def fileno(self) -> int:
+        if self._raw is None:
+            raise io.UnsupportedOperation("there is no file below")
+        return self._raw.fileno()
+
+    def write(self, text: str) -> int:
+        thread = threading.get_ident()
+        *lines, rest = (self._begun.pop(thread, "") + text).split("\n")
+        if rest:
+            self._begun[thread] = rest
+        for line in lines:
+            self._say(line)
+        return len(text)
+
+    def end(self) -> None:
+        """Tell what was begun and will not be ended."""
+        while self._begun:
+            self._say(self._begun.popitem()[1])
+
+    def _say(self, line: str) -> None:
+        if line.strip():
+            self._told(line.rstrip("\r"))
+
+
+class _Handler(logging.Handler):
+    def __init__(self, told: Told) -> None:
+        super().__init__()
+        self._told = told
+
+    def emit(self, record: logging.LogRecord) -> None:
+        try:
+            text, detail = f"{record.name}: {record.getMessage()}", ""
+            if record.exc_info:
+                detail = logging.Formatter().formatException(record.exc_info)
+        except Exception:  # arguments that do not fit their text: this is how logging itself tells it
+            self.handleError(record)
+            return
+        self._told(_level_of(record.levelno), text, detail)
+
+
+def _level_of(number: int) -> Level:
+    if number >= logging.ERROR:
+        return Level.ERROR
+    return Level.WARN if number >= logging.WARNING else Level.OK
+
+
+def take_printed() -> list[str]:
+    """Return the lines that came to the file behind standard output past Python, such as from C, and empty it."""
+    about = os.fstat(1)
+    if not stat.S_ISREG(about.st_mode) or not about.st_size:
+        return []
+    text = _OUTPUT.read_text(encoding="utf-8", errors="replace")
+    os.ftruncate(1, 0)
+    return [line for line in text.splitlines() if line.strip()]

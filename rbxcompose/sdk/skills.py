@@ -1,0 +1,170 @@
+"""Skills in Python: a function, or a class for what takes time; each is one file and one decorator.
+
+They run in the process of missions, so a call has 5 ms; what computes or waits longer is a component with an action.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
+
+from rbxcompose.config import Dimensioned, Place
+from rbxcompose.expressions.types import COUNT, FLAG, PLACE, POSE, TEXT, Type, choice_of, quantity_of
+from rbxcompose.geometry import Pose2
+from rbxcompose.plugins import BrokenPluginError, Plugins
+from rbxcompose.units import NUMBER
+
+PLUGINS = Plugins("skill", "rbxcompose.skills")
+Told = bool | str | Mapping[str, object]  # how a skill ended: well or not, with an outcome, or well and what it found
+
+F = TypeVar("F", bound=Callable[..., Any])
+_SKILLS: dict[str, SkillType] = {}
+_TYPES: Mapping[Any, Type] = {
+    str: TEXT,
+    bool: FLAG,
+    int: COUNT,
+    float: quantity_of(NUMBER),
+    Place: PLACE,
+    Pose2: POSE,
+}
+
+
+class Activity:
+    """A skill that takes time: one object for each time that it is started.
+
+    `start` takes the arguments. `step` is called `rate` times a second, the first time at once, with the robot time
+    [s], until it returns how it ended. Who can be paused defines `pause` and `resume`, and is declared as `pausable`.
+    """
+
+    rate: ClassVar[float] = 20.0  # [Hz] of `step`
+
+    def step(self, now: float) -> Told | None:
+        """Go on; return None while it is not done."""
+        raise NotImplementedError
+
+    def halt(self) -> None:
+        """Stop at once: nobody waits for it any more."""
+
+    def pause(self, now: float) -> None:
+        """Hold, at robot time `now` [s]; no steps come until `resume`."""
+
+    def resume(self, now: float) -> None:
+        """Go on, at robot time `now` [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class SkillType:
+    """A declared skill: `make` is the function, or the class of the activity. The first argument is the main one."""
+
+    name: str
+    make: Callable[..., Any]
+    arguments: Mapping[str, Type]
+    required: frozenset[str]
+    claims: str = ""
+    restartable: bool = True
+    pausable: bool = False
+    outcomes: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def main(self) -> str:
+        """Return the argument that a single value is."""
+        return next(iter(self.arguments), "")
+
+    @property
+    def is_activity(self) -> bool:
+        """Tell whether it may take time."""
+        return inspect.isclass(self.make)
+
+
+def skill(
+    name: str,
+    *,
+    claims: str = "",
+    restartable: bool = True,
+    pausable: bool = False,
+    outcomes: Mapping[str, str] = MappingProxyType({}),
+) -> Callable[[F], F]:
+    """Declare a skill: a function with typed arguments, or an `Activity` whose `start` has them.
+
+    It ends with True, False, one of its `outcomes` (each counts as `success` or `failure`), or a map of what it found
+    out; a function that returns nothing has succeeded. What it raises is a failure. `claims` is the part of the robot
+    that it needs for itself.
+
+    Raises:
+        TypeError: if an argument has no type that a mission can write, or an activity cannot be used.
+        ValueError: if another skill has this name, or an outcome counts as something else.
+    """
+
+    def register(made: F) -> F:
+        if wrong := set(outcomes.values()) - {"success", "failure"}:
+            raise ValueError(f"an outcome counts as success or failure, not as {', '.join(sorted(wrong))}")
+        other = _SKILLS.get(name)
+        if other is not None and _place(other.make) != _place(made):
+            raise ValueError(f"two skills are named '{name}': {_place(other.make)} and {_place(made)}")
+        arguments, required = _arguments(made)
+        _SKILLS[name] = SkillType(name, made, arguments, required, claims, restartable, pausable, outcomes)
+        return made
+
+    return register
+
+
+def skill_names() -> list[str]:
+    """Return the names of all skills in Python, sorted; nothing is imported for it."""
+    return sorted({*PLUGINS.names(), *_SKILLS})
+
+
+def skill_type(name: str) -> SkillType:
+    """Import a skill's file, if that is still to be done, and return the skill.
+
+    Raises:
+        KeyError: if there is none of this name.
+        BrokenPluginError: if it is that of another package and cannot be used.
+    """
+    if name not in _SKILLS:
+        try:
+            is_there = PLUGINS.load(name)
+        except BrokenPluginError:
+            _SKILLS.pop(name, None)
+            raise
+        if is_there and name not in _SKILLS:
+            raise PLUGINS.broken(name, f"its module declares no skill by @skill({name!r})")
+    return _SKILLS[name]
+
+
+def _place(made: Callable[..., Any]) -> str:
+    return f"{made.__module__}.{made.__qualname__}"
+
+
+def _arguments(made: Callable[..., Any]) -> tuple[dict[str, Type], frozenset[str]]:
+    """Return the arguments with their types, and those that have no default."""
+    function: Callable[..., Any] = made
+    if inspect.isclass(made):
+        if not issubclass(made, Activity) or not callable(getattr(made, "start", None)):
+            raise TypeError(f"{_place(made)} is no subclass of Activity with a method 'start'")
+        function = getattr(made, "start")  # noqa: B009 - each subclass has arguments of its own
+    hints = get_type_hints(function, include_extras=True)
+    found: dict[str, Type] = {}
+    required = set()
+    for name, parameter in inspect.signature(function).parameters.items():
+        if name == "self":
+            continue
+        if parameter.kind not in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY):
+            raise TypeError(f"{_place(made)}: '*{name}' cannot be written in a mission")
+        found[name] = _type_of(hints.get(name), f"{_place(made)}: the argument '{name}'")
+        if parameter.default is parameter.empty:
+            required.add(name)
+    return found, frozenset(required)
+
+
+def _type_of(hint: Any, who: str) -> Type:
+    for one in getattr(hint, "__metadata__", ()):
+        if isinstance(one, Dimensioned):
+            return quantity_of(one.dimension)
+    if get_origin(hint) is Literal:
+        return choice_of(*get_args(hint))
+    if hint not in _TYPES:
+        raise TypeError(f"{who} needs a type: a quantity such as Speed, Place, Pose2, str, bool, int, float or Literal")
+    return _TYPES[hint]
