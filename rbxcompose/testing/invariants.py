@@ -1,0 +1,281 @@
+"""What *safe* means: laws that each run of a robot keeps, whatever fails. They are applied to what the run has told.
+
+A `Story` is read from recorded messages: of a stepped run, or of a recording of real processes. All times are robot
+time [s], velocities [m/s] and [rad/s].
+
+- Unwarranted motion: the base moves only by a live command. After the last one it may follow it for its timeout and two
+  cycles, and then brakes: `v(t) <= v_max - a (t - deadline)`. A stop ends every command that was sent before a release.
+- Unheeded stop: between stop and release a mux lets nothing through but rest.
+- Second winner: a mux forwards what one of its inputs has just sent; while that input lives, none of lower priority.
+- Shared claim: of the goals that claim the same part of the robot, one at most is carried out.
+- Endless goal: a goal that was accepted ends within the longest time that one may take.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from rbxcompose.bus.goals import GoalState
+
+ROBOT = "robot itself"  # whom a stop or a release is told first; each process hears of it a little later
+ROUNDING = 1e-6  # a velocity this small is rest [m/s, rad/s]
+
+Velocity = tuple[float, float]  # forwards [m/s], turning [rad/s]
+
+
+@dataclass(frozen=True, slots=True)
+class Base:
+    """What a base follows, and how it brakes."""
+
+    command: str  # topic
+    motion: str  # topic of its odometry
+    process: str
+    timeout: float
+    cycle: float
+    deceleration: Velocity  # [m/s^2], [rad/s^2]
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """An input of a mux: the larger priority wins, until it was silent for the timeout."""
+
+    priority: int
+    timeout: float
+
+
+@dataclass(frozen=True, slots=True)
+class Switch:
+    """A mux: its output, and its inputs by their topics."""
+
+    output: str
+    process: str
+    inputs: Mapping[str, Source]
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """The part of the robot that the goals of an action need for themselves, and the process of its server."""
+
+    part: str
+    process: str
+
+
+@dataclass(frozen=True, slots=True)
+class Laws:
+    """What a robot has to keep to.
+
+    `slack` is how late a message may be that was sent, on its way or since a process hung; `is_lossless` tells that
+    each one arrives.
+    """
+
+    bases: Sequence[Base] = ()
+    switches: Sequence[Switch] = ()
+    claims: Mapping[str, Claim] = field(default_factory=dict)  # by the name of the action
+    longest_goal: float = 60.0
+    slack: float = 0.0
+    is_lossless: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """A velocity on a topic: a command, or the motion that odometry tells."""
+
+    time: float
+    topic: str
+    velocity: Velocity
+
+    @property
+    def is_finite(self) -> bool:
+        """Tell whether it is a velocity at all."""
+        return math.isfinite(sum(self.velocity))
+
+    @property
+    def is_rest(self) -> bool:
+        """Tell whether nothing moves by it."""
+        return self.is_finite and max(map(abs, self.velocity)) <= ROUNDING
+
+
+@dataclass(frozen=True, slots=True)
+class Ordered:
+    """What a process was told to do: `stop`, `release`, `brake` for good, `shutdown`; or `begin`, when it is forked."""
+
+    time: float
+    process: str
+    verb: str
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """The goals of an action, by their ids, as its server told them; empty when the server has gone."""
+
+    time: float
+    action: str
+    goals: Mapping[bytes, GoalState]
+
+
+Event = Sent | Ordered | Told
+Story = Sequence[Event]  # by time
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """A law that was broken."""
+
+    time: float
+    law: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.time:.3f} s: {self.law}: {self.text}"
+
+
+def violations(laws: Laws, story: Story) -> list[Violation]:
+    """Return what was not safe, by time; the first violation of each law says more than those that follow from it."""
+    found: list[Violation] = []
+    for base in laws.bases:
+        found += unwarranted_motion(base, story, laws.slack)
+    for switch in laws.switches:
+        found += [
+            *unheeded_stop(switch, story),
+            *second_winner(switch, story, laws.slack, is_lossless=laws.is_lossless),
+        ]
+    found += [*shared_claim(laws.claims, story), *endless_goal(laws.claims, story, laws.longest_goal)]
+    return sorted(found, key=lambda one: one.time)
+
+
+def unwarranted_motion(base: Base, story: Story, slack: float) -> Iterator[Violation]:
+    """Yield where a base moved faster than it can, at the latest, have braked to."""
+    force = base.timeout + 2 * base.cycle + slack  # for how long it may follow what was sent
+    deadline = commanded = -math.inf  # until when it may follow a command; when the last one was sent
+    is_stopped = False
+    fastest: Velocity = (0.0, 0.0)
+    for event in story:
+        match event:
+            case Ordered(time, process, "stop" | "brake") if process == base.process:
+                is_stopped, deadline = True, min(deadline, time + 2 * base.cycle)
+            case Ordered(time, process, "release") if process == base.process:
+                is_stopped = False
+                if commanded >= time - slack:  # it may still be on its way
+                    deadline = commanded + force
+            case Sent(time, topic, _) if topic == base.command and event.is_finite and not event.is_rest:
+                commanded = time
+                deadline = deadline if is_stopped else time + force
+            case Sent(time, topic, velocity) if topic == base.motion:
+                fastest = (max(fastest[0], abs(velocity[0])), max(fastest[1], abs(velocity[1])))
+                late = max(0.0, time - deadline)
+                allowed = [max(0.0, most - rate * late) for most, rate in zip(fastest, base.deceleration, strict=True)]
+                if any(abs(one) > most + ROUNDING for one, most in zip(velocity, allowed, strict=True)):
+                    words = f"{velocity} at {base.motion}, {late:.3f} s after the last command had lost its force"
+                    yield Violation(time, "unwarranted motion", words)
+
+
+def unheeded_stop(switch: Switch, story: Story) -> Iterator[Violation]:
+    """Yield what a mux let through while it was stopped, or after it had braked for good."""
+    is_stopped = is_closed = is_wanted = False
+    for event in story:
+        match event:
+            case Ordered(_, process, "stop" | "release" as verb) if process == ROBOT:
+                is_wanted = verb == "stop"
+            case Ordered(_, process, verb) if process == switch.process:
+                is_stopped = is_wanted if verb == "begin" else verb == "stop" or (is_stopped and verb != "release")
+                is_closed = verb == "brake" or (is_closed and verb != "begin")
+            case Sent(time, topic, velocity) if topic == switch.output and not event.is_rest:
+                if is_stopped or is_closed:
+                    yield Violation(time, "unheeded stop", f"{velocity} went through to {topic}")
+
+
+def second_winner(switch: Switch, story: Story, slack: float, *, is_lossless: bool) -> Iterator[Violation]:
+    """Yield what a mux invented, and what it let through beside an input of higher priority.
+
+    That is one which it has let through within its timeout; if no message can be lost, also one that has just spoken
+    and does not have to come to rest first.
+    """
+    inputs = {topic: _Input(source) for topic, source in switch.inputs.items()}
+    for event in story:
+        match event:
+            case Ordered(_, process, _) if process == switch.process:
+                for one in inputs.values():
+                    one.forget()
+            case Sent(_, topic, _) if topic in inputs:
+                inputs[topic].hear(event, slack)
+            case Sent(time, topic, velocity) if topic == switch.output and not event.is_rest:
+                senders = [name for name, one in inputs.items() if one.has_sent(velocity, time - slack)]
+                if not senders:
+                    yield Violation(time, "second winner", f"no input has sent {velocity}, which is on {topic}")
+                    continue
+                winner = max(senders, key=lambda name: inputs[name].source.priority)
+                inputs[winner].won = time
+                for name, one in inputs.items():
+                    since = max(one.won, one.spoke_before(time - slack) if is_lossless else -math.inf)
+                    if one.source.priority > inputs[winner].source.priority and time < since + one.source.timeout:
+                        yield Violation(time, "second winner", f"{winner} beside {name}, which lives since {since:.3f}")
+
+
+class _Input:
+    """What is known of an input of a mux since its last stop, release or restart."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.won = -math.inf  # when it was let through last
+        self._recent: deque[Sent] = deque(maxlen=200)
+        self._counting: deque[float] = deque(maxlen=200)  # when it spoke, and had not to come to rest first
+        self._is_held = False
+
+    def forget(self) -> None:
+        self.won, self._is_held = -math.inf, bool(self._recent)
+        self._counting.clear()
+
+    def hear(self, sent: Sent, slack: float) -> None:
+        if not sent.is_finite:
+            return
+        last = self._recent[-1].time if self._recent else -math.inf
+        self._is_held = self._is_held and not sent.is_rest and sent.time <= last + self.source.timeout + slack
+        self._recent.append(sent)
+        if not self._is_held:
+            self._counting.append(sent.time)
+
+    def has_sent(self, velocity: Velocity, since: float) -> bool:
+        return any(one.velocity == velocity and one.time >= since - ROUNDING for one in self._recent)
+
+    def spoke_before(self, time: float) -> float:
+        return max((one for one in self._counting if one <= time), default=-math.inf)
+
+
+def shared_claim(claims: Mapping[str, Claim], story: Story) -> Iterator[Violation]:
+    """Yield where two goals that claim the same are carried out; one that is being cancelled does not count."""
+    executing: dict[str, dict[bytes, GoalState]] = {}  # action -> goals
+    for event in story:
+        if isinstance(event, Ordered) and event.verb == "begin":
+            executing = {name: one for name, one in executing.items() if claims[name].process != event.process}
+        if not isinstance(event, Told) or event.action not in claims:
+            continue
+        executing[event.action] = {id_: state for id_, state in event.goals.items() if state is GoalState.EXECUTING}
+        part = claims[event.action].part
+        rivals = [name for name, goals in executing.items() if claims[name].part == part for _ in goals]
+        if len(rivals) > 1:
+            yield Violation(event.time, "shared claim", f"{' and '.join(rivals)} both have '{part}'")
+
+
+def endless_goal(claims: Mapping[str, Claim], story: Story, longest: float) -> Iterator[Violation]:
+    """Yield each goal that did not end in time, or that was left open by a process which was shut down."""
+    began: dict[str, dict[bytes, float]] = {name: {} for name in claims}
+    closed: set[str] = set()  # processes
+    for event in story:
+        match event:
+            case Ordered(_, process, "begin"):
+                closed.discard(process)
+                began.update((name, {}) for name, one in claims.items() if one.process == process)
+            case Ordered(_, process, "shutdown"):
+                closed.add(process)
+            case Told(time, action, goals) if action in claims:
+                is_open = {id_ for id_, state in goals.items() if not state.is_end}
+                began[action] = {id_: began[action].get(id_, time) for id_ in is_open}
+        for name, since in began.items():
+            for id_ in [id_ for id_, time in since.items() if event.time - time > longest]:
+                yield Violation(event.time, "endless goal", f"a goal of {name} has run since {since.pop(id_):.3f} s")
+    for name, since in began.items():
+        if since and claims[name].process in closed:
+            yield Violation(story[-1].time, "endless goal", f"a goal of {name} was left open")

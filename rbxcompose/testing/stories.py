@@ -1,0 +1,88 @@
+"""The laws of a robot from its plan, and stories from what was recorded of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from rbxcompose.bus.goals import GoalState
+from rbxcompose.bus.names import ActionNames
+from rbxcompose.clock import NANOSECONDS
+from rbxcompose.components.diff_drive_sim import DiffDriveSim, DiffDriveSimConfig
+from rbxcompose.components.mux import MuxConfig
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.action_msgs import GoalStatusArray
+from rbxcompose.msgs.cdr import decode
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.recording.message import Recorded
+from rbxcompose.sdk.ports import ServesAction
+from rbxcompose.sdk.registry import component_type
+from rbxcompose.testing.invariants import Base, Claim, Event, Laws, Ordered, Sent, Source, Switch, Told
+
+
+def laws_of(plan: Plan, *, slack: float = 0.0, is_lossless: bool = False, longest_goal: float = 60.0) -> Laws:
+    """Return what a robot has to keep to: its bases, its muxes of velocities, what its actions claim."""
+    switches = (_switch(one) for one in plan.instances if isinstance(one.config, MuxConfig) and _is_twist(one.config))
+    return Laws(
+        bases=[_base(one, one.config) for one in plan.instances if isinstance(one.config, DiffDriveSimConfig)],
+        switches=list(switches),
+        claims=dict(_claims(plan)),
+        longest_goal=longest_goal,
+        slack=slack,
+        is_lossless=is_lossless,
+    )
+
+
+def events_of(laws: Laws, told: Iterable[Recorded | Ordered], start: int = 0) -> Iterator[Event]:
+    """Yield what messages tell, in their order, among orders; `start` is robot time 0 on the messages' clock [ns]."""
+    commands = {one.command for one in laws.bases} | {one.output for one in laws.switches}
+    commands |= {topic for one in laws.switches for topic in one.inputs}
+    motions = {one.motion for one in laws.bases}
+    goals = {ActionNames.of(name).status: name for name in laws.claims}
+    for message in told:
+        if isinstance(message, Ordered):
+            yield message
+            continue
+        time, topic = (message.log_time - start) / NANOSECONDS, message.topic.name
+        if topic in motions:
+            yield Sent(time, topic, _velocity(decode(Odometry, message.payload).twist.twist))
+        elif topic in commands and message.topic.type == Twist.TYPE:
+            yield Sent(time, topic, _velocity(decode(Twist, message.payload)))
+        elif topic in goals:
+            statuses = decode(GoalStatusArray, message.payload).status_list
+            yield Told(time, goals[topic], {one.goal_info.goal_id.uuid: GoalState(one.status) for one in statuses})
+
+
+def _velocity(twist: Twist) -> tuple[float, float]:
+    return twist.linear.x, twist.angular.z
+
+
+def _base(instance: Instance, config: DiffDriveSimConfig) -> Base:
+    return Base(
+        command=instance.topic("cmd_vel"),
+        motion=instance.topic("odom"),
+        process=instance.process,
+        timeout=config.command_timeout,
+        cycle=1.0 / DiffDriveSim.rate,
+        deceleration=(config.acceleration, config.turn_acceleration),
+    )
+
+
+def _is_twist(config: MuxConfig) -> bool:
+    return registry.message(config.message) is Twist
+
+
+def _switch(instance: Instance) -> Switch:
+    config = instance.config
+    assert isinstance(config, MuxConfig)  # noqa: S101
+    inputs = {instance.topic(name): Source(one.priority, one.timeout) for name, one in config.inputs.items()}
+    return Switch(instance.topic("output"), instance.process, inputs)
+
+
+def _claims(plan: Plan) -> Iterator[tuple[str, Claim]]:
+    """Yield each action whose goals claim a part of the robot, by its full name."""
+    for one in plan.instances:
+        for name, port in component_type(one.type).ports(one.config).items():
+            if isinstance(port, ServesAction) and port.claims:
+                yield one.topic(name), Claim(port.claims, one.process)

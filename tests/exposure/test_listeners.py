@@ -1,0 +1,202 @@
+"""What a running robot listens on, and what becomes of those who attack that: they are refused, the robot goes on."""
+
+from __future__ import annotations
+
+import os
+import selectors
+import shutil
+import signal
+import socket
+import stat
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rbxcompose.bus.probe import probe_key
+from rbxcompose.bus.transport import Answer
+from rbxcompose.bus.zenoh_session import open_client
+from rbxcompose.bus.zenoh_transport import ZenohTransport
+from rbxcompose.runtime import control
+from rbxcompose.runtime.control import ControlServer, ask
+from rbxcompose.runtime.folder import SOCKET, RobotFolder
+from tests.exposure.attacks import ON_CONTROL, ON_ROUTER, REQUESTS, sending
+from tests.exposure.sockets import Listener, listeners
+from tests.runtime.test_real_processes import Robot, eventually
+from tests.soak import Soak
+
+NOBODY = 65534  # uid
+QUICK_ANSWER = 2.0  # [s]
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[Robot]:
+    """A robot that is up for all tests of this module, and leaves nothing behind but its logs."""
+    base = Path(tempfile.mkdtemp(prefix="rbx"))
+    made = Robot(f"exposed_{os.getpid()}", base)
+    made.up_detached()
+    port = made.ps()["router"]["endpoint"].rpartition(":")[2]
+    yield made
+    down = made.do("down")
+    left = made.processes()
+    for one in left:
+        one.send_signal(signal.SIGKILL)
+    files = {path.name for path in made.folder.path.iterdir()} - {"log.jsonl", "log.1.jsonl"}
+    shutil.rmtree(base)
+    with socket.socket() as probe:
+        is_port_free = probe.connect_ex(("127.0.0.1", int(port))) != 0
+    assert (down.returncode, left, files, is_port_free) == (0, [], set(), True)
+
+
+@pytest.fixture(scope="module")
+def refused(soak: Soak) -> Iterator[list[str]]:
+    tried: list[str] = []
+    yield tried
+    soak.tell("attacks on listeners", len(tried), 0, "all refused: the robot went on, at the same processes")
+
+
+def found(robot: Robot) -> list[Listener]:
+    return listeners(one.pid for one in robot.processes())
+
+
+def alive(robot: Robot) -> list[int]:
+    return sorted(one.pid for one in robot.processes())
+
+
+def steps(robot: Robot) -> int:
+    return sum(text.startswith("step ") for text in robot.texts("first"))
+
+
+def test_a_robot_listens_on_the_loopback_interface_only(robot: Robot) -> None:
+    tcp = [one for one in found(robot) if one.protocol != "unix"]
+    assert tcp
+    assert all(one.is_loopback for one in tcp), tcp
+    assert {one.protocol for one in tcp} == {"tcp"}
+
+
+def test_each_process_has_one_port_at_most_and_the_supervisor_none(robot: Robot) -> None:
+    tcp = [one.pid for one in found(robot) if one.protocol == "tcp"]
+    assert len(tcp) == len(set(tcp))
+    shown = robot.ps()
+    assert shown["supervisor"]["pid"] not in tcp
+    assert shown["router"]["endpoint"].rpartition(":")[2] in {one.place for one in found(robot)}
+
+
+def test_the_only_unix_socket_is_that_of_the_supervisor_in_a_folder_of_its_own(robot: Robot) -> None:
+    unix = [one for one in found(robot) if one.protocol == "unix"]
+    assert [one.pid for one in unix] == [robot.ps()["supervisor"]["pid"]]
+    assert not any(one.place.startswith("@") for one in unix)
+    folder = robot.folder.path
+    assert [stat.S_IMODE(path.stat().st_mode) for path in (folder, folder.parent)] == [0o700, 0o700]
+    assert stat.S_ISSOCK((folder / SOCKET).stat().st_mode)
+    assert all(stat.S_IMODE(path.stat().st_mode) & 0o077 == 0 for path in folder.iterdir() if path.name != SOCKET)
+
+
+def knock(robot: Robot) -> socket.socket:
+    """Connect with the control socket."""
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    connection.settimeout(QUICK_ANSWER)
+    try:
+        with control._short_address(robot.folder.path) as address:
+            connection.connect(address)
+    except OSError:
+        connection.close()
+        raise
+    return connection
+
+
+def test_a_request_that_makes_no_sense_is_refused(robot: Robot, refused: list[str]) -> None:
+    before = alive(robot)
+    for name, data in REQUESTS.items():
+        with sending(data, lambda: knock(robot)):
+            assert ask(robot.folder, {"verb": "ps"}, timeout=QUICK_ANSWER), name
+        refused.append(name)
+    assert_goes_on(robot, before)
+
+
+@pytest.mark.parametrize("name", ON_CONTROL)
+def test_an_attack_on_the_control_socket_is_refused(robot: Robot, refused: list[str], name: str) -> None:
+    before = alive(robot)
+    with ON_CONTROL[name](lambda: knock(robot)):
+        assert_goes_on(robot, before)
+    assert ask(robot.folder, {"verb": "ps"}, timeout=QUICK_ANSWER)
+    refused.append(name)
+
+
+@pytest.mark.parametrize("name", ON_ROUTER)
+def test_an_attack_on_the_router_is_refused(robot: Robot, refused: list[str], name: str) -> None:
+    before, endpoint = alive(robot), robot.ps()["router"]["endpoint"]
+    port = int(endpoint.rpartition(":")[2])
+    with ON_ROUTER[name](lambda: socket.create_connection(("127.0.0.1", port), QUICK_ANSWER)):
+        assert_goes_on(robot, before)
+    eventually(lambda: answers(endpoint, robot.name))
+    assert alive(robot) == before
+    refused.append(name)
+
+
+def assert_goes_on(robot: Robot, before: list[int]) -> None:
+    """Require that the supervisor answers, the components make their steps, and no process was replaced."""
+    answer: Any = ask(robot.folder, {"verb": "ps"}, timeout=QUICK_ANSWER)
+    assert {one["state"] for one in answer["components"]} == {"active"}
+    count = steps(robot)
+    eventually(lambda: steps(robot) > count)
+    assert alive(robot) == before
+
+
+def answers(endpoint: str, name: str) -> bool:
+    """Tell whether a newcomer reaches the processes of a robot through its router."""
+    heard: list[Answer] = []
+    try:
+        transport = ZenohTransport(open_client(endpoint), lambda owner, callback: None)
+    except OSError:
+        return False
+    transport.ask(probe_key(name), b"", b"", heard.append)
+    deadline = time.monotonic() + 0.5
+    while not any(not one.error for one in heard) and time.monotonic() < deadline:
+        os.sched_yield()
+    transport.close()
+    return any(not one.error for one in heard)
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can become somebody else")
+def test_another_user_is_not_heard_even_if_the_folder_were_open() -> None:
+    folder = RobotFolder(Path(tempfile.mkdtemp(prefix="rbx")))
+    with selectors.DefaultSelector() as selector:
+        server = ControlServer(folder, selector)
+        server.handle = lambda request, number: server.answer(number, "heard")
+        folder.path.chmod(0o777)
+        (folder.path / SOCKET).chmod(0o777)
+        connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        reading, writing = os.pipe()
+
+        pid = os.fork()
+        if pid == 0:
+            signal.alarm(10)
+            os.setgroups([])
+            os.setuid(NOBODY)
+            os._exit(0 if _is_refused(connection, folder.path / SOCKET, writing) else 1)
+        os.read(reading, 1)
+        for key, _ in selector.select(5.0):
+            key.data()
+        assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
+        assert not server._connections
+        server.close()
+    for descriptor in (reading, writing):
+        os.close(descriptor)
+    connection.close()
+    shutil.rmtree(folder.path)
+
+
+def _is_refused(connection: socket.socket, path: Path, writing: int) -> bool:
+    """Knock at a control socket, tell by `writing` that it is done, and return whether nothing is answered."""
+    connection.settimeout(5.0)
+    connection.connect(str(path))
+    os.write(writing, b"x")
+    try:
+        connection.sendall(b'{"verb": "ps"}\n')
+        return connection.recv(100) == b""
+    except (BrokenPipeError, ConnectionResetError):
+        return True

@@ -1,0 +1,73 @@
+"""Somebody floods the commands of the base with what is none: the patrol goes on, and everybody is told."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
+from rbxcompose.qos import Qos
+from tests.conftest import ROOT
+from tests.faults.observer import COMMAND, MOTION, Observer
+from tests.faults.patrol import Patrol
+from tests.soak import Soak
+
+RATE = 175_000  # [Hz]; beyond what a machine can send, it sends what it can
+QUICK, MANY = 3, 10  # [s]
+LONGEST_GAP = 1.0  # [s] between two odometries, on a machine that has nothing left to give
+MOVING = 0.8  # of the time at least
+
+
+class Health:
+    """Hears what diagnostics tell of the base, with the time [s]."""
+
+    def __init__(self, observer: Observer) -> None:
+        self.reports: list[float] = []
+        self.refused: list[tuple[float, int]] = []
+        observer.listen(
+            "diagnostics_agg", DiagnosticArray, Qos.STATE, lambda one: self.reports.append(time.monotonic())
+        )
+        observer.listen("diagnostics", DiagnosticArray, Qos.STATE, self._take)
+
+    def _take(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            values = {pair.key: pair.value for pair in status.values}
+            if status.name == f"base: {COMMAND}" and "refused" in values:
+                self.refused.append((time.monotonic(), int(values["refused"])))
+
+
+@pytest.mark.timeout(60)
+def test_a_flood_is_refused_and_told_while_the_patrol_goes_on(soak: Soak, tmp_path: Path) -> None:
+    seconds = soak.examples(QUICK, MANY)
+    with Patrol(tmp_path, times=10, hears_commands=False) as patrol:
+        observer = patrol.observer
+        health = Health(observer)
+        assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
+        words = [sys.executable, "-m", "tests.faults.flooder", observer.router, COMMAND, str(RATE), str(seconds)]
+        with subprocess.Popen(words, env=patrol.environment, cwd=ROOT, stdout=subprocess.PIPE, text=True) as flooder:
+            assert flooder.stdout is not None
+            flooder.stdout.readline()  # it begins
+            began = time.monotonic()
+            sent = int(flooder.stdout.readline())
+            ended = time.monotonic()
+        motion = [one for one in list(observer.story) if one.topic == MOTION and began < one.time < ended]
+        assert patrol.wait_for(lambda: bool(health.refused) and health.refused[-1][0] > ended)
+    moving = sum(not one.is_rest for one in motion) / len(motion)
+    gap = max(after.time - before.time for before, after in pairwise(motion))
+    told = {number for at, number in health.refused if began < at}
+    refused = max(told)
+    text = (
+        f"{sent / seconds:,.0f} a second were sent to a base, of which {refused / seconds:,.0f} arrived and were "
+        f"refused; it moved for {moving:.0%} of the time, its odometry had gaps of at most {gap:.2f} s"
+    )
+    soak.tell("flood of commands", sent, 0, text)
+    assert refused > 1000 * seconds, text
+    assert len(told) >= seconds - 1, f"diagnostics told of it {len(told)} times"
+    assert sum(began < at < ended for at in health.reports) >= seconds - 1, "nobody told how the robot is"
+    assert gap < LONGEST_GAP, text
+    assert moving > MOVING, text

@@ -1,0 +1,46 @@
+"""What goes wrong with the folder of a robot, or around it, while real processes run."""
+
+from __future__ import annotations
+
+import signal
+
+import pytest
+
+from rbxcompose.replacing import TEMPORARY
+from rbxcompose.runtime.folder import STATE
+from rbxcompose.runtime.processes import titled
+from tests.runtime.test_real_processes import PATIENCE, Robot, eventually, robot
+
+__all__ = ["robot"]
+
+CALLERS = 4
+
+
+@pytest.mark.timeout(40)
+def test_of_many_that_start_it_at_once_one_does(robot: Robot) -> None:
+    started = [robot.up("-d") for _ in range(CALLERS)]
+    ends = [(one.communicate(timeout=PATIENCE)[0], one.returncode) for one in started]
+    refused = [output for output, code in ends if code == 1]
+    assert sorted(code for _, code in ends) == [0] + [1] * (CALLERS - 1)
+    assert all("error[RBX9001]" in output and "is already up" in output for output in refused)
+    assert len(robot.processes()) == 5
+    assert robot.do("down").returncode == 0
+
+
+@pytest.mark.timeout(40)
+def test_a_state_that_cannot_be_written_is_told_and_the_robot_goes_on(robot: Robot) -> None:
+    robot.up_detached()
+    state = robot.folder.path / STATE
+    first = robot.process_of("first")
+    state.unlink()
+    state.mkdir()  # no file can take the place of a folder
+    first.send_signal(signal.SIGKILL)
+    eventually(lambda: robot.texts("first").count("started") == 2)
+    assert robot.has_logged("the state file cannot be written")
+    eventually(lambda: not list(robot.folder.path.glob(f"*{TEMPORARY}")))
+    state.rmdir()
+    again = next(one for one in titled(f"rbxcompose {robot.name}: robot") if one.is_running)
+    again.send_signal(signal.SIGKILL)
+    eventually(lambda: robot.texts("first").count("started") == 3)
+    assert [one["restarts"] for one in robot.ps()["components"]] == [2, 0]
+    assert robot.do("down").returncode == 0

@@ -1,0 +1,54 @@
+"""Nobody but the drivers asks for time: the check itself, and that all which is given time keeps to it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.testing import clock_uses
+from tests.project.test_layers import CORES, PACKAGE
+
+GIVEN_TIME = sorted({*CORES, "components", "sdk"})
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("import time\ntime.sleep(1)", ["x.py:2: time.sleep"]),
+        ("import time as t\nx = t.monotonic", ["x.py:2: time.monotonic"]),
+        ("from time import monotonic as m\nm()", ["x.py:1: time.monotonic", "x.py:2: time.monotonic"]),
+        ("import datetime\ndatetime.datetime.now()", ["x.py:2: datetime.datetime.now"]),
+        ("from datetime import datetime as d\nd.utcnow()", ["x.py:2: datetime.datetime.utcnow"]),
+        ("import asyncio\nasync def f():\n    await asyncio.sleep(1)", ["x.py:3: asyncio.sleep"]),
+        ("import threading\nthreading.Timer(1, f)", ["x.py:2: threading.Timer"]),
+        ("from threading import Timer", ["x.py:1: threading.Timer"]),
+    ],
+)
+def test_a_clock_is_found_under_any_name(text: str, found: list[str], tmp_path: Path) -> None:
+    file = tmp_path / "x.py"
+    file.write_text(text, encoding="utf-8")
+    assert clock_uses(file) == found
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time = self.now\ntime.sleep",
+        "from datetime import datetime\ndatetime.fromtimestamp(3)",
+        "from .time import now\nnow()",
+        "import threading\nthreading.Lock()",
+        "'time.sleep(1)'  # time.sleep(1)",
+    ],
+)
+def test_what_only_looks_like_a_clock_is_none(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "x.py"
+    file.write_text(text, encoding="utf-8")
+    assert clock_uses(file) == []
+
+
+@pytest.mark.parametrize("part", GIVEN_TIME)
+def test_cores_components_and_the_sdk_never_ask_for_time(part: str) -> None:
+    files = [*(PACKAGE / part).rglob("*.py")] or [PACKAGE / f"{part}.py"]
+    assert files
+    assert [use for file in files for use in clock_uses(file)] == []
