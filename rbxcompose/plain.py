@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 
 FORBIDDEN = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufeff\ufffe\uffff]"
@@ -29,3 +30,27 @@ def plain(text: str, limit: int = 200) -> str:
     """Return `text` on one line with what is invisible spelt out, cut after `limit` characters with a count."""
     shown = _INVISIBLE.sub(_visible, text[:limit])
     return f"{shown}... ({len(text) - limit:,} more characters)" if len(text) > limit else shown
+
+
+def columns(text: str) -> int:
+    """Return how many columns of a terminal a text takes."""
+    return sum(map(_columns, text))
+
+
+def fitted(text: str, width: int) -> str:
+    """Return `text` cut to at most `width` columns of a terminal, with dots where something is left out."""
+    if columns(text) <= width:
+        return text
+    kept, room = "", width - 3
+    for character in text:
+        room -= _columns(character)
+        if room < 0:
+            break
+        kept += character
+    return kept + "..."[: max(0, width)]
+
+
+def _columns(character: str) -> int:
+    if unicodedata.combining(character) or unicodedata.category(character) in ("Mn", "Me", "Cf"):
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in ("W", "F") else 1

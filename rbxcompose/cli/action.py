@@ -8,31 +8,15 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.common.bus_place import add_bus_options
 from rbxcompose.cli.common.guest import Guest
-from rbxcompose.cli.common.nouns import (
-    add_json_option,
-    add_ls_options,
-    add_timeout_option,
-    tell_list,
-    visit,
-)
+from rbxcompose.cli.common.nouns import add_server_verbs, tell_list, visit
+
+_VERB = ("send", "send a goal, print feedback and result")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="ls|send", required=True)
-    ls = actions.add_parser("ls", help="list the actions with their types")
-    add_ls_options(ls)
-    ls.set_defaults(do=_ls)
-    send = actions.add_parser("send", help="send a goal, print feedback and result")
-    send.add_argument("name", metavar="ACTION", help="its name, such as /go_to")
-    send.add_argument("goal", metavar="GOAL", nargs="?", default="", help="YAML; what it leaves out is zero")
-    add_timeout_option(send, "5s")
-    add_json_option(send)
-    send.set_defaults(do=_send)
-    for one in (ls, send):
-        add_bus_options(one)
+    add_server_verbs(parser, "action", _VERB, "goal", "/go_to", (_ls, _send))
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -1,14 +1,17 @@
 """Tell every mistake of a robot before a motor moves.
 
-PATH is a robot's file or folder, a folder with robots below it, or a mission, part or overlay: then the robots of its
-project that use it are checked. Exit codes: 0 fine, 1 errors found (with --strict also warnings), 2 wrong usage.
+PATH is a robot's file or folder, a folder with robots or tests below it, a test, or a mission or part: then the robots
+of its project that use it are checked. An overlay is checked on a robot: check ROBOT -f FILE. Exit codes: 0 fine, 1
+errors found (with --strict also warnings), 2 wrong usage.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from rbxcompose.cli.common.fixing import fix, only_ours
 from rbxcompose.cli.common.robot_options import add_layer_options, compiled
@@ -17,7 +20,7 @@ from rbxcompose.cli.common.telling import FINDINGS, has_colour, tell
 from rbxcompose.compiler import Compilation
 from rbxcompose.findings import Report
 from rbxcompose.formats import format_names, renderer
-from rbxcompose.plan.model import Plan
+from rbxcompose.plan.model import Plan, extent
 
 TEXT = "text"
 FOR_PEOPLE = (TEXT, "github")  # formats in which also a line without a finding has a meaning
@@ -39,6 +42,7 @@ class Checked:
     report: Report = field(default_factory=Report)
     sources: dict[str, str] = field(default_factory=dict)
     fine: list[Plan] = field(default_factory=list)
+    tests: list[str] = field(default_factory=list)  # the names of those that can run
 
     def add(self, one: Compilation) -> None:
         """Add what was found in one robot."""
@@ -67,18 +71,31 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> Checked:
         one = compiled(robot, arguments)
         if any(file in one.sources for file in wanted.files):
             checked.add(one)
-    projects = projects_of([*wanted.robots, *wanted.users])
+    if wanted.tests:
+        _check_tests(wanted.tests, checked)
+    projects = projects_of([*wanted.robots, *wanted.users, *wanted.tests])
     checked.report = Report([*only_ours(checked.report, projects), *wanted.unused(checked.sources)])
     return checked
+
+
+def _check_tests(tests: list[str], checked: Checked) -> None:
+    from rbxcompose.trials.reading import Reading  # only tests need it
+
+    reading = Reading(os.environ)
+    for path in tests:
+        trial, report = reading.read(Path(path).resolve())
+        checked.report.extend(report)
+        if trial is not None:
+            checked.tests.append(trial.name)
+    checked.report.extend(reading.report)
+    checked.sources.update(reading.sources)
 
 
 def _written(checked: Checked, form: str) -> str:
     if any(checked.report) or form not in FOR_PEOPLE:
         return renderer(form)(checked.report, checked.sources, has_colour(sys.stdout))
-    return "\n".join(
-        f"{plan.robot} is fine: {len(plan.instances)} components in {len(plan.groups)} processes"
-        for plan in checked.fine
-    )
+    lines = [f"{plan.robot} is fine: {extent(len(plan.instances), len(plan.groups))}" for plan in checked.fine]
+    return "\n".join([*lines, *(f"the test {name} is fine" for name in checked.tests)])
 
 
 def _whisper(text: str) -> None:

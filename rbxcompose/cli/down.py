@@ -43,7 +43,7 @@ def _end(folder: RobotFolder) -> list[str]:
     state = known_state(folder)
     told: list[str] = []
     if state is not None and state.is_supervised:
-        if _asked(folder) and not wait_until_ended([state.supervisor], _ORDERLY):
+        if not state.supervisor.is_stopped and _asked(folder) and not wait_until_ended([state.supervisor], _ORDERLY):
             return told
         told.append("the supervisor did not answer and was killed")
         kill_supervisor(state.supervisor)

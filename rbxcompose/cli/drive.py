@@ -9,28 +9,27 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import select
 import sys
-import termios
-import tty
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 
 from rbxcompose.bus.graph import Name
 from rbxcompose.bus.topics import Publisher
 from rbxcompose.cli.common.bus_place import add_bus_options
-from rbxcompose.cli.common.dead_man import PERIOD, DeadMan, Velocity, keys
+from rbxcompose.cli.common.dead_man import PERIOD, DeadMan, Velocity, is_end, keys
 from rbxcompose.cli.common.guest import NAME, Guest
 from rbxcompose.cli.common.nouns import NO_NAME, NOBODY, add_timeout_option, positive, visit
 from rbxcompose.cli.common.robots import NotDoneError
 from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.cli.common.terminal import raw
 from rbxcompose.findings import kind
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.qos import Qos
 from rbxcompose.units import ANGULAR_SPEED, SPEED
 
 _INPUT = "/cmd_vel/teleop"
-_HELP = "arrows or w a s d: drive   space: stop   q: quit"
-_MOST_READ = 1024  # bytes of keys at once
+_HELP = "ready: arrows or w a s d: drive   space: stop   q: quit"
+_MOST_READ = 4096  # bytes of keys at once
 
 NO_TERMINAL = kind(
     "RBX9027",
@@ -57,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Drive until q, an interrupt, or the end of the terminal."""
+    """Drive until q, an interrupt, or the end of the terminal or of its input."""
     if not sys.stdin.isatty():
         return refuse(NO_TERMINAL.at(None, "there is no terminal to read keys from"))
     return visit(arguments, lambda guest: _drive(guest, arguments))
@@ -69,7 +68,10 @@ def _drive(guest: Guest, arguments: argparse.Namespace) -> int:
     if not guest.run(lambda: publisher.has_match, arguments.timeout):
         return refuse(NOBODY.at(None, f"nobody takes velocities on '{name}'"))
     wheel = _Wheel(guest, publisher, DeadMan(arguments.speed, arguments.turn))
-    with guest.interruptible(), _raw(sys.stdin.fileno()):
+    with guest.interruptible(), raw(sys.stdin.fileno()):
+        wheel.read_early()
+        if wheel.is_over:
+            return 0
         tell(_HELP)
         try:
             guest.watch(sys.stdin.fileno(), wheel.read)
@@ -101,11 +103,19 @@ class _Wheel:
 
     def read(self) -> None:
         """Take the keys that were pressed."""
-        data = os.read(sys.stdin.fileno(), _MOST_READ)
-        for key in keys(data.decode(errors="replace")):
+        for key in self._pressed():
             self._send(self._dead_man.press(key, self._guest.clock.now()))
-            self.is_over = self.is_over or key == "q"
-        self.is_over = self.is_over or not data
+
+    def read_early(self) -> None:
+        """Take the keys that were pressed before this: they move nothing, but may end it."""
+        if select.select([sys.stdin], [], [], 0)[0]:
+            self._pressed()
+
+    def _pressed(self) -> list[str]:
+        data = os.read(sys.stdin.fileno(), _MOST_READ)
+        pressed = keys(data.decode(errors="replace"))
+        self.is_over = self.is_over or not data or any(map(is_end, pressed))
+        return pressed
 
     def let_go(self) -> None:
         """Stand still, and be silent."""
@@ -114,17 +124,3 @@ class _Wheel:
     def _send(self, velocity: Velocity | None) -> None:
         if velocity is not None:
             self._publisher(Twist(linear=Vector3(x=velocity.speed), angular=Vector3(z=velocity.turn)))
-
-
-@contextmanager
-def _raw(terminal: int) -> Iterator[None]:
-    """Have keys at once and unseen; what the terminal was before it is again at the end."""
-    before = termios.tcgetattr(terminal)
-    try:
-        tty.setcbreak(terminal)
-        now = termios.tcgetattr(terminal)
-        now[6][termios.VSUSP] = b"\0"  # who suspends us would be left with this terminal
-        termios.tcsetattr(terminal, termios.TCSANOW, now)
-        yield
-    finally:
-        termios.tcsetattr(terminal, termios.TCSADRAIN, before)

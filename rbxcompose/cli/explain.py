@@ -29,7 +29,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.code is None:
         tell(_as_json(list(kinds.values())) if arguments.json else _listed(kinds))
         return 0
-    code = _PREFIX + arguments.code.upper().removeprefix(_PREFIX)
+    written = arguments.code.upper()
+    code = written if written in kinds else _PREFIX + written.removeprefix(_PREFIX)
     if code not in kinds:
         family = [one for one in kinds if one.startswith(code[: len(_PREFIX) + 2])]
         hint = suggest(code, family or kinds, "codes")

@@ -12,6 +12,7 @@ from pathlib import Path
 from rbxcompose.cli.common.robot_options import add_layer_options, layers_of
 from rbxcompose.cli.common.telling import FINDINGS, tell, tell_report
 from rbxcompose.compiler import compile_robot
+from rbxcompose.replacing import replace_file
 from rbxcompose.seeing.diagram import diagram_of
 from rbxcompose.seeing.graph_dot import dot
 from rbxcompose.seeing.graph_html import html
@@ -46,7 +47,10 @@ def run(arguments: argparse.Namespace) -> int:
 def _write(file: Path, text: str) -> str:
     """Write a file; return what kept it from being written, or nothing."""
     try:
-        file.write_text(text, encoding="utf-8")
+        if file.exists() and not file.is_file():
+            file.write_text(text, encoding="utf-8")  # `/dev/stdout`, a pipe
+        else:
+            replace_file(file.resolve(), text.encode())
     except OSError as error:
         return f"'{file}' cannot be written: {error.strerror}"
     return ""

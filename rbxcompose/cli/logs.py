@@ -1,6 +1,6 @@
-"""Show the log of a robot, also of its last run.
+"""Show the log of a robot, also of its last run, or what some of its components wrote.
 
-The log of the run before is kept beside it as `log.1.jsonl`.
+A file that has grown large is set aside as `log.jsonl.1`, and so on; the log of the run before is `log.1.jsonl`.
 """
 
 from __future__ import annotations
@@ -8,10 +8,13 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Iterable, Sequence
 
-from rbxcompose.cli.common.robots import NOT_UP, NotDoneError, add_robot_option, find_robot
+from rbxcompose.cli.common.robots import NOT_UP, NotDoneError, add_robot_option, find_robot, known_state
 from rbxcompose.cli.common.story import Story
 from rbxcompose.cli.common.telling import has_colour, refuse, tell
+from rbxcompose.diagnostics.levels import LOG_LEVELS
+from rbxcompose.findings import suggest
 from rbxcompose.runtime.folder import RobotFolder, base_folder
 from rbxcompose.runtime.follow import Follower
 from rbxcompose.runtime.log import NAME
@@ -22,32 +25,73 @@ _PAUSE = 0.05  # [s] between looks for more
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file")
+    parser.add_argument(
+        "names", nargs="*", metavar="ROBOT|PATH|COMPONENT", help="the robot, by name or file, then who is to be shown"
+    )
     add_robot_option(parser)
+    parser.add_argument("--level", choices=LOG_LEVELS, default="info", help="the least level that is shown")
     parser.add_argument("-f", "--follow", action="store_true", help="go on with what comes, until interrupted")
     parser.add_argument("-n", "--lines", type=int, metavar="N", help="begin with the last N records")
+    parser.add_argument("--json", action="store_true", help="one JSON object per record, as the log file has them")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the records that are there and, if asked for, those that come."""
     try:
-        folder = _folder(arguments.robot or arguments.path)
+        folder, names = _meant(arguments.robot, arguments.names)
+        follower = Follower(folder.path / NAME)
+        records = follower.read()
+        sources = {record.source for record in records}
+        _know(names, folder, sources)
     except NotDoneError as error:
         return refuse(error.finding)
-    follower = Follower(folder.path / NAME)
-    records = follower.read()
-    story = Story({record.source for record in records}, colour=has_colour(sys.stdout))
-    _tell(story, records if arguments.lines is None else records[max(0, len(records) - arguments.lines) :])
+    story = Story(names or sources, colour=has_colour(sys.stdout))
+
+    def wanted(records: Iterable[Record]) -> list[Record]:
+        least = LOG_LEVELS[arguments.level]
+        return [one for one in records if one.level >= least and (not names or one.source in names)]
+
+    def show(records: Iterable[Record]) -> None:
+        for record in records:
+            tell(record.to_json() if arguments.json else story.line(record))
+
+    shown = wanted(records)
+    show(shown if arguments.lines is None else shown[max(0, len(shown) - arguments.lines) :])
     while arguments.follow:
         time.sleep(_PAUSE)
-        _tell(story, follower.read())
+        show(wanted(follower.read()))
     follower.close()
     return 0
 
 
-def _tell(story: Story, records: list[Record]) -> None:
-    for record in records:
-        tell(story.line(record))
+def _meant(robot: str | None, names: Sequence[str]) -> tuple[RobotFolder, Sequence[str]]:
+    """Return the folder of the robot and the names of components; the first name may be that of the robot.
+
+    Raises:
+        NotDoneError: if there is no log, or several.
+    """
+    if robot is not None or not names:
+        return _folder(robot), names
+    try:
+        return _folder(names[0]), names[1:]
+    except NotDoneError as error:
+        if error.finding.code != NOT_UP.code:
+            raise
+    return _folder(None), names
+
+
+def _know(names: Sequence[str], folder: RobotFolder, sources: Iterable[str]) -> None:
+    """See to it that all names are those of somebody who may write to the log.
+
+    Raises:
+        NotDoneError: if one is not.
+    """
+    state = known_state(folder)
+    known = {*sources, *(one.name for one in state.components)} if state is not None else set(sources)
+    for name in names:
+        if name not in known:
+            text = f"'{name}' is no robot that is up, and no component in the log of '{folder.path.name}'"
+            raise NotDoneError(NOT_UP.at(None, text, help=suggest(name, sorted(known), "components")))
 
 
 def _folder(wanted: str | None) -> RobotFolder:

@@ -49,6 +49,15 @@ def load(verb: str) -> Verb:
     return cast(Verb, importlib.import_module(f"{cli.__name__}.{verb}"))
 
 
+def parser_of(name: str, verb: Verb) -> argparse.ArgumentParser:
+    """Return the parser of a verb."""
+    import argparse  # help can do without
+
+    parser = argparse.ArgumentParser(f"rbxcompose {name}", description=verb.__doc__ or "", allow_abbrev=False)
+    verb.add_arguments(parser)
+    return parser
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code: 0 fine, 1 findings, 2 wrong usage, 3 and 4 of `up`, 130 interrupted."""
     if arguments is None:
@@ -60,6 +69,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if words[0] == "--version":
         sys.stdout.write(f"rbxcompose {rbxcompose.__version__}\n")
         return 0
+    if words[0] == "__complete":  # what the scripts of `completion` ask
+        from rbxcompose.cli.common.known_values import complete
+
+        return complete(words[1:])
     if words[0] not in verbs():
         from rbxcompose.findings import suggest
 
@@ -75,14 +88,10 @@ def _interrupted(number: int, frame: FrameType | None) -> NoReturn:
 
 
 def _run(name: str, words: Sequence[str]) -> int:
-    import argparse
-
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # pydantic would search all that is installed for some
     try:
         verb = load(name)
-        about = verb.__doc__ or ""
-        parser = argparse.ArgumentParser(f"rbxcompose {name}", description=about, allow_abbrev=False)
-        verb.add_arguments(parser)
-        return verb.run(parser.parse_args(words))
+        return verb.run(parser_of(name, verb).parse_args(words))
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # so that the flush at exit has somewhere to go
         return 1

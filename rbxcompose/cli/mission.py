@@ -1,44 +1,197 @@
-"""Pause or resume the mission of a running robot, or list its missions."""
+"""Run, hold, watch, draw and explore the missions of a robot.
+
+Exit codes: 0 fine, 1 refused or errors found, 2 wrong usage.
+"""
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
-from typing import Any, cast
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
 
-from rbxcompose.cli.common.asking import pass_on
-from rbxcompose.cli.common.robots import NotDoneError, add_robot_option, find_robot, request
+from rbxcompose.cli.common.asking import add_asking_options, pass_on
+from rbxcompose.cli.common.robots import NotDoneError, find_robot, request
 from rbxcompose.cli.common.telling import refuse, tell
+
+_PERIOD = 0.2  # [s] between two questions to a robot that is followed
+_FORMATS = "text", "mermaid", "dot", "html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="pause|resume|ls", required=True)
-    add_robot_option(actions.add_parser("pause", help="hold the mission; its timers stand still"))
-    add_robot_option(actions.add_parser("resume", help="go on where it was held"))
-    ls = actions.add_parser("ls", help="list the robot's missions")
-    add_robot_option(ls)
-    ls.add_argument("--json", action="store_true", help="answer with a JSON list")
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+
+    def add(action: str, words: str, do: Callable[[argparse.Namespace], int]) -> argparse.ArgumentParser:
+        made = actions.add_parser(action, help=words, description=words)
+        made.set_defaults(do=do)
+        return made
+
+    add_asking_options(add("ls", "list the robot's missions, and how they stand", _list))
+    begin = _named(add("run", "begin a mission beside those that run", _run), needed=True)
+    begin.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
+    begin.add_argument("--from", dest="start", default="", metavar="STATE", help="begin in this state: 'outer.inner'")
+    _named(add("cancel", "end a mission for good", _say))
+    _named(add("pause", "hold a mission; its timers stand still", _say))
+    _named(add("resume", "go on where a mission was held", _say))
+    _named(add("status", "tell where a mission is, with its data", _status))
+    _named(add("watch", "show a mission live", _watch))
+    log = _named(add("log", "tell what missions did, as JSON, one line each", _log))
+    log.add_argument("-f", "--follow", action="store_true", help="go on with what is to come")
+    log.add_argument("--all", action="store_true", help="also what came in, from which it can be run again")
+    again = add("replay", "run missions again from their log, and tell the first difference", _replay)
+    again.add_argument("log", metavar="FILE", help="what 'mission log --all' told")
+    _on_file(again)
+    show = _on_file(add("show", "draw a mission; one that runs, with how its nodes stand", _show), "name")
+    show.add_argument("--format", choices=_FORMATS, default="text", help="how it is written")
+    show.add_argument("--out", metavar="FILE", help="write it to this file")
+    _on_file(add("skills", "list what missions may ask of a robot", _skills)).add_argument(
+        "--json", action="store_true", help="answer in JSON"
+    )
+    explore = _on_file(add("explore", "look for dead ends by trying all that may happen", _explore), "name")
+    explore.add_argument("--states", type=int, default=2000, metavar="N", help="look at so many states at most")
+    explore.add_argument("--depth", type=int, default=30, metavar="N", help="let so many things happen at most")
+    explore.add_argument("--json", action="store_true", help="answer in JSON")
+
+
+def _named(parser: argparse.ArgumentParser, *, needed: bool = False) -> argparse.ArgumentParser:
+    parser.add_argument("name", nargs=None if needed else "?", default="", metavar="MISSION", help="which one")
+    add_asking_options(parser)
+    return parser
+
+
+def _on_file(parser: argparse.ArgumentParser, *names: str) -> argparse.ArgumentParser:
+    for name in names:
+        parser.add_argument(name, metavar="MISSION", help="which one")
+    parser.add_argument("path", nargs="?", metavar="ROBOT", help="the robot's file; without it the one that runs")
+    return parser
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Pass the word on to the component that carries out missions, or list what the robot has."""
-    if arguments.action == "ls":
-        return _list(arguments.robot, arguments.json)
-    return pass_on(arguments.robot, {"verb": "command", "to": "mission", "word": arguments.action})
-
-
-def _list(robot: str | None, as_json: bool) -> int:
+    """Do what is asked for."""
+    do: Callable[[argparse.Namespace], int] = arguments.do
     try:
-        missions = cast(list[dict[str, Any]], request(find_robot(robot), {"verb": "missions"}))
+        return do(arguments)
     except NotDoneError as error:
         return refuse(error.finding)
-    tell(json.dumps(missions) if as_json else _table(missions))
+
+
+def ask(robot: str | None, words: str) -> Any:
+    """Return the answer of a robot's executive to a question."""
+    return json.loads(str(request(find_robot(robot), {"verb": "query", "to": "mission", "word": words})))
+
+
+def _say(arguments: argparse.Namespace) -> int:
+    return _pass(arguments, arguments.action, arguments.name)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    words = [word for one in arguments.sets for word in ("--set", one)]
+    return _pass(arguments, "run", arguments.name, *words, *(["--from", arguments.start] if arguments.start else []))
+
+
+def _pass(arguments: argparse.Namespace, *words: str) -> int:
+    import shlex
+
+    line = shlex.join(word for word in words if word)
+    return pass_on(arguments, {"verb": "command", "to": "mission", "word": line})
+
+
+def _list(arguments: argparse.Namespace) -> int:
+    missions = ask(arguments.robot, "ls")
+    tell(json.dumps(missions) if arguments.json else _table(missions))
     return 0
 
 
 def _table(missions: Sequence[dict[str, Any]]) -> str:
-    width = max((len(one["name"]) for one in missions), default=0)
-    lines = [f"{'*' if one['starts'] else ' '} {one['name']:<{width}}  {one['about']}" for one in missions]
-    return "\n".join([*lines, "(* starts by itself)"] if lines else ["this robot has no missions"])
+    names = max((len(one["name"]) for one in missions), default=0)
+    states = max((len(one["state"]) for one in missions), default=0)
+    lines = [f"{one['name']:<{names}}  {one['state']:<{states}}  {one['about']}".rstrip() for one in missions]
+    return "\n".join(lines) or "this robot has no missions"
+
+
+def _chosen(arguments: argparse.Namespace) -> str:
+    """Return the mission that is meant: the one that is named, else the only one that runs, or ran last."""
+    if arguments.name:
+        return str(arguments.name)
+    from rbxcompose.missions.mirror import ACTIVE
+    from rbxcompose.missions.statuses import IDLE, NAMES
+
+    known = [one for one in ask(arguments.robot, "ls") if one["state"] != NAMES[IDLE]]
+    active = [one for one in known if one["state"] in ACTIVE] or known
+    if len(active) != 1:
+        from rbxcompose.cli.common.robots import WHICH
+
+        names = ", ".join(one["name"] for one in active)
+        words = f"which mission: {names}?" if active else "no mission is running"
+        raise NotDoneError(WHICH.at(None, words, help="'rbxcompose mission ls' lists them"))
+    return str(active[0]["name"])
+
+
+def _status(arguments: argparse.Namespace) -> int:
+    name = _chosen(arguments)
+    seen = ask(arguments.robot, f"state {name} 0")
+    if arguments.json:
+        tell(json.dumps(seen))
+        return 0
+    tell("\n".join(_drawn(name, arguments.robot, seen, 120)))
+    return 0
+
+
+def _drawn(name: str, robot: str | None, seen: dict[str, Any], width: int, *, colour: bool = False) -> list[str]:
+    from rbxcompose.cli.common.mission_watch import lines_of
+    from rbxcompose.missions.picture import picture_from_data
+
+    return lines_of(picture_from_data(ask(robot, f"picture {name}")), seen, width, colour=colour)
+
+
+def _watch(arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.common.mission_watch import follow, watch
+
+    name = _chosen(arguments)
+    do = follow if arguments.json else watch
+    return do(lambda words: ask(arguments.robot, words), name, _PERIOD)
+
+
+def _log(arguments: argparse.Namespace) -> int:
+    from rbxcompose.missions.logbook import INPUTS
+
+    number = 0
+    try:
+        while True:
+            news = ask(arguments.robot, f"log {number}")
+            number = news["next"]
+            for record in news["records"]:
+                is_meant = not arguments.name or record["mission"] == arguments.name
+                if is_meant and (arguments.all or record["event"] not in INPUTS):
+                    tell(json.dumps(record))
+            if not arguments.follow:
+                return 0
+            time.sleep(_PERIOD)
+    except KeyboardInterrupt:
+        return 0
+
+
+def _replay(arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.common.mission_replay import replay_log
+
+    return replay_log(arguments)
+
+
+def _show(arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.common.mission_files import show
+
+    return show(arguments, lambda words: ask(None, words))
+
+
+def _skills(arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.common.mission_files import skills
+
+    return skills(arguments)
+
+
+def _explore(arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.common.mission_explore import explore
+
+    return explore(arguments)

@@ -15,6 +15,7 @@ from rbxcompose.cli.common.telling import refuse, tell
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.msgs.generate import all_structures
 from rbxcompose.msgs.hashes import type_hash
+from rbxcompose.msgs.joined import short
 from rbxcompose.msgs.packages import OWN, all_names, package_files, parts_of, whole_text
 from rbxcompose.scaffold.writing import write_new
 
@@ -26,22 +27,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="show|export", required=True)
     show = actions.add_parser("show", help="print a definition with all that it is made of, and its type hash")
     show.add_argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
-    show.add_argument("--json", action="store_true", help="answer in JSON")
     export = actions.add_parser("export", help=f"write the package {OWN} for a ROS 2 workspace")
     export.add_argument("folder", metavar="DIR", type=Path, help=f"the folder in which {OWN} is made")
+    for one in (show, export):
+        one.add_argument("--json", action="store_true", help="answer in JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Show a type, or write the package."""
-    return _export(arguments.folder) if arguments.action == "export" else _show(arguments.type, arguments.json)
+    if arguments.action == "export":
+        return _export(arguments.folder, arguments.json)
+    return _show(arguments.type, arguments.json)
 
 
 def _show(wanted: str, as_json: bool) -> int:
     names = all_names()
-    name = next((name for name in names if wanted in (name, _short(name))), None)
+    name = next((name for name in names if wanted in (name, short(name))), None)
     if name is None:
         words = f"'{wanted}' is not a type that is known here"
-        return refuse(NO_TYPE.misspelt(None, words, wanted, [*names, *map(_short, names)], "known types"))
+        return refuse(NO_TYPE.misspelt(None, words, wanted, [*names, *map(short, names)], "known types"))
     hashed, text = type_hash(name, all_structures()), whole_text(name)
     if as_json:
         tell(to_json({"type": name, "hash": hashed, "text": text, "parts": parts_of(name)}))
@@ -50,15 +54,13 @@ def _show(wanted: str, as_json: bool) -> int:
     return 0
 
 
-def _short(name: str) -> str:
-    package, _, bare = name.split("/")
-    return f"{package}/{bare}"
-
-
-def _export(folder: Path) -> int:
+def _export(folder: Path, as_json: bool) -> int:
     target = folder / OWN
     finding = write_new(target, package_files(OWN, rbxcompose.__version__, LICENCE))
     if finding is not None:
         return refuse(replace(finding, help="choose another folder"))
-    tell(f"{shown_name(target)} is written; in the workspace: colcon build --packages-select {OWN}")
+    if as_json:
+        tell(to_json({"package": OWN, "folder": str(target)}))
+    else:
+        tell(f"{shown_name(target)} is written; in the workspace: colcon build --packages-select {OWN}")
     return 0

@@ -14,9 +14,9 @@ from rbxcompose.cli.common.telling import FINDINGS, refuse, tell, tell_report
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.limits import ALL_BYTES
+from rbxcompose.plan.diff import difference
 from rbxcompose.plan.dump import PlanTextError, dump, load
 from rbxcompose.plan.model import Plan
-from rbxcompose.seeing.diff import difference
 from rbxcompose.seeing.plan_text import plan_text
 
 NO_PLAN = kind(

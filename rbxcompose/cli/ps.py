@@ -9,9 +9,12 @@ from typing import Any, cast
 
 from rbxcompose.cli.common.robots import NotDoneError, add_robot_option, find_robot, known_state, request
 from rbxcompose.cli.common.telling import refuse, tell
-from rbxcompose.runtime.folder import RobotFolder, State
+from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, State
+from rbxcompose.runtime.processes import Process
 
 _COLUMNS = ("name", "type", "state", "process", "pid", "restarts")
+_ANSWER = 0.4  # [s] for a supervisor to answer; what it has written is as new as that, but for what died since
+_BLOCKED = "blocked"  # the state of what runs and cannot do its work
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,8 +36,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _shown(folder: RobotFolder) -> dict[str, Any]:
+    written = known_state(folder)
+    if written is not None and written.supervisor.is_stopped:
+        return _last_known(written)  # it cannot answer
     try:
-        state = cast(dict[str, Any], request(folder, {"verb": "ps"}))
+        state = cast(dict[str, Any], request(folder, {"verb": "ps"}, timeout=_ANSWER))
     except NotDoneError:
         written = known_state(folder)
         if written is None:
@@ -44,21 +50,29 @@ def _shown(folder: RobotFolder) -> dict[str, Any]:
         "robot": state["robot"],
         "supervisor": {"pid": state["supervisor"]["pid"]},
         "router": {"endpoint": state["router"]},
-        "components": list(state["components"]),
+        "components": [_component(**one) for one in state["components"]],
     }
+
+
+def _component(*, state: str, waits_for: str | None, **fields: object) -> dict[str, object]:
+    """Return one component; one that is blocked tells by whom."""
+    if waits_for is None:
+        return {**fields, "state": state}
+    return {**fields, "state": _BLOCKED if state == "active" else state, "waits_for": waits_for}
 
 
 def _last_known(state: State) -> dict[str, Any]:
     alive = state.alive()
     components = [
-        {
-            "name": one.name,
-            "type": one.type,
-            "state": one.state if one.process in alive else "dead",
-            "process": one.process,
-            "pid": alive[one.process].pid if one.process in alive else None,
-            "restarts": one.restarts,
-        }
+        _component(
+            name=one.name,
+            type=one.type,
+            state=_state(one, alive),
+            process=one.process,
+            pid=alive[one.process].pid if one.process in alive else None,
+            restarts=one.restarts,
+            waits_for=one.waits_for,
+        )
         for one in state.components
     ]
     supervisor = state.supervisor.pid if state.is_supervised else None
@@ -71,13 +85,21 @@ def _last_known(state: State) -> dict[str, Any]:
     }
 
 
+def _state(one: ComponentState, alive: Mapping[str, Process]) -> str:
+    if one.process not in alive:
+        return one.state if one.state == "failed" else "dead"
+    return SUSPENDED if alive[one.process].is_stopped else one.state
+
+
 def _table(shown: Mapping[str, Any]) -> str:
     pid, endpoint = shown["supervisor"]["pid"], shown["router"]["endpoint"]
     head = f"{shown['robot']}: supervisor {pid or 'dead'}, router {endpoint or 'none'}"
     rows = [_COLUMNS, *([_cell(one[column]) for column in _COLUMNS] for one in shown["components"])]
     widths = [max(len(row[index]) for row in rows) for index in range(len(_COLUMNS))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join([head, *lines])
+    blocked = [one for one in shown["components"] if "waits_for" in one]
+    waiting = [f"{one['name']} waits for {one['waits_for']}, which failed" for one in blocked]
+    return "\n".join([head, *lines, *waiting])
 
 
 def _cell(value: object) -> str:

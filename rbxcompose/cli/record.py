@@ -7,26 +7,24 @@ read them. A recorder that is killed loses at most half a second: its file is re
 from __future__ import annotations
 
 import argparse
+import math
 import re
-import time
-from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
 from rbxcompose.cli.common.bus_place import BusPlace, add_bus_options, find_place
-from rbxcompose.cli.common.recording_bus import Tap, join
+from rbxcompose.cli.common.guest import Guest
+from rbxcompose.cli.common.nouns import seconds
+from rbxcompose.cli.common.recording_bus import Tap
 from rbxcompose.cli.common.recordings import (
     add_selection_options,
+    count_table,
     recover_in,
-    seconds,
     selection_of,
-    table,
-    until_interrupted,
     warn,
 )
 from rbxcompose.cli.common.robots import NotDoneError, find_robot
 from rbxcompose.cli.common.telling import refuse, tell
-from rbxcompose.clock import MonotonicClock
 from rbxcompose.plain import plain
 from rbxcompose.recording.codes import LOST, UNWRITABLE
 from rbxcompose.recording.files import ENDING
@@ -61,35 +59,25 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _record(arguments: argparse.Namespace, place: BusPlace, path: Path) -> int:
-    clock = MonotonicClock()
-    with until_interrupted() as interrupt:
+    with Guest(place, stays=True) as guest, guest.interruptible():
+        start = guest.clock.now()
         try:
-            recorder = Recorder(path, clock.now(), arguments.split)
+            recorder = Recorder(path, start, arguments.split)
         except OSError as error:
             return refuse(UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {_reason(error)}"))
-        try:
-            transport = join(place)
-        except NotDoneError:
-            recorder.discard()
-            raise
-        tap = Tap(transport, place.domain, selection_of(arguments), clock)
+        tap = Tap(guest, selection_of(arguments))
         tell(f"recording to {recorder.paths[0]}; Ctrl-C ends it")
-        start = clock.now()
-        try:
-            return _write(
-                recorder, tap, clock, lambda: bool(interrupt) or _is_over(clock.now() - start, arguments.duration)
-            )
-        finally:
-            transport.close()
+        end = math.inf if arguments.duration is None else start + arguments.duration
+        return _write(recorder, tap, guest, end)
 
 
-def _write(recorder: Recorder, tap: Tap, clock: MonotonicClock, is_over: Callable[[], bool]) -> int:
+def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float) -> int:
     try:
-        while not is_over():
-            time.sleep(_PAUSE)
+        while not guest.is_interrupted and guest.clock.now() < end:
+            guest.run(lambda: guest.is_interrupted, _PAUSE)
             for message in tap.take():
                 recorder.add(message)
-            recorder.keep(clock.now())
+            recorder.keep(guest.clock.now())
         recorder.finish()
     except OSError as error:
         recorder.abandon()
@@ -97,12 +85,8 @@ def _write(recorder: Recorder, tap: Tap, clock: MonotonicClock, is_over: Callabl
     if tap.lost:
         warn(LOST.at(None, f"{tap.lost:,} messages came too fast to be recorded", help="choose fewer with '--topics'"))
     paths = ", ".join(map(str, recorder.paths))
-    tell(f"{table(recorder.counts)}\nrecorded {recorder.counts.total():,} messages to {paths}")
+    tell(f"{count_table(recorder.counts)}\nrecorded {recorder.counts.total():,} messages to {paths}")
     return 0
-
-
-def _is_over(elapsed: float, duration: float | None) -> bool:
-    return duration is not None and elapsed >= duration
 
 
 def _path(arguments: argparse.Namespace) -> Path:

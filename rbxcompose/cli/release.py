@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.common.asking import pass_on
-from rbxcompose.cli.common.robots import add_robot_option
+from rbxcompose.cli.common.asking import add_asking_options, pass_on
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    add_robot_option(parser)
+    add_asking_options(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Release the robot."""
-    return pass_on(arguments.robot, {"verb": "release"})
+    return pass_on(arguments, {"verb": "release"})

@@ -1,7 +1,11 @@
 """Publish a recording again on a robot's bus, or show what is in it.
 
 Messages come at the intervals in which they were recorded. Topics of the class `command` make a robot move: they are
-left out unless `--topics` names them.
+left out unless `--topics` names them. Topics that somebody on the bus sends now are refused without `--over`.
+
+With --into, nothing is published: a component of a run that `up --rate max --record` has kept is run again, with its
+recorded inputs, and what it sends is compared with the recording. It has the settings that it had, or those of
+--robot PATH. Exit codes: 0 the same, 1 a difference or findings.
 """
 
 from __future__ import annotations
@@ -9,37 +13,39 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import time
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from rbxcompose.cli.common.bus_place import add_bus_options, find_place
-from rbxcompose.cli.common.recording_bus import Player, join
+from rbxcompose.cli.common.guest import Guest
+from rbxcompose.cli.common.nouns import seconds
+from rbxcompose.cli.common.recording_bus import Player
 from rbxcompose.cli.common.recordings import (
-    Interrupt,
     add_selection_options,
+    count_table,
     recover_in,
-    seconds,
     selection_of,
-    table,
-    until_interrupted,
     warn,
 )
+from rbxcompose.cli.common.rerunning import run_again
+from rbxcompose.cli.common.robot_options import add_layer_options
 from rbxcompose.cli.common.robots import NotDoneError
 from rbxcompose.cli.common.telling import refuse, tell
-from rbxcompose.clock import MonotonicClock
+from rbxcompose.findings import MOST_NAMES, Finding
 from rbxcompose.plain import plain
 from rbxcompose.qos import Qos
-from rbxcompose.recording.codes import DAMAGED, NOT_REPLAYED, NOTHING, UNREADABLE
+from rbxcompose.recording.codes import DAMAGED, NOT_REPLAYED, NOTHING, SENT_ALREADY, UNREADABLE
 from rbxcompose.recording.files import PART
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import NotARecordingError, RecordingReader
 from rbxcompose.recording.schedule import playlist
 from rbxcompose.recording.summary import Summary, summary_of
-from rbxcompose.recording.topics import Selection, Topic, is_replayable
+from rbxcompose.recording.topics import Selection, Topic, by_name, is_replayable
 
-_PAUSE = 0.05  # [s] at most between looks for an interrupt
+USAGE = 2
+_PAUSE = 0.05  # [s] before a recording begins anew
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,19 +57,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--from", type=seconds, default=0.0, dest="start", metavar="10s", help="leave out what is before"
     )
+    parser.add_argument("--over", action="store_true", help="also topics that somebody sends now, beside them")
     parser.add_argument("--loop", action="store_true", help="begin anew at the end, until Ctrl-C")
+    parser.add_argument(
+        "--into",
+        metavar="COMPONENT",
+        help="run one component of a recorded run again, as it was or as in --robot PATH, and compare",
+    )
+    parser.add_argument("--write", type=Path, metavar="FILE", help="with --into: keep what it sends now")
+    add_layer_options(parser)
     parser.add_argument("--info", action="store_true", help="only show topics, types, counts and duration")
-    parser.add_argument("--json", action="store_true", help="with --info: answer with one JSON object")
+    parser.add_argument("--json", action="store_true", help="with --info or --into: answer with one JSON object")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Read the file once to know what is in it, then replay it."""
+    if problem := _misused(arguments):
+        sys.stderr.write(f"rbxcompose replay: {problem}\n")
+        return USAGE
     path = arguments.path
     if path.parent.is_dir():
         recover_in(path.parent)
     if path.name.endswith(PART) and not path.exists():
         path = path.with_name(path.name.removesuffix(PART))
     try:
+        if arguments.into is not None:
+            with _opened(path) as reader:
+                return run_again(arguments, path, reader)
         summary = _look_through(path)
         if arguments.info:
             tell(json.dumps(_fields(summary)) if arguments.json else _text(path, summary))
@@ -71,6 +91,14 @@ def run(arguments: argparse.Namespace) -> int:
         return _replay(arguments, path, summary)
     except NotDoneError as error:
         return refuse(error.finding)
+
+
+def _misused(arguments: argparse.Namespace) -> str:
+    """Return what is wrong with options that do not fit together."""
+    layers = arguments.profile or arguments.overlays or arguments.sets or arguments.real
+    if layers and not (arguments.into and arguments.robot):
+        return "what is laid over a robot's file needs --into and --robot PATH"
+    return "--write needs --into" if arguments.write and not arguments.into else ""
 
 
 def _look_through(path: Path) -> Summary:
@@ -102,21 +130,28 @@ def _replay(arguments: argparse.Namespace, path: Path, summary: Summary) -> int:
     if not topics or arguments.start > summary.duration:
         why = "no topic that was chosen can be replayed" if not topics else f"it lasts {summary.duration:.1f} s"
         return refuse(NOTHING.at(None, f"nothing of '{plain(str(path))}' is replayed: {why}"))
-    place = find_place(arguments)
-    transport = join(place)
-    clock = MonotonicClock()
-    try:
-        player = Player(transport, place.domain, topics, clock)
-        with until_interrupted() as interrupt:
-            player.wait_for_subscribers()
-            tell(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
-            count = _play(path, player, topics, arguments, interrupt)
-            while arguments.loop and _wait(time.monotonic() + _PAUSE, interrupt):  # also if it lasts no time at all
-                count += _play(path, player, topics, arguments, interrupt)
-    finally:
-        transport.close()
+    with Guest(find_place(arguments), stays=True) as guest, guest.interruptible():
+        if not arguments.over and (finding := _sent_already(guest, topics)):
+            return refuse(finding)
+        player = Player(guest, topics)
+        player.wait_for_subscribers()
+        tell(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
+        count = _play(path, player, topics, arguments, guest)
+        while arguments.loop and _wait(guest.clock.now() + _PAUSE, guest):  # also if it lasts no time at all
+            count += _play(path, player, topics, arguments, guest)
     tell(f"replayed {count:,} messages")
     return 0
+
+
+def _sent_already(guest: Guest, topics: list[Topic]) -> Finding | None:
+    """Return the finding for topics that somebody else sends now, None if there are none."""
+    chosen = {one.name for one in topics}
+    names = [one.name for one in guest.graph().topics if one.givers and one.name in chosen]
+    if not names:
+        return None
+    rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    message = f"somebody sends now what is to be replayed: {plain(', '.join(names[:MOST_NAMES]))}{rest}"
+    return SENT_ALREADY.at(None, message, help="choose others with '--topics', or replay beside them with '--over'")
 
 
 def _chosen(summary: Summary, wanted: Selection) -> list[Topic]:
@@ -132,14 +167,14 @@ def _chosen(summary: Summary, wanted: Selection) -> list[Topic]:
     return [one for one in topics if one.name not in {*unfit, *commands}]
 
 
-def _play(path: Path, player: Player, topics: list[Topic], arguments: argparse.Namespace, interrupt: Interrupt) -> int:
+def _play(path: Path, player: Player, topics: list[Topic], arguments: argparse.Namespace, guest: Guest) -> int:
     """Publish the recording once and return how many messages that were."""
     chosen = set(topics)
     count = 0
-    start = time.monotonic()
+    start = guest.clock.now()
     with _opened(path) as reader:
         for due, message in playlist(reader.messages(), rate=arguments.rate, start=arguments.start):
-            if not _wait(start + due, interrupt):
+            if not _wait(start + due, guest):
                 break
             count += _put(player, message, chosen)
     return count
@@ -152,22 +187,20 @@ def _put(player: Player, message: Recorded, chosen: set[Topic]) -> int:
     return 1
 
 
-def _wait(until: float, interrupt: Interrupt) -> bool:
-    """Wait for a time of the monotonic clock; return False if an interrupt came first."""
-    while not interrupt and (left := until - time.monotonic()) > 0:
-        time.sleep(min(left, _PAUSE))
-    return not interrupt
+def _wait(until: float, guest: Guest) -> bool:
+    """Wait for a time of the guest's clock; return False if an interrupt came first."""
+    return not guest.run(lambda: guest.is_interrupted, until - guest.clock.now())
 
 
 def _text(path: Path, summary: Summary) -> str:
     head = f"{plain(str(path))}: {summary.messages:,} messages, {summary.duration:.3f} s"
-    return f"{head}\n{table(summary.counts)}" if summary.counts else head
+    return f"{head}\n{count_table(summary.counts)}" if summary.counts else head
 
 
 def _fields(summary: Summary) -> dict[str, object]:
     topics = [
         {"name": one.name, "type": one.type, "class": one.qos.value, "encoding": one.encoding, "messages": number}
-        for one, number in sorted(summary.counts.items(), key=lambda item: (item[0].name, item[0].type))
+        for one, number in sorted(by_name(summary.counts).items(), key=lambda item: (item[0].name, item[0].type))
     ]
     return {
         "messages": summary.messages,

@@ -9,11 +9,14 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from pathlib import Path
 
-from rbxcompose.cli.common.robot_options import add_layer_options, layers_of
-from rbxcompose.cli.common.telling import tell_report
+from rbxcompose.cli.common.robot_options import add_layer_options, compiled, layers_of
+from rbxcompose.cli.common.telling import refuse, tell_report
 from rbxcompose.cli.common.watch import run_plan
+from rbxcompose.cli.common.watching import Watching
 from rbxcompose.compiler import compile_robot
+from rbxcompose.recording.codes import UNWRITABLE
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.units import TIME, UnitError, to_si
 
@@ -28,6 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--rate", type=_rate, default=RunOptions(), metavar="20x|max|1x", help="robot time per real time, reproducible"
     )
     parser.add_argument("-d", "--detach", action="store_true", help="return when all is active; the robot stays up")
+    parser.add_argument(
+        "--record", type=Path, metavar="FILE", help="with --rate: keep all that happens, to be replayed"
+    )
+    parser.add_argument("--watch", action="store_true", help="let it take what its files say, as you edit them")
     parser.add_argument("--for", type=_duration, dest="duration", metavar="30s", help="end after this robot time")
 
 
@@ -36,20 +43,42 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.real and arguments.rate.is_stepped:
         sys.stderr.write("rbxcompose up: --real keeps its own time, so --rate cannot be given with it\n")
         return USAGE
+    if arguments.watch and (arguments.detach or arguments.rate.is_stepped):
+        other = "-d" if arguments.detach else "--rate"
+        sys.stderr.write(f"rbxcompose up: --watch is for the foreground in real time, without {other}\n")
+        return USAGE
     compilation = compile_robot(arguments.path, **layers_of(arguments))
     tell_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.report.has_errors:
         return 1
+    if compilation.plan.follows_clock and arguments.rate.is_stepped:
+        sys.stderr.write("rbxcompose up: the robot follows /clock ('bus.clock'), so --rate cannot be given with it\n")
+        return USAGE
     options = RunOptions(
         is_stepped=arguments.rate.is_stepped,
         rate=arguments.rate.rate,
         duration=arguments.duration,
         is_detached=arguments.detach,
+        record=arguments.record.absolute() if arguments.record else None,
     )
+    if options.record is not None and not options.is_stepped:
+        sys.stderr.write(
+            "rbxcompose up: --record needs --rate; a run in real time is recorded by 'rbxcompose record'\n"
+        )
+        return USAGE
+    if options.record is not None and (problem := _write_problem(options.record)):
+        return refuse(UNWRITABLE.at(None, problem))
     if options.is_stepped and options.rate is None and options.duration is None and compilation.plan.start is None:
         sys.stderr.write("rbxcompose up: without 'start:' nothing ends a run at --rate max: give --for\n")
         return USAGE
-    return run_plan(compilation.plan, options)
+    watching = Watching(lambda: compiled(arguments.path, arguments), compilation) if arguments.watch else None
+    return run_plan(compilation.plan, options, watching)
+
+
+def _write_problem(path: Path) -> str:
+    from rbxcompose.recording.files import write_problem  # only a recorded run needs MCAP
+
+    return write_problem(path)
 
 
 def _rate(text: str) -> RunOptions:

@@ -23,6 +23,8 @@ def meant(name: str, *valid: str) -> str:
         ("goto", ("go_to", "charger"), "go_to"),
         ("patrol.yml", ("patrol.yaml", "tour.yaml"), "patrol.yaml"),
         ("Robto", ("Robot",), "Robot"),
+        ("form", ("from", "priority", "timeout", "max_rate"), "from"),
+        ("sapce", ("space", "rate"), "space"),
     ],
 )
 def test_a_slip_of_the_hand_is_corrected(name: str, valid: tuple[str, ...], right: str) -> None:
@@ -32,7 +34,8 @@ def test_a_slip_of_the_hand_is_corrected(name: str, valid: tuple[str, ...], righ
 @pytest.mark.parametrize(
     ("name", "valid", "why"),
     [
-        ("form", ("from",), "too far"),
+        ("fort", ("from",), "too far"),
+        ("corner_12", ("corner_21",), "another number, though two digits have changed places"),
         ("corner_5", ("corner_1", "corner_2"), "two are as near"),
         ("corner_2", ("corner_1",), "another number"),
         ("min_turn_speed", ("max_turn_speed",), "another word"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.plain import FORBIDDEN, plain
+from rbxcompose.plain import FORBIDDEN, columns, fitted, plain
 
 
 def test_control_characters_are_spelt_out() -> None:
@@ -26,3 +26,14 @@ def test_nothing_invisible_is_left_and_it_is_one_line(text: str) -> None:
     assert not FORBIDDEN.search(shown)
     assert "\n" not in shown
     assert "\t" not in shown
+
+
+@given(st.text(), st.integers(3, 40))
+def test_what_is_fitted_fits_and_is_the_text_or_how_it_begins(text: str, width: int) -> None:
+    shown = fitted(text, width)
+    assert columns(shown) <= width
+    assert shown == text or (shown.endswith("...") and text.startswith(shown[:-3]))
+
+
+def test_wide_characters_take_two_columns_and_combining_ones_none() -> None:
+    assert [columns(one) for one in ("robot", "\u673a", "e\u0301", "\u200b")] == [5, 2, 1, 0]

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from rbxcompose.cli import main as command
 from rbxcompose.cli.common import fixing
-from rbxcompose.cli.common.fixing import replace_file
 from rbxcompose.edits import safe_fixes
 from rbxcompose.findings import Finding, Fix, Sources
+from rbxcompose.replacing import replace_file
 
 ROOT = Path(__file__).parents[2]
 ROBOT, MISSION = Path("robots/bot/robot.yaml"), Path("missions/patrol.yaml")
@@ -78,6 +78,14 @@ def test_a_mission_is_checked_with_the_robots_that_use_it(project: Path, capsys:
     assert "warning[RBX9007]: no robot of the project uses 'missions/draft.yaml'" in told
 
 
+def test_an_overlay_alone_is_told_to_name_a_robot(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (project / "careful.yaml").write_text("rbx: 1\nkind: Overlay\nname: careful\nargs: {speed: 0.2 m/s}\n")
+    told = output(capsys, "careful.yaml", code=0)
+    assert "warning[RBX9007]: 'careful.yaml' is an overlay, and does not say for which robot" in told
+    assert "name the robot, too: 'rbxcompose check ROBOT -f careful.yaml'" in told
+    assert "is fine" in output(capsys, "-f", "careful.yaml", str(ROBOT), "careful.yaml", code=0)
+
+
 def test_a_robot_that_is_named_twice_is_told_once(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     change(project / MISSION, "go_to: dock", "go_to: harbour")
     assert "1 error\n" in output(capsys, str(ROBOT), str(ROBOT), str(MISSION), code=1)
@@ -87,6 +95,21 @@ def test_what_is_not_there_is_a_finding(project: Path, capsys: pytest.CaptureFix
     assert "error[RBX1301]" in output(capsys, "robots/nobody", code=1)
     (project / "empty").mkdir()
     assert "error[RBX1301]" in output(capsys, "empty", code=1)
+
+
+TEST = "rbx: 1\nkind: Test\nname: {0}\nmission: patrol\nrobot: ../../robots/bot/robot.yaml\nexpect:\n  outcome: {1}\n"
+
+
+def test_a_folder_of_tests_means_each_of_them(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (project / "missions/tests/more").mkdir(parents=True)
+    for name, outcome in (("tests/one", "success"), ("tests/more/two", "sucess")):
+        text = TEST.format(name.rsplit("/", 1)[-1], outcome).replace("../../", "../" * (name.count("/") + 1))
+        (project / f"missions/{name}.test.yaml").write_text(text)
+    told = output(capsys, "missions/tests", code=1)
+    assert "missions/tests/more/two.test.yaml:7:12" in told
+    assert "1 error" in told
+    change(project / "missions/tests/more/two.test.yaml", "sucess", "success")
+    assert output(capsys, "missions/tests", code=0).splitlines() == ["the test two is fine", "the test one is fine"]
 
 
 def test_warnings_count_only_under_strict(project: Path, capsys: pytest.CaptureFixture[str]) -> None:

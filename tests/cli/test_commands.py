@@ -128,6 +128,33 @@ def test_logs_shows_the_last_run_also_when_the_robot_is_down(capsys: pytest.Capt
     assert capsys.readouterr().out == ""
 
 
+def test_logs_shows_who_is_asked_for_from_the_level_that_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    folder = written("a")
+    log = start_new(folder.path)
+    for source, level in (("base", Level.OK), ("arm", Level.WARN), ("robot", Level.ERROR), ("base", Level.WARN)):
+        log.write(Record(1.0, level, source, "text"))
+    log.close()
+
+    def shown(*words: str) -> list[str]:
+        assert command.main(["logs", *words]) == 0
+        return [line.split(maxsplit=1)[1] for line in capsys.readouterr().out.splitlines()]
+
+    assert shown("base") == ["base   text", "base   warn: text"]
+    assert shown("a", "arm", "base", "--level", "warn") == ["arm    warn: text", "base   warn: text"]
+    assert shown("--robot", "a", "--level", "error") == ["robot  error: text"]
+    assert shown("base", "-n", "1") == ["base   warn: text"]
+    assert command.main(["logs", "arm", "--json"]) == 0
+    assert capsys.readouterr().out == '{"t": 1.0, "level": "WARN", "source": "arm", "text": "text"}\n'
+
+
+def test_logs_of_somebody_who_is_not_there_is_a_finding_with_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
+    written("a")
+    assert command.main(["logs", "bse"]) == 1
+    shown = capsys.readouterr().err
+    assert "error[RBX9002]: 'bse' is no robot that is up, and no component in the log of 'a'" in shown
+    assert "did you mean 'base'?" in shown
+
+
 def test_following_a_log_ends_at_an_interrupt_without_a_word(base: Path) -> None:
     folder = RobotFolder.of("a")
     folder.make()

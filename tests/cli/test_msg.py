@@ -13,6 +13,7 @@ from rbxcompose.msgs.definitions import parse
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.packages import all_names, package_files, parts_of, whole_text
 from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
+from rbxcompose.recording.definitions import definition_of
 
 
 def test_a_type_is_shown_with_its_hash_and_its_parts(capsys: pytest.CaptureFixture[str]) -> None:
@@ -71,3 +72,8 @@ def test_a_package_names_the_packages_that_its_types_are_made_of() -> None:
     assert "DEPENDENCIES builtin_interfaces geometry_msgs std_msgs\n" in files["CMakeLists.txt"]
     assert "find_package(geometry_msgs REQUIRED)\n" in files["CMakeLists.txt"]
     assert "<depend>geometry_msgs</depend>" in files["package.xml"]
+
+
+@pytest.mark.parametrize("name", [name for name in all_names() if "/msg/" in name])
+def test_a_recording_has_the_same_text_of_a_message(name: str) -> None:
+    assert definition_of(name) == whole_text(name)

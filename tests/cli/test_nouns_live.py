@@ -15,7 +15,7 @@ import termios
 from argparse import Namespace
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import pytest
 
@@ -179,8 +179,9 @@ def test_without_a_router_that_is_a_finding(robot: Robot) -> None:
 class Keyboard:
     """`drive` at a terminal of its own."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, early: str = "") -> None:
         self.ours, self.theirs = pty.openpty()
+        self.press(early)
         self.before = termios.tcgetattr(self.theirs)
         self.process = subprocess.Popen(
             robot.command("drive", "--speed", "0.1 m/s"),
@@ -191,10 +192,13 @@ class Keyboard:
             stderr=self.theirs,
             start_new_session=True,
         )
+
+    def until_ready(self) -> Self:
         shown = ""
-        while "q: quit" not in shown:
+        while "ready: " not in shown:
             assert select.select([self.ours], [], [], PATIENCE)[0], shown
             shown += os.read(self.ours, 4096).decode()
+        return self
 
     def press(self, keys: str) -> None:
         os.write(self.ours, keys.encode())
@@ -214,7 +218,8 @@ def test_the_robot_moves_only_while_a_key_is_pressed(robot: Robot) -> None:
         assert topic is not None
         speeds: list[float] = []
         guest.listen(topic, lambda heard: speeds.append(decode(Twist, heard.arrival.payload).linear.x))
-        keyboard = Keyboard(robot)
+        keyboard = Keyboard(robot, early="ww\x1b[A").until_ready()
+        assert not guest.run(lambda: speeds != [], 0.2)
         keyboard.press("\x1b[A")
         assert guest.run(lambda: 0.0 in speeds, PATIENCE)
         assert not guest.run(lambda: speeds[-1] != 0.0 or speeds.count(0.0) > 1, 0.5)
@@ -226,8 +231,19 @@ def test_the_robot_moves_only_while_a_key_is_pressed(robot: Robot) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_the_terminal_is_what_it_was_after_every_end(robot: Robot, number: signal.Signals) -> None:
-    keyboard = Keyboard(robot)
+    keyboard = Keyboard(robot).until_ready()
     keyboard.process.send_signal(number)
+    assert keyboard.end() == 0
+
+
+@pytest.mark.parametrize("keys", ["wq", "\x04", "w\n\x04"])
+def test_an_end_that_was_typed_before_it_was_ready_counts(robot: Robot, keys: str) -> None:
+    assert Keyboard(robot, early=keys).end() == 0
+
+
+def test_the_end_of_input_ends_driving(robot: Robot) -> None:
+    keyboard = Keyboard(robot).until_ready()
+    keyboard.press("\x04")
     assert keyboard.end() == 0
 
 

@@ -165,6 +165,12 @@ def test_two_seconds_of_a_robot_and_a_recorder_that_is_killed(robot: Shell) -> N
     assert {"/odom", "/tf_static"} <= {one.topic.name for one in whole}
     assert len([one for one in whole if one.topic.name == "/odom"]) > 60  # of 100
 
+    player = robot.start("replay", "whole.mcap", "--topics", "odom", "tf_static")
+    output, _ = player.communicate(timeout=PATIENCE)
+    assert player.returncode == 1
+    assert "error[RBX9210]: somebody sends now what is to be replayed: /odom, /tf_static" in output
+    assert "replayed" in robot.do("replay", "whole.mcap", "--topics", "odom", "--rate", "20x", "--over")
+
     recorder = robot.start("record", "-o", "cut.mcap")
     part = robot.folder / "cut.mcap.part"
     robot.until(lambda: part.exists() and part.stat().st_size > 10_000)
@@ -229,14 +235,14 @@ def test_nothing_to_replay_is_a_finding(tmp_path: Path, capsys: pytest.CaptureFi
     assert "error[RBX9205]" in refused(["replay", str(path), "--from", "10s"], capsys)
 
 
-def test_a_file_that_is_there_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_is_there_is_not_overwritten(
+    tmp_path: Path, router: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(b"mine")
-    assert "error[RBX9203]" in refused(["record", "--router", "tcp/127.0.0.1:1", "-o", str(path)], capsys)
+    assert "error[RBX9203]" in refused(["record", "--router", router, "-o", str(path)], capsys)
     assert path.read_bytes() == b"mine"
-    assert "error[RBX9203]" in refused(
-        ["record", "--router", "tcp/127.0.0.1:1", "-o", str(tmp_path / "no/a.mcap")], capsys
-    )
+    assert "error[RBX9203]" in refused(["record", "--router", router, "-o", str(tmp_path / "no/a.mcap")], capsys)
 
 
 def test_without_a_router_nothing_is_left_behind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -75,3 +75,11 @@ def parse_robot(*words: str) -> argparse.Namespace:
     parser = argparse.ArgumentParser()
     up.add_arguments(parser)
     return parser.parse_args(words)
+
+
+@pytest.mark.parametrize(("words", "named"), [(["-d"], "without -d"), (["--rate", "max"], "without --rate")])
+def test_files_are_watched_in_the_foreground_and_in_real_time_only(
+    words: list[str], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert up.run(parse("--watch", *words)) == 2
+    assert named in capsys.readouterr().err

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from rbxcompose.cli.common.robots import NotDoneError, find_robot, request
+import argparse
+import json
+
+from rbxcompose.cli.common.robots import NotDoneError, add_robot_option, find_robot, request
 from rbxcompose.cli.common.telling import refuse, tell
 
 
-def pass_on(robot: str | None, fields: dict[str, object]) -> int:
+def add_asking_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--robot NAME` and `--json`."""
+    add_robot_option(parser)
+    parser.add_argument("--json", action="store_true", help="answer in JSON")
+
+
+def pass_on(arguments: argparse.Namespace, fields: dict[str, object]) -> int:
     """Send a request, print the answer, return the exit code."""
     try:
-        answer = request(find_robot(robot), fields)
+        folder = find_robot(arguments.robot)
+        answer = request(folder, fields)
     except NotDoneError as error:
         return refuse(error.finding)
-    tell(str(answer))
+    tell(json.dumps({"robot": folder.path.name, "answer": answer}) if arguments.json else str(answer))
     return 0

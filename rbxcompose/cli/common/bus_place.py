@@ -6,6 +6,7 @@ import argparse
 from dataclasses import dataclass
 
 from rbxcompose.cli.common.robots import NO_ANSWER, NotDoneError, add_robot_option, find_robot, known_state
+from rbxcompose.runtime.folder import RobotFolder
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +32,17 @@ def find_place(arguments: argparse.Namespace) -> BusPlace:
     """
     if arguments.router is not None:
         return BusPlace(arguments.router, arguments.domain or 0)
-    folder = find_robot(arguments.robot)
+    found = place_of(find_robot(arguments.robot))
+    return found if arguments.domain is None else BusPlace(found.router, arguments.domain)
+
+
+def place_of(folder: RobotFolder) -> BusPlace:
+    """Return the place of a robot's own bus.
+
+    Raises:
+        NotDoneError: if it has no router.
+    """
     state = known_state(folder)
     if state is None or state.router is None:
         raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' has no router that is known"))
-    return BusPlace(state.router, state.domain if arguments.domain is None else arguments.domain)
+    return BusPlace(state.router, state.domain)

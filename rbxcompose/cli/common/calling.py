@@ -16,10 +16,10 @@ from rbxcompose.sdk.bound import Reply
 
 def call(guest: Guest, arguments: argparse.Namespace) -> int:
     """Send a request and print the response."""
-    found = wanted([one for one in guest.graph().services if one.givers], arguments.service, "service")
+    found = wanted([one for one in guest.graph().services if one.givers], arguments.name, "service")
     kind = found.kinds[0]
     service = type_of(kind, "srv", registry.service)
-    request = message_from(service.Request, arguments.request)
+    request = message_from(service.Request, arguments.content)
     if request is None:
         return 1
     client = guest.bus(kind).client(NAME, found.name, service)

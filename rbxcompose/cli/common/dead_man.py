@@ -7,6 +7,8 @@ from dataclasses import dataclass
 HOLD = 0.3  # [s] that a key counts as pressed; terminals only tell presses, and repeat them while a key is held
 PERIOD = 0.1  # [s] between two commands
 
+_ENDS = ("q", "\x04", "\0")  # Ctrl-D comes as a zero if it was typed before keys came at once
+
 _FORWARD, _BACK, _LEFT, _RIGHT = (1, 0), (-1, 0), (0, 1), (0, -1)
 _STILL = (0, 0)
 _KEYS = {
@@ -42,6 +44,11 @@ def keys(text: str) -> list[str]:
         found.append(text[:length].lower() if length == 1 else text[:length])
         text = text[length:]
     return found
+
+
+def is_end(key: str) -> bool:
+    """Tell whether a key ends driving: q, or the end of input."""
+    return key in _ENDS
 
 
 class DeadMan:

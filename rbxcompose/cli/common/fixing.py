@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import stat
-import tempfile
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +10,7 @@ from typing import Protocol
 from rbxcompose.edits import apply, safe_fixes
 from rbxcompose.findings import Finding, Fix, Report, Sources
 from rbxcompose.plain import plain
+from rbxcompose.replacing import replace_file
 
 ROUNDS = 20  # one fix may let the next mistake be seen
 _WORDS = 200  # characters of a title
@@ -96,30 +94,3 @@ def _write(file: str, text: str, say: Say) -> bool:
         say(f"left {plain(file)} as it is: {error.strerror}")
         return False
     return True
-
-
-def replace_file(path: Path, data: bytes) -> None:
-    """Replace a file whole or not at all, whatever happens meanwhile; its mode stays.
-
-    Raises:
-        OSError: if it cannot be written; it is as before then.
-    """
-    mode = stat.S_IMODE(path.stat().st_mode)
-    if not os.access(path, os.W_OK):
-        raise PermissionError(13, "it may not be written")
-    descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with open(descriptor, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fchmod(descriptor, mode)
-            os.fsync(descriptor)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)

@@ -6,6 +6,7 @@ import math
 import selectors
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,13 +15,13 @@ from typing import TYPE_CHECKING, Self
 
 import zenoh
 
-from rbxcompose.bus.attachment import decode_attachment
+from rbxcompose.bus.attachment import Attachment, decode_attachment
 from rbxcompose.bus.graph import Graph, Kind, Name
 from rbxcompose.bus.inbox import Inbox as Queue
 from rbxcompose.bus.names import data_key
 from rbxcompose.bus.tokens import SPACE
 from rbxcompose.bus.transport import Arrival
-from rbxcompose.bus.zenoh_session import open_client
+from rbxcompose.bus.zenoh_session import open_client, open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.cli.common.bus_place import BusPlace
 from rbxcompose.cli.common.robots import NotDoneError
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 NAME = "_rbxcompose"  # of the node; tools do not list what begins with `_`
 LONGEST_QUEUE = 1000  # messages that wait to be shown
 PATIENCE = 2.0  # [s] for an answer of the router
+_PAUSE = 0.01  # [s] between two looks for the router
 NO_HASHES = "TypeHashNotSupported"  # what ROS 2 Humble writes in the place of a hash
 
 NO_ROUTER = kind(
@@ -62,32 +64,41 @@ class Heard:
     @property
     def sender(self) -> bytes:
         """Return the GID of who sent it, or nothing if it does not say."""
+        return self._attachment.gid
+
+    @property
+    def stamp(self) -> int:
+        """Return when it was sent, by the sender's clock [ns], or 0 if it does not say."""
+        return self._attachment.stamp
+
+    @property
+    def _attachment(self) -> Attachment:
         try:
-            return decode_attachment(self.arrival.attachment).gid
+            return decode_attachment(self.arrival.attachment)
         except ValueError:
-            return b""
+            return Attachment(0, 0, b"")
 
 
 class Guest:
     """Reads who is on the bus, listens, and lends a bus of its own to who wants to speak."""
 
-    def __init__(self, place: BusPlace) -> None:
-        """Join the bus.
+    def __init__(self, place: BusPlace, *, stays: bool = False) -> None:
+        """Join the bus: for a question by its router, or to stay, with links of its own to all others.
+
+        Who stays loses nothing when the router ends and is started again.
 
         Raises:
             NotDoneError: if no router answers.
         """
-        try:
-            self._session = open_client(place.router)
-        except OSError as error:
-            raise NotDoneError(NO_ROUTER.at(None, error.strerror or str(error))) from error
-        self.domain, self.clock, self.scheduler = place.domain, MonotonicClock(), Scheduler()
+        self.clock = MonotonicClock()
+        self._session = self._lasting(place.router) if stays else _short(place.router)
+        self.domain, self.scheduler = place.domain, Scheduler()
         self.is_interrupted = False
         self._inbox = Inbox()
-        self._transport = ZenohTransport(self._session, self._inbox.put)
+        self.transport = ZenohTransport(self._session, self._inbox.put)
         self._bus: Bus | None = None
         self._queues: list[Queue[Heard]] = []
-        self._selector = selectors.DefaultSelector()
+        self._selector = selectors.SelectSelector()  # unlike others it can wait for less than a millisecond
         self._selector.register(self._inbox, selectors.EVENT_READ, lambda: None)
 
     def __enter__(self) -> Self:
@@ -96,7 +107,7 @@ class Guest:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        (self._bus or self._transport).close()
+        (self._bus or self.transport).close()
         self._selector.close()
         self._inbox.close()
 
@@ -114,7 +125,7 @@ class Guest:
         if self._bus is None:
             wire = "humble" if kind is not None and kind.hash == NO_HASHES else "jazzy"
             self._bus = Bus(
-                self.scheduler, self.clock, domain=self.domain, wire=wire, transport=self._transport, log=_complain
+                self.scheduler, self.clock, domain=self.domain, wire=wire, transport=self.transport, log=_complain
             )
         return self._bus
 
@@ -126,7 +137,7 @@ class Guest:
         for one in topic.kinds:
             if one.type.count("/") == 2:
                 key = data_key(self.domain, topic.name, one.type, one.hash)
-                self._transport.subscribe(key, Qos.LATCHED if is_latched else Qos.EVENT, self._arrived(queue, one))
+                self.transport.subscribe(key, Qos.LATCHED if is_latched else Qos.EVENT, self._arrived(queue, one))
 
     @property
     def dropped(self) -> int:
@@ -174,9 +185,29 @@ class Guest:
             for number, handler in before.items():
                 signal.signal(number, handler)
 
+    def _lasting(self, router: str) -> zenoh.Session:
+        try:
+            session = open_peer(router)
+        except zenoh.ZError as error:  # a router that is not there yet is no error
+            raise NotDoneError(NO_ROUTER.at(None, f"'{router}' is no endpoint of a router")) from error
+        deadline = self.clock.now() + PATIENCE
+        while not session.info.routers_zid():
+            if self.clock.now() > deadline:
+                session.close()  # type: ignore[no-untyped-call]
+                raise NotDoneError(NO_ROUTER.at(None, f"no router answers at {router}"))
+            time.sleep(_PAUSE)
+        return session
+
     def _arrived(self, queue: Queue[Heard], kind: Kind) -> Callable[[Arrival], None]:
         # In a thread of the transport: a message has the time at which it came, not that at which it is shown.
-        return lambda arrival: queue.put(Heard(self.clock.now(), kind, arrival), self._transport.wake)
+        return lambda arrival: queue.put(Heard(self.clock.now(), kind, arrival), self.transport.wake)
+
+
+def _short(router: str) -> zenoh.Session:
+    try:
+        return open_client(router)
+    except OSError as error:
+        raise NotDoneError(NO_ROUTER.at(None, error.strerror or str(error))) from error
 
 
 def _complain(owner: str, text: str) -> None:

@@ -6,13 +6,13 @@ import os
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from rbxcompose.cli.common.fixing import replace_file
 from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.model.charging import GO_TO, server
 from rbxcompose.model.flow import Flow, setting
 from rbxcompose.model.robot import Robot
+from rbxcompose.replacing import replace_file
 from rbxcompose.scaffold.answers import ANSWER, AnswerError
 from rbxcompose.scaffold.mission import MissionAnswers, with_entry
 
@@ -39,7 +39,7 @@ class Home:
         places = tuple(self.robot.manifest.places.values())
         for skill in sorted(self.robot.skills) if places else ():
             if driver := server(self.robot, skill, GO_TO):
-                parts = [driver, *(base for one, base in Flow.of(self.robot).drives() if one is driver)]
+                parts = [driver, *(base for one, base in Flow(self.robot).drives() if one is driver)]
                 limits = [setting(part, key) for part in parts for key in ("speed", "max_speed")]
                 return MissionAnswers(name, file, places, skill, min(limit for limit in limits if limit))
         return MissionAnswers(name, file)

@@ -9,13 +9,15 @@ from dataclasses import asdict
 from typing import Any
 
 from rbxcompose.bus.graph import End, Name, find
-from rbxcompose.cli.common.bus_place import find_place
+from rbxcompose.cli.common.bus_place import add_bus_options, find_place
 from rbxcompose.cli.common.guest import Guest
 from rbxcompose.cli.common.robots import NotDoneError
 from rbxcompose.cli.common.telling import refuse, tell
 from rbxcompose.findings import kind
 from rbxcompose.plain import plain
 from rbxcompose.units import FREQUENCY, TIME, Dimension, UnitError, to_si
+
+Do = Callable[[Guest, argparse.Namespace], int]
 
 NO_NAME = kind(
     "RBX9022",
@@ -104,6 +106,28 @@ def described(one: Name, ends: tuple[str, str]) -> dict[str, Any]:
         ends[0]: [_end(end) for end in one.givers],
         ends[1]: [_end(end) for end in one.takers],
     }
+
+
+def add_server_verbs(
+    parser: argparse.ArgumentParser, noun: str, verb: tuple[str, str], content: str, example: str, do: Sequence[Do]
+) -> None:
+    """Declare what can be done with services and actions: `ls`, and a `verb` with its help, which sends a `content`.
+
+    `do` is what carries them out, in this order.
+    """
+    actions = parser.add_subparsers(dest="action", metavar=f"ls|{verb[0]}", required=True)
+    ls = actions.add_parser("ls", help=f"list the {noun}s with their types")
+    add_ls_options(ls)
+    send = actions.add_parser(verb[0], help=verb[1])
+    send.add_argument("name", metavar=noun.upper(), help=f"its name, such as {example}")
+    send.add_argument(
+        "content", metavar=content.upper(), nargs="?", default="", help="YAML; what it leaves out is zero"
+    )
+    add_timeout_option(send, "5s")
+    add_json_option(send)
+    for one, done in zip((ls, send), do, strict=True):
+        one.set_defaults(do=done)
+        add_bus_options(one)
 
 
 def add_ls_options(parser: argparse.ArgumentParser) -> None:

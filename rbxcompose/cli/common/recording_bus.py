@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from itertools import count
-
-import zenoh
 
 from rbxcompose.bus.attachment import Attachment, decode_attachment
 from rbxcompose.bus.classes import ros_qos
@@ -16,54 +13,28 @@ from rbxcompose.bus.names import data_key, dds_type
 from rbxcompose.bus.tokens import SPACE, EndpointToken, EntityKind, NodeToken, gid, parse_token
 from rbxcompose.bus.transport import Arrival, RemotePublisher
 from rbxcompose.bus.wire import WIRE_PROFILES
-from rbxcompose.bus.zenoh_session import open_peer
-from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.cli.common.bus_place import BusPlace
-from rbxcompose.cli.common.guest import NO_ROUTER
-from rbxcompose.cli.common.robots import NotDoneError
-from rbxcompose.clock import Clock
+from rbxcompose.cli.common.guest import Guest
 from rbxcompose.recording.definitions import definition_of
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.topics import Selection, Topic, topic_of
 
 MOST_WAITING = 20_000  # messages that came and are not yet written
 MOST_TOPICS = 2_000
-_PATIENCE = 3.0  # [s] until the router has answered
 _MATCHING = 1.0  # [s] at most until subscribers have found a new publisher
-_PAUSE = 0.01  # [s]
-
-
-def join(place: BusPlace) -> ZenohTransport:
-    """Open a session at a router.
-
-    Raises:
-        NotDoneError: if none answers.
-    """
-    try:
-        session = open_peer(place.router)
-    except zenoh.ZError as error:  # a router that is not there yet is no error
-        raise NotDoneError(NO_ROUTER.at(None, f"'{place.router}' is no endpoint of a router")) from error
-    transport = ZenohTransport(session, lambda owner, callback: callback())
-    deadline = time.monotonic() + _PATIENCE
-    while not session.info.routers_zid():
-        if time.monotonic() > deadline:
-            transport.close()
-            raise NotDoneError(NO_ROUTER.at(None, f"no router answers at {place.router}"))
-        time.sleep(_PAUSE)
-    return transport
+_PAUSE = 0.01  # [s] between two looks for them
 
 
 class Tap:
     """Takes what is published on all topics that are wanted, also on those that come while it runs."""
 
-    def __init__(self, transport: ZenohTransport, domain: int, wanted: Selection, clock: Clock) -> None:
-        self._transport, self._domain, self._wanted, self._clock = transport, domain, wanted, clock
+    def __init__(self, guest: Guest, wanted: Selection) -> None:
+        self._guest, self._wanted = guest, wanted
         self._tokens: deque[str] = deque(maxlen=MOST_WAITING)
         self._waiting: deque[Callable[[], Recorded]] = deque(maxlen=MOST_WAITING)
         self._arrivals = count(1)
         self._arrived = self._taken = 0
         self._keys: set[str] = set()
-        transport.watch(f"{SPACE}/{domain}/**", self._noticed)
+        guest.transport.watch(f"{SPACE}/{guest.domain}/**", self._noticed)
 
     @property
     def lost(self) -> int:
@@ -87,15 +58,15 @@ class Tap:
         topic = topic_of(token) if isinstance(token, EndpointToken) else None
         if topic is None or not self._wanted.takes(topic) or len(self._keys) >= MOST_TOPICS:
             return
-        data = data_key(self._domain, topic.name, topic.type, topic.hash)
+        data = data_key(self._guest.domain, topic.name, topic.type, topic.hash)
         if data in self._keys:
             return
         self._keys.add(data)
         whole = replace(topic, definition=definition_of(topic.type))
-        self._transport.subscribe(data, topic.qos, lambda arrival: self._arrive(whole, arrival))
+        self._guest.transport.subscribe(data, topic.qos, lambda arrival: self._arrive(whole, arrival))
 
     def _arrive(self, topic: Topic, arrival: Arrival) -> None:
-        stamp = self._clock.stamp()
+        stamp = self._guest.clock.stamp()
         self._waiting.append(lambda: _recorded(topic, stamp, arrival))
         self._arrived = next(self._arrivals)
 
@@ -111,9 +82,10 @@ def _recorded(topic: Topic, stamp: int, arrival: Arrival) -> Recorded:
 class Player:
     """Publishes recorded messages as the node `replay`."""
 
-    def __init__(self, transport: ZenohTransport, domain: int, topics: Iterable[Topic], clock: Clock) -> None:
-        self._clock = clock
+    def __init__(self, guest: Guest, topics: Iterable[Topic]) -> None:
+        self._guest = guest
         self._sequence = count(1)
+        transport, domain = guest.transport, guest.domain
         node = NodeToken(domain, transport.session, 0, "replay")
         transport.announce(node.key)
         self._publishers: dict[Topic, tuple[RemotePublisher, bytes]] = {}
@@ -127,11 +99,13 @@ class Player:
 
     def wait_for_subscribers(self) -> None:
         """Wait until each topic has a subscriber, but not for long: many will never have one."""
-        deadline = time.monotonic() + _MATCHING
-        while time.monotonic() < deadline and not all(one.has_match for one, _ in self._publishers.values()):
-            time.sleep(_PAUSE)
+        publishers = [one for one, _ in self._publishers.values()]
+        deadline = self._guest.clock.now() + _MATCHING
+        while not all(one.has_match for one in publishers) and self._guest.clock.now() < deadline:
+            if self._guest.run(lambda: self._guest.is_interrupted, _PAUSE):
+                return
 
     def put(self, message: Recorded) -> None:
         """Publish a message again."""
         publisher, sender = self._publishers[message.topic]
-        publisher.put(message.payload, Attachment(next(self._sequence), self._clock.stamp(), sender).encode())
+        publisher.put(message.payload, Attachment(next(self._sequence), self._guest.clock.stamp(), sender).encode())

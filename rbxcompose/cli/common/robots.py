@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable
 
 from rbxcompose.findings import Finding, kind, suggest
-from rbxcompose.runtime.control import NoAnswerError, RefusedError, ask
+from rbxcompose.runtime.control import ANSWER, NoAnswerError, RefusedError, ask
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, State, all_folders
 
 ALREADY_UP = kind(
@@ -112,15 +112,15 @@ def known_state(folder: RobotFolder) -> State | None:
         return None
 
 
-def request(folder: RobotFolder, fields: dict[str, object]) -> object:
-    """Ask a robot's supervisor and return the answer.
+def request(folder: RobotFolder, fields: dict[str, object], *, timeout: float = ANSWER) -> object:
+    """Ask a robot's supervisor and return the answer, which may take `timeout` [s].
 
     Raises:
         NotDoneError: if it refuses or does not answer.
     """
     name = folder.path.name
     try:
-        return ask(folder, fields)
+        return ask(folder, fields, timeout=timeout)
     except RefusedError as refusal:
         raise NotDoneError(REFUSED.at(None, f"'{name}' refuses: {refusal}")) from refusal
     except NoAnswerError as error:

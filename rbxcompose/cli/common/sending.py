@@ -21,7 +21,7 @@ def send(guest: Guest, arguments: argparse.Namespace) -> int:
     """Send a goal, print its feedback and its result."""
     found = wanted([one for one in guest.graph().actions if one.givers], arguments.name, "action")
     action = type_of(found.kinds[0], "action", registry.action, lambda found: found.SendGoal.HASH)
-    goal = message_from(action.Goal, arguments.goal)
+    goal = message_from(action.Goal, arguments.content)
     if goal is None:
         return 1
     client = guest.bus(found.kinds[0]).action_client(NAME, found.name, action)

@@ -10,13 +10,14 @@ from pathlib import Path
 from rbxcompose.findings import Finding, Severity, Span, kind
 from rbxcompose.manifest.files import ROBOT_FILE, find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
+from rbxcompose.manifest.trials import TEST
 
 UNUSED = kind(
     "RBX9007",
     """No robot uses the file
 
-A mission, a part or an overlay is checked together with the robots that use it. No robot of the project does, so that
-there is nothing to check it against.
+A mission or a part is checked together with the robots that use it. No robot of the project does, so that there is
+nothing to check it against. An overlay does not say which robots it is for: `check ROBOT -f FILE` checks it on one.
 
 Bad: `rbxcompose check missions/draft.yaml`, which no robot has in its `missions:`.
 Good: name the mission in a robot, or leave it out of the command.
@@ -24,7 +25,7 @@ Good: name the mission in a robot, or leave it out of the command.
     Severity.WARNING,
 )
 
-_USE = "name it in a robot ('missions:', 'include:'); an overlay is checked by 'check ROBOT -f FILE'"
+_USE = "name it in a robot ('missions:', 'include:')"
 _KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
 _HEAD = 4096  # bytes of a file in which its kind stands
 _MANIFESTS = ("*.yaml", "*.yml")
@@ -33,25 +34,30 @@ _ROBOTS = "robots"
 
 @dataclass(slots=True)
 class Targets:
-    """The robots to check: `robots` in any case, `users` if they use one of `files`."""
+    """The robots to check: `robots` in any case, `users` if they use one of `files`; and the `tests` of missions."""
 
     robots: list[str] = field(default_factory=list)
     users: list[str] = field(default_factory=list)
     files: list[str] = field(default_factory=list)
+    tests: list[str] = field(default_factory=list)
 
     def unused(self, read: Iterable[str]) -> Iterator[Finding]:
         """Yield a finding for each of `files` that is not among the names of those that were `read`."""
         known = set(read)
         for file in self.files:
             if file not in known:
-                yield UNUSED.at(Span(file, 1, 1, 1, 2), f"no robot of the project uses '{file}'", help=_USE)
+                message, how = f"no robot of the project uses '{file}'", _USE
+                if _kind_of(Path(file)) == "Overlay":
+                    message = f"'{file}' is an overlay, and does not say for which robot"
+                    how = f"name the robot, too: 'rbxcompose check ROBOT -f {file}'"
+                yield UNUSED.at(Span(file, 1, 1, 1, 2), message, help=how)
 
 
 def targets(paths: Iterable[str]) -> Targets:
     """Return the robots that paths of the command line mean.
 
-    A path is a robot's file or folder, `rbx:robots/NAME`, a folder that has robots below it, or any other manifest,
-    which means the robots of its project that use it.
+    A path is a robot's file or folder, `rbx:robots/NAME`, a folder that has robots or else tests below it, or any other
+    manifest, which means the robots of its project that use it.
     """
     out = Targets()
     for written in paths:
@@ -59,9 +65,14 @@ def targets(paths: Iterable[str]) -> Targets:
         if written.startswith(PREFIX) or not path.exists():
             out.robots.append(written)
         elif path.is_dir():
-            out.robots += [written] if (path / ROBOT_FILE).exists() else robots_below(path) or [written]
+            robots = [written] if (path / ROBOT_FILE).exists() else robots_below(path)
+            tests = [] if robots else tests_below(path)
+            out.tests += tests
+            out.robots += robots if robots or tests else [written]
         elif _kind_of(path) in ("Robot", ""):
             out.robots.append(written)
+        elif _kind_of(path) == TEST:
+            out.tests.append(written)
         else:
             out.files.append(shown_name(path.resolve()))
             out.users += robots_below(project_of(path))
@@ -75,6 +86,12 @@ def robots_below(folder: Path) -> list[str]:
     base = folder / _ROBOTS if (folder / _ROBOTS).is_dir() else folder
     files = (path for depth in ("", "*/", "*/*/") for pattern in _MANIFESTS for path in base.glob(depth + pattern))
     return sorted(shown_name(path.resolve()) for path in files if _kind_of(path) == "Robot")
+
+
+def tests_below(folder: Path) -> list[str]:
+    """Return the tests of missions in a folder, at any depth."""
+    files = (path for pattern in _MANIFESTS for path in folder.rglob(pattern))
+    return sorted(shown_name(path.resolve()) for path in files if _kind_of(path) == TEST)
 
 
 def projects_of(paths: Iterable[str]) -> list[Path]:

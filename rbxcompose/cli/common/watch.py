@@ -3,35 +3,45 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from rbxcompose.cli.common.robots import ALREADY_UP, UNSAFE
 from rbxcompose.cli.common.story import Story
 from rbxcompose.cli.common.summary import summary
 from rbxcompose.cli.common.telling import has_colour, refuse, tell
 from rbxcompose.diagnostics.levels import Level
-from rbxcompose.plan.model import Plan
+from rbxcompose.plan.model import Plan, extent
 from rbxcompose.runtime.conductor import ROBOT_FAILED
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.follow import Follower
 from rbxcompose.runtime.launch import AlreadyUp, Begun, Ended, Report, Started, Unsafe, Up, start_supervisor
 from rbxcompose.runtime.log import NAME
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.records import Record
+
+if TYPE_CHECKING:
+    from rbxcompose.cli.common.watching import Watching
 
 _LOOK = 0.05  # [s] between looks at the log
 
 
-def run_plan(plan: Plan, options: RunOptions) -> int:
-    """Run a robot to its end, or until all is active if detached, and return the exit code."""
+def run_plan(plan: Plan, options: RunOptions, watching: Watching | None = None) -> int:
+    """Run a robot to its end, or until all is active if detached, and return the exit code.
+
+    `watching` follows its files meanwhile.
+    """
     plan = plan.in_one_process() if options.is_stepped else plan
     started = start_supervisor(plan, options)
-    return _Watch(plan, options, started).run()
+    return _Watch(plan, options, started, watching).run()
 
 
 class _Watch:
     """Watches one run from its first report to its last."""
 
-    def __init__(self, plan: Plan, options: RunOptions, started: Started) -> None:
-        self._plan, self._options, self._started = plan, options, started
+    def __init__(self, plan: Plan, options: RunOptions, started: Started, watching: Watching | None) -> None:
+        self._plan, self._options, self._started, self._watching = plan, options, started, watching
+        self._is_up = False
         self._story = Story([one.name for one in plan.instances], colour=has_colour(sys.stdout))
         self._log: Follower | None = None  # none before the log of this run has begun
 
@@ -39,12 +49,18 @@ class _Watch:
         """Watch until the robot is down, or up if detached, and return the exit code."""
         try:
             while True:
-                report = self._started.wait_for_report(_LOOK)
-                self._tell_story()
-                if report is not None and (exit_code := self._tell(report)) is not None:
+                records = self._records()
+                report = self._started.wait_for_report(0.0 if records else _LOOK)
+                exit_code = self._tell(report) if isinstance(report, Up) else None  # comes before what starts with it
+                self._tell_story([*records, *self._records()])
+                if self._watching is not None and self._is_up and exit_code is None:
+                    self._watching.look()
+                if report is not None and not isinstance(report, Up):
+                    exit_code = self._tell(report)
+                if exit_code is not None:
                     return exit_code
         except EOFError:
-            self._tell_story()
+            self._tell_story(self._records())
             sys.stderr.write("rbxcompose up: the supervisor was killed; its processes come to rest by themselves\n")
             self._started.wait()
             return ROBOT_FAILED
@@ -52,8 +68,12 @@ class _Watch:
             if self._log is not None:
                 self._log.close()
 
-    def _tell_story(self) -> None:
-        for record in self._log.read() if self._log is not None else ():
+    def _records(self) -> list[Record]:
+        """Return what has been logged since the last call."""
+        return self._log.read() if self._log is not None else []
+
+    def _tell_story(self, records: Iterable[Record]) -> None:
+        for record in records:
             if record.level is not Level.OK or not self._options.is_detached:
                 tell(self._story.line(record))
 
@@ -65,8 +85,8 @@ class _Watch:
                 self._log = Follower(RobotFolder.of(name).path / NAME)
                 return None
             case Up(components, processes, seconds):
-                shown = f"{components} components in {processes} process{'es' if processes > 1 else ''}"
-                tell(f"{name} is up: {shown}, {seconds:.2f} s")
+                self._is_up = True
+                tell(f"{name} is up: {extent(components, processes)}, {seconds:.2f} s")
                 if self._options.is_detached:
                     self._started.let_go()
                     return 0

@@ -1,0 +1,66 @@
+"""Change a running robot to what its files say now: only what has changed restarts.
+
+First the difference is shown, component by component with the reason; on a terminal it is asked for. A manifest with
+findings changes nothing. What is unsafe while the robot moves, or a mission runs, is refused with the reason.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+
+from rbxcompose.cli.common.applying import Proposal
+from rbxcompose.cli.common.robot_options import add_layer_options, compiled
+from rbxcompose.cli.common.robots import REFUSED, NotDoneError
+from rbxcompose.cli.common.telling import refuse, tell, tell_report
+
+USAGE = 2
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
+    add_layer_options(parser)
+    parser.add_argument("-y", "--yes", action="store_true", help="do not ask")
+    parser.add_argument("--dry-run", action="store_true", help="show the difference and what speaks against it")
+    parser.add_argument("--json", action="store_true", help="write the difference as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compile the robot, show what would change in the one that runs, change it."""
+    compilation = compiled(arguments.path, arguments)
+    tell_report(compilation.report, compilation.sources)
+    if compilation.plan is None or compilation.robot is None:
+        return 1
+    try:
+        proposal = Proposal.of(compilation.plan, compilation.robot)
+        tell(json.dumps(proposal.found) if arguments.json else proposal.text())
+        return _carry_out(proposal, arguments)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def _carry_out(proposal: Proposal, arguments: argparse.Namespace) -> int:
+    name = proposal.folder.path.name
+    if proposal.why_not:
+        return refuse(REFUSED.at(None, f"'{name}' refuses: {proposal.why_not}"))
+    if arguments.dry_run or proposal.is_empty:
+        return 0
+    if not arguments.yes:
+        if arguments.json or not sys.stdin.isatty():
+            sys.stderr.write("rbxcompose apply: nobody can be asked here: give --yes, or --dry-run to look only\n")
+            return USAGE
+        if not _is_wanted(name):
+            tell("nothing was changed")
+            return 0
+    answer = proposal.apply()
+    if not arguments.json:
+        tell(f"{name} is changed: {answer}")
+    return 0
+
+
+def _is_wanted(name: str) -> bool:
+    sys.stdout.write(f"change '{name}'? [y/N] ")
+    sys.stdout.flush()
+    return sys.stdin.readline().strip().lower() in ("y", "yes")

@@ -1,0 +1,199 @@
+"""Pure core: what `top` shows of a robot at one moment, and the lines that show it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plain import columns, fitted, plain
+from rbxcompose.runtime.records import Record
+
+MOST_WARNINGS = 5
+_GAP = "  "
+_RESET = "\x1b[0m"
+_BOLD, _FAINT, _YELLOW, _RED, _MAGENTA = "\x1b[1m", "\x1b[2m", "\x1b[33m", "\x1b[31m", "\x1b[35m"
+_COLOURS = {Level.OK: "", Level.WARN: _YELLOW, Level.ERROR: _RED, Level.STALE: _MAGENTA}
+_FAILED = frozenset({"failed", "dead", "lost"})
+_MOST_OF_NAMES = 24  # columns
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A component: its messages that go out [1/s], and what diagnostics say of it; None where nothing is known."""
+
+    name: str
+    type: str
+    state: str
+    process: str
+    restarts: int
+    rate: float | None = None
+    level: Level | None = None
+    message: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """A process: the share of one processor that it takes, None if not known yet, and its memory [B]."""
+
+    process: str
+    pid: int
+    cpu: float | None
+    memory: int
+
+
+@dataclass(frozen=True, slots=True)
+class Tree:
+    """A mission that runs: its name, how it stands, and the nodes that run, from the outside in, as lines."""
+
+    mission: str
+    state: str
+    running: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """All that is shown: `health` has the level and the words of each group of the diagnostics."""
+
+    robot: str
+    is_supervised: bool
+    router: str | None
+    mission: str
+    batteries: Sequence[tuple[str, str]]
+    parts: Sequence[Part]
+    loads: Sequence[Load]
+    health: Sequence[tuple[str, Level, str]]
+    warnings: Sequence[Record]
+    trees: Sequence[Tree] = ()
+
+    def to_data(self) -> dict[str, Any]:
+        """Return it for JSON; levels by their names."""
+        parts = [{**asdict(one), "level": None if one.level is None else one.level.name} for one in self.parts]
+        return {
+            "robot": self.robot,
+            "is_supervised": self.is_supervised,
+            "router": self.router,
+            "mission": self.mission,
+            "missions": [asdict(one) for one in self.trees],
+            "batteries": dict(self.batteries),
+            "components": parts,
+            "processes": [asdict(one) for one in self.loads],
+            "diagnostics": [{"group": name, "level": level.name, "message": text} for name, level, text in self.health],
+            "warnings": [
+                {"time": one.time, "level": one.level.name, "source": one.source, "text": one.text}
+                for one in self.warnings
+            ],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    text: str
+    colour: str = ""
+
+
+def lines_of(picture: Picture, width: int, height: int, *, colour: bool = False) -> list[str]:
+    """Return at most `height` lines of at most `width` columns; what does not fit is counted.
+
+    Missions have the room that is left by all else; components go last.
+    """
+    head = _head(picture)
+    loads = [_Line(""), *_loads(picture.loads)]
+    tail = [*_health(picture.health), *_warnings(picture.warnings)]
+    room = max(2, height - len(head) - len(loads) - len(tail))
+    parts = _shortened(_parts(picture.parts), room)
+    left = height - len(head) - len(parts) - len(loads) - len(tail)
+    shown = [*head, *parts, *loads, *_trees(picture.trees, left), *tail][:height]
+    return [_painted(line, width, colour) for line in shown]
+
+
+def _head(picture: Picture) -> list[_Line]:
+    supervisor = "" if picture.is_supervised else "; its supervisor is dead, 'rbxcompose down' ends what is left"
+    lines = [_Line(f"{plain(picture.robot)}: router {plain(picture.router or 'none')}{supervisor}", _BOLD)]
+    if picture.mission:
+        lines.append(_Line(f"mission: {plain(picture.mission)}"))
+    if picture.batteries:
+        lines.append(_Line(_GAP.join(f"{plain(name)}: {plain(text)}" for name, text in picture.batteries)))
+    return [*lines, _Line("")]
+
+
+def _parts(parts: Sequence[Part]) -> list[_Line]:
+    rows = [
+        (
+            one.name,
+            one.type,
+            one.state,
+            one.process,
+            str(one.restarts),
+            "-" if one.rate is None else f"{one.rate:.1f}",
+            "" if one.level in (None, Level.OK) else f"{one.level.name}: {one.message}",
+        )
+        for one in parts
+    ]
+    head, *lines = _table([("component", "type", "state", "process", "restarts", "msg/s", ""), *rows])
+    return [_Line(head, _FAINT), *(_Line(line, _alarm(one)) for line, one in zip(lines, parts, strict=True))]
+
+
+def _alarm(part: Part) -> str:
+    if part.state in _FAILED:
+        return _RED
+    return _YELLOW if part.state != "active" else _COLOURS[part.level or Level.OK]
+
+
+def _loads(loads: Sequence[Load]) -> list[_Line]:
+    rows = [
+        (one.process, str(one.pid), "-" if one.cpu is None else f"{one.cpu:.1%}", f"{one.memory / 1e6:.0f} MB")
+        for one in loads
+    ]
+    head, *lines = _table([("process", "pid", "cpu", "memory"), *rows])
+    return [_Line(head, _FAINT), *map(_Line, lines)]
+
+
+def _trees(trees: Sequence[Tree], room: int) -> list[_Line]:
+    lines = [line for one in trees for line in _tree(one)]
+    return [_Line(""), *_shortened(lines, room - 1)] if lines and room > 1 else []
+
+
+def _tree(tree: Tree) -> list[_Line]:
+    head = _Line(f"mission {plain(tree.mission)}: {plain(tree.state)}", _FAINT)
+    return [head, *(_Line(plain(line)) for line in tree.running)]
+
+
+def _health(health: Sequence[tuple[str, Level, str]]) -> list[_Line]:
+    fine = [plain(name) for name, level, _ in health if level is Level.OK]
+    lines = [
+        _Line(f"{level.name} {plain(name)}: {plain(text)}", _COLOURS[level])
+        for name, level, text in health
+        if level is not Level.OK
+    ]
+    lines += [_Line(f"OK {', '.join(fine)}")] if fine else []
+    return [_Line(""), *lines] if lines else []
+
+
+def _warnings(warnings: Sequence[Record]) -> list[_Line]:
+    lines = [
+        _Line(f"{one.time:8.1f}  {plain(one.source)}: {plain(one.text)}", _COLOURS[one.level])
+        for one in warnings[-MOST_WARNINGS:]
+    ]
+    return [_Line(""), *lines] if lines else []
+
+
+def _shortened(lines: Sequence[_Line], room: int) -> list[_Line]:
+    if len(lines) <= room:
+        return list(lines)
+    return [*lines[: room - 1], _Line(f"... and {len(lines) - room + 1} more", _FAINT)]
+
+
+def _table(rows: Sequence[Iterable[str]]) -> list[str]:
+    cells = [[fitted(plain(cell), _MOST_OF_NAMES) for cell in row[:-1]] + [plain(row[-1])] for row in map(list, rows)]
+    widths = [max(map(columns, column)) for column in zip(*cells, strict=True)]
+    return [
+        _GAP.join(cell + " " * (width - columns(cell)) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in cells
+    ]
+
+
+def _painted(line: _Line, width: int, colour: bool) -> str:
+    text = fitted(line.text, width)
+    return f"{line.colour}{text}{_RESET}" if colour and line.colour and text else text

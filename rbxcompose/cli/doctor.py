@@ -1,0 +1,133 @@
+"""Examine this machine and the robots that run on it: what is wrong, and what to do about it.
+
+A robot that is named, by its file or its name, is looked at alone; its devices and secrets are, too. Exit codes: 0 no
+error, 1 errors found, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import sys
+import time
+
+from rbxcompose.cli.common.bus_place import place_of
+from rbxcompose.cli.common.guest import Guest, Heard
+from rbxcompose.cli.common.messages import to_json
+from rbxcompose.cli.common.nouns import add_json_option
+from rbxcompose.cli.common.robots import NotDoneError, add_robot_option, find_robot
+from rbxcompose.cli.common.telling import FINDINGS, has_colour, refuse, tell, tell_report
+from rbxcompose.compiler import compile_robot
+from rbxcompose.doctor import machine
+from rbxcompose.doctor.examining import Answer, examine_all, has_errors
+from rbxcompose.doctor.facts import Bus, Facts, Running
+from rbxcompose.findings import Finding, Report
+from rbxcompose.manifest.library import PREFIX
+from rbxcompose.model.robot import Robot
+from rbxcompose.rendering.text import render_text
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, all_folders, base_folder
+
+_LISTENING = 1.0  # [s] to messages, for their stamps
+_NANOSECONDS = 1e9
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="only this robot, by name or file")
+    add_robot_option(parser)
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Collect the facts, examine them, tell what came out."""
+    watch = machine.ClockWatch()
+    try:
+        folders, path = _meant(arguments.robot or arguments.path)
+    except NotDoneError as error:
+        return refuse(error.finding)
+    file = None if path is None else _described(path)
+    if path is not None and file is None:
+        return FINDINGS
+    running = [_running(folder) for folder in folders]
+    facts = Facts(
+        running=running,
+        file=file,
+        python=platform.python_version(),
+        versions=machine.versions(),
+        clocks=watch.clocks(),
+        limits=machine.limits(),
+        listeners=machine.listeners(),
+        processes=machine.processes(),
+        base=base_folder(),
+    )
+    answers = examine_all(facts)
+    tell(to_json([one.to_data() for one in answers]) if arguments.json else _text(answers))
+    return FINDINGS if has_errors(answers) else 0
+
+
+def _meant(wanted: str | None) -> tuple[list[RobotFolder], str | None]:
+    """Return the robots that are up, or the file that is meant and need not be up.
+
+    Raises:
+        NotDoneError: if what is wanted is neither.
+    """
+    if wanted is None:
+        return all_folders(), None
+    try:
+        return [find_robot(wanted)], None
+    except NotDoneError:
+        if not os.path.exists(wanted) and not wanted.startswith(PREFIX):
+            raise
+        return [], wanted
+
+
+def _described(path: str) -> Robot | None:
+    """Return the robot that a file describes; tell what is wrong with the file if it cannot be read as one."""
+    compilation = compile_robot(path, environment=os.environ)
+    if compilation.robot is None:
+        tell_report(compilation.report, compilation.sources)
+    return compilation.robot
+
+
+def _running(folder: RobotFolder) -> Running:
+    try:
+        state = folder.read_state()
+    except BrokenStateError as error:
+        return Running(folder, None, str(error))
+    if state is None:
+        return Running(folder, None, "it has gone")
+    robot = compile_robot(state.file, environment=os.environ).robot if os.path.exists(state.file) else None
+    return Running(folder, state, "", robot, _bus(folder))
+
+
+def _bus(folder: RobotFolder) -> Bus | None:
+    """Listen for a moment; None if there is no bus to be reached, which others tell."""
+    try:
+        with Guest(place_of(folder)) as guest:
+            graph = guest.graph()
+            nodes = {end.gid: end.node for topic in graph.topics for end in topic.givers}
+            ages: dict[str, float] = {}
+
+            def heard(message: Heard) -> None:
+                age = time.time() - (guest.clock.now() - message.time) - message.stamp / _NANOSECONDS
+                node = nodes.get(message.sender)
+                if node is not None and message.stamp:
+                    ages[node] = min(age, ages.get(node, age))
+
+            for topic in graph.topics:
+                if all(end.qos is not None and not end.qos.is_transient_local for end in topic.givers):
+                    guest.listen(topic, heard)
+            guest.run(lambda: False, _LISTENING)
+            return Bus(graph, ages)
+    except NotDoneError:
+        return None
+
+
+def _text(answers: list[Answer]) -> str:
+    """Return what is fine, then the findings."""
+    width = max(len(one.examination) for one in answers)
+    lines = [f"ok  {one.examination:<{width}}  {one.told}" for one in answers if isinstance(one.told, str)]
+    report = Report()
+    report.extend(one.told for one in answers if isinstance(one.told, Finding))
+    return "\n".join([*lines, render_text(report, {}, has_colour(sys.stdout))]).rstrip("\n")

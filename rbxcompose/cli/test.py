@@ -1,0 +1,104 @@
+"""Run the tests of missions, in virtual time.
+
+PATH is a test or a folder with tests below it; without one it is `missions/`. Exit codes: 0 all passed, 1 a test failed
+or has mistakes, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from rbxcompose.cli.common.telling import FINDINGS, has_colour, tell, tell_report
+from rbxcompose.findings import Report
+from rbxcompose.manifest.files import shown_name
+from rbxcompose.trials.coverage import Coverage
+from rbxcompose.trials.finding_files import tests_of
+from rbxcompose.trials.junit import junit
+from rbxcompose.trials.reading import Reading
+from rbxcompose.trials.running import run_trial
+from rbxcompose.trials.telling import Outcome, Teller, as_json, coverage_text
+
+USAGE = 2
+HERE = Path("missions")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument(
+        "paths", nargs="*", type=Path, default=[HERE], metavar="PATH", help="tests, or folders of tests"
+    )
+    parser.add_argument("--filter", default="", metavar="TEXT", help="only those with this text in their names")
+    parser.add_argument("--coverage", action="store_true", help="tell which ways of the missions no test took")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit's XML")
+    parser.add_argument("-v", "--verbose", action="store_true", help="show the traces of all tests")
+    parser.add_argument("--json", action="store_true", help="write JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read, run and judge the tests, and tell what came out."""
+    for path in arguments.paths:
+        if not path.exists():
+            sys.stderr.write(f"rbxcompose test: there is no '{path}'\n")
+            return USAGE
+    files = tests_of(arguments.paths)
+    if not files:
+        sys.stderr.write(f"rbxcompose test: no tests ('kind: Test') in {', '.join(map(str, arguments.paths))}\n")
+        return USAGE
+    reading, coverage, teller = Reading(os.environ), Coverage(), Teller(has_colour(sys.stdout))
+    outcomes: list[Outcome] = []
+    for file in files:
+        outcome = _outcome(file, reading, arguments.filter)
+        if outcome is None:
+            continue
+        outcomes.append(outcome)
+        if outcome.verdict:
+            coverage.add(outcome.verdict.trial.linked, outcome.verdict.trial.names, outcome.verdict.seen.keys)
+        if not arguments.json:
+            _tell(outcome, teller, arguments.verbose)
+    tell_report(_findings(reading, outcomes), reading.sources)
+    if not outcomes:
+        sys.stderr.write(f"rbxcompose test: no test has '{arguments.filter}' in its name\n")
+        return USAGE
+    _finish(outcomes, coverage, teller, arguments)
+    return 0 if all(one.passed for one in outcomes) else FINDINGS
+
+
+def _outcome(file: Path, reading: Reading, wanted: str) -> Outcome | None:
+    """Return what became of a test, None for one that is not wanted."""
+    began = time.perf_counter()
+    trial, report = reading.read(file)
+    name = trial.name if trial else file.name
+    if wanted not in name:
+        return None
+    compiled = time.perf_counter()
+    if trial is None:
+        return Outcome(shown_name(file), name, tuple(report), took=compiled - began)
+    verdict = run_trial(trial)
+    return Outcome(shown_name(file), name, tuple(report), verdict, time.perf_counter() - compiled)
+
+
+def _tell(outcome: Outcome, teller: Teller, verbose: bool) -> None:
+    tell(teller.line(outcome))
+    if outcome.verdict and (verbose or not outcome.passed):
+        tell(teller.trace(outcome.verdict))
+
+
+def _findings(reading: Reading, outcomes: Sequence[Outcome]) -> Report:
+    return Report([*reading.report, *(finding for one in outcomes for finding in one.findings)])
+
+
+def _finish(outcomes: Sequence[Outcome], coverage: Coverage, teller: Teller, arguments: argparse.Namespace) -> None:
+    if arguments.junit:
+        arguments.junit.write_text(junit(outcomes), encoding="utf-8")
+    if arguments.json:
+        tell(json.dumps(as_json(outcomes, coverage), indent=1))
+        return
+    if arguments.coverage and coverage.ways:
+        tell(coverage_text(coverage))
+    tell(teller.summary(outcomes, coverage))

@@ -1,0 +1,85 @@
+"""Show a running robot live: components, processes, mission, batteries, what went wrong last.
+
+It looks once a second, until q or Ctrl-C. Without a terminal it looks once. The rate of a component is that of its
+messages; the share of a process is that of one processor.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import sys
+
+from rbxcompose.cli.common.bus_place import place_of
+from rbxcompose.cli.common.guest import Guest
+from rbxcompose.cli.common.messages import to_json
+from rbxcompose.cli.common.nouns import add_json_option
+from rbxcompose.cli.common.picture import Picture, lines_of
+from rbxcompose.cli.common.robots import NOT_UP, NotDoneError, add_robot_option, find_robot
+from rbxcompose.cli.common.sampling import Sampler
+from rbxcompose.cli.common.telling import has_colour, refuse, tell
+from rbxcompose.cli.common.terminal import full_screen, raw, show
+
+_PERIOD = 1.0  # [s] between two looks
+_MOST_READ = 1024  # bytes of keys at once
+_WIDTH, _HEIGHT = 100, 1000  # of a picture for no terminal
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file")
+    add_robot_option(parser)
+    parser.add_argument("--once", action="store_true", help="look for a second, show what was seen, and end")
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Look, once or again and again."""
+    try:
+        folder = find_robot(arguments.robot or arguments.path)
+        with Guest(place_of(folder)) as guest:
+            sampler = Sampler(folder, guest)
+            try:
+                if arguments.json or arguments.once or not (sys.stdin.isatty() and sys.stdout.isatty()):
+                    return _once(guest, sampler, arguments.json)
+                return _live(guest, sampler)
+            finally:
+                sampler.close()
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def _once(guest: Guest, sampler: Sampler, as_json: bool) -> int:
+    _sampled(sampler)
+    guest.run(lambda: False, _PERIOD)
+    guest.run(lambda: sampler.is_complete, _PERIOD)  # they come once in a period
+    picture = _sampled(sampler)
+    colour = has_colour(sys.stdout)
+    tell(to_json(picture.to_data()) if as_json else "\n".join(lines_of(picture, _WIDTH, _HEIGHT, colour=colour)))
+    return 0
+
+
+def _live(guest: Guest, sampler: Sampler) -> int:
+    keyboard, colour = sys.stdin.fileno(), has_colour(sys.stdout)
+    is_over = False
+
+    def read() -> None:
+        nonlocal is_over
+        keys = os.read(keyboard, _MOST_READ)
+        is_over = not keys or b"q" in keys.lower()
+
+    with guest.interruptible(), raw(keyboard), full_screen(sys.stdout):
+        guest.watch(keyboard, read)
+        while True:
+            size = shutil.get_terminal_size()  # of a terminal that says 0 x 0 it makes 80 x 24
+            show(sys.stdout, lines_of(_sampled(sampler), size.columns, size.lines, colour=colour))
+            if guest.run(lambda: is_over or guest.is_interrupted, _PERIOD):
+                return 0
+
+
+def _sampled(sampler: Sampler) -> Picture:
+    picture = sampler.sample()
+    if picture is None:
+        raise NotDoneError(NOT_UP.at(None, "the robot has gone down"))
+    return picture

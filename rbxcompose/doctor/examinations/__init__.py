@@ -1,0 +1,1 @@
+"""Examinations: one file each, named like its function."""

@@ -1,0 +1,35 @@
+"""Names on the bus whose ends never meet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.doctor.examining import examination
+from rbxcompose.doctor.facts import Facts
+from rbxcompose.findings import Finding, kind
+from rbxcompose.plain import plain
+
+CLASH = kind(
+    "RBX9408",
+    """Two ends of one topic, service or action have different types
+
+They never hear each other, and nobody says so: the type and the hash of its definition are part of the name on the
+wire. The definitions of one type differ where packages of different versions are mixed.
+
+Bad: `/battery` as `std_msgs/Float32` at one end, and as `sensor_msgs/BatteryState` at the other.
+Good: one type, in one version, at all ends: `rbxcompose msg show TYPE` prints its hash.
+""",
+)
+
+
+@examination
+def clashes(facts: Facts) -> Iterator[str | Finding]:
+    """Compare types and hashes of all ends of each name."""
+    for one in (one for one in facts.running if one.bus is not None):
+        graph = one.bus.graph if one.bus else None
+        names = [*graph.topics, *graph.services, *graph.actions] if graph else []
+        for name in (name for name in names if name.clash):
+            words = f"{plain(name.name)} of '{one.name}' has {plain(name.clash, 400)}"
+            yield CLASH.at(None, words, help=f"'rbxcompose topic show {plain(name.name)}' tells who has which")
+        if not any(name.clash for name in names):
+            yield f"{one.name}: all ends of {len(names)} names agree in their types"

@@ -1,0 +1,69 @@
+"""Whether clocks tell the same time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.doctor.examining import examination
+from rbxcompose.doctor.facts import Facts
+from rbxcompose.findings import Finding, Severity, kind
+
+MOST_STEP = 0.05  # [s] by which the wall clock may move against the monotonic one while we look
+MOST_AHEAD, MOST_BEHIND = 0.05, 1.0  # [s] of a sender's stamps; behind they are also by what the way takes
+
+WRONG_CLOCK = kind(
+    "RBX9404",
+    """The clock of this machine is wrong
+
+Robots move by the monotonic clock, which nobody sets; but stamps of messages, recordings and ROS 2 use the wall clock.
+
+Bad: a computer without a battery for its clock, and without a time server.
+Good: `timedatectl set-ntp true`
+""",
+    Severity.WARNING,
+)
+OTHER_CLOCK = kind(
+    "RBX9405",
+    """Somebody on the bus has another time
+
+The stamps of its messages lie in the future, or long ago. What compares stamps of several senders, such as transforms
+and recordings, is then wrong. A robot that runs with `--rate` counts its own time from zero, and so do its stamps.
+
+Bad: two computers of which one has no time server.
+Good: `timedatectl set-ntp true` on both
+""",
+    Severity.WARNING,
+)
+_HELP = "let a time server set it: timedatectl set-ntp true"
+
+
+@examination
+def clocks(facts: Facts) -> Iterator[str | Finding]:
+    """Compare the wall clock with what must be, with the monotonic clock, and with the stamps of others."""
+    clock = facts.clocks
+    if clock.wall < clock.oldest:
+        yield WRONG_CLOCK.at(
+            None, "the clock of this machine is before the time at which rbxcompose was made", help=_HELP
+        )
+    elif abs(clock.step) > MOST_STEP:
+        yield WRONG_CLOCK.at(
+            None, f"the clock of this machine moved by {clock.step:+.3f} s while we looked", help=_HELP
+        )
+    else:
+        yield f"the wall clock goes evenly{_server(clock.is_synchronised)}"
+    for one in facts.running:
+        ages = one.bus.ages if one.bus else {}
+        wrong = {node: age for node, age in ages.items() if not -MOST_AHEAD <= age <= MOST_BEHIND}
+        for node, age in sorted(wrong.items()):
+            words = f"{-age:.2f} s in the future" if age < 0 else f"{age:.2f} s in the past"
+            yield OTHER_CLOCK.at(None, f"the stamps of '{node}' of '{one.name}' lie {words}", help=_HELP)
+        if ages and not wrong:
+            yield f"{one.name}: the stamps of {len(ages)} nodes agree with this clock"
+
+
+def _server(is_synchronised: bool | None) -> str:
+    if is_synchronised is None:
+        return ""
+    return (
+        ", set by a time server" if is_synchronised else "; no time server sets it, which matters with several machines"
+    )

@@ -1,0 +1,76 @@
+"""Devices that components name."""
+
+from __future__ import annotations
+
+import grp
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rbxcompose.doctor.examining import examination
+from rbxcompose.doctor.facts import Facts
+from rbxcompose.findings import Finding, kind
+from rbxcompose.model.robot import Robot
+from rbxcompose.plain import plain
+
+_PREFIX = "/dev/"
+
+NO_DEVICE = kind(
+    "RBX9411",
+    """A device that the robot names cannot be used
+
+It is not plugged in, has another name, or this user may not open it. Serial devices mostly belong to the group
+`dialout`; who was added to it has to log in anew.
+
+Bad: `port: /dev/ttyUSB0`, which is `/dev/ttyUSB1` after the next start.
+Good: `port: /dev/serial/by-id/...`, and `sudo usermod -aG dialout $USER`
+""",
+)
+
+
+@examination
+def devices(facts: Facts) -> Iterator[str | Finding]:
+    """Look whether each device is there and may be opened."""
+    named = {device: (robot, part) for robot in facts.robots for part, device in _named(robot)}
+    for device, (robot, part) in sorted(named.items()):
+        place = robot.part_span(part)
+        path, shown = Path(device), plain(device)
+        if not path.exists():
+            yield NO_DEVICE.at(
+                place, f"'{part}' names {shown}, which is not there", help="plug it in, or look below /dev"
+            )
+        elif not path.is_char_device():
+            yield NO_DEVICE.at(place, f"'{part}' names {shown}, which is no device", help="look below /dev")
+        elif not os.access(path, os.R_OK | os.W_OK):
+            todo = f"sudo usermod -aG {_group(path)} $USER, then log in anew"
+            yield NO_DEVICE.at(place, f"'{part}' names {shown}, which this user may not open", help=todo)
+        else:
+            yield f"{shown} of '{part}' can be opened"
+    if not named:
+        yield "no component names a device"
+
+
+def _named(robot: Robot) -> Iterator[tuple[str, str]]:
+    for part in robot.parts.values():
+        for name in type(part.config).model_fields:
+            yield from ((part.name, text) for text in _texts(getattr(part.config, name)) if text.startswith(_PREFIX))
+
+
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        for one in value.values():
+            yield from _texts(one)
+    elif isinstance(value, list | tuple):
+        for one in value:
+            yield from _texts(one)
+
+
+def _group(path: Path) -> str:
+    number = path.stat().st_gid
+    try:
+        return grp.getgrgid(number).gr_name
+    except KeyError:
+        return str(number)

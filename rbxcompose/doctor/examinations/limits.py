@@ -1,0 +1,50 @@
+"""What this user's processes may have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.doctor.examining import examination
+from rbxcompose.doctor.facts import Facts
+from rbxcompose.findings import Finding, Severity, kind
+
+FEWEST_FILES = 1024
+SMALLEST_SHARED = 16_000_000  # [B]
+
+LOW_LIMIT = kind(
+    "RBX9406",
+    """A limit of this machine is low
+
+Each link of a process takes an open file, and large messages may go through shared memory. Nothing that rbxcompose
+ships needs real-time priority or locked memory; drivers of others may.
+
+Bad: a container with 1 MB at `/dev/shm`, or `ulimit -n 64`.
+Good: `docker run --shm-size=256m`, `ulimit -n 4096`
+""",
+    Severity.WARNING,
+)
+
+
+@examination
+def limits(facts: Facts) -> Iterator[str | Finding]:
+    """Tell the limits, and which are too low."""
+    has = facts.limits
+    if has.open_files is not None and has.open_files < FEWEST_FILES:
+        words = f"a process may have only {has.open_files} open files"
+        yield LOW_LIMIT.at(None, words, help=f"ulimit -n {FEWEST_FILES}, or more in /etc/security/limits.conf")
+    if has.shared_memory is None or has.shared_memory < SMALLEST_SHARED:
+        free = "there is none" if has.shared_memory is None else f"only {has.shared_memory / 1e6:.0f} MB of it free"
+        yield LOW_LIMIT.at(None, f"shared memory: {free}", help="of a container: docker run --shm-size=256m")
+    shared = "none" if has.shared_memory is None else f"{has.shared_memory / 1e6:.0f} MB"
+    yield (
+        f"open files {_number(has.open_files)}, real-time priority {_number(has.real_time_priority)}, "
+        f"locked memory {_size(has.locked_memory)}, shared memory {shared}"
+    )
+
+
+def _number(value: int | None) -> str:
+    return "without limit" if value is None else str(value)
+
+
+def _size(value: int | None) -> str:
+    return "without limit" if value is None else f"{value / 1e6:.0f} MB"

@@ -1,0 +1,57 @@
+"""Who may open what is this user's alone."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+from rbxcompose.doctor.examining import examination
+from rbxcompose.doctor.facts import Facts
+from rbxcompose.findings import Finding, kind
+from rbxcompose.manifest.files import project_of, shown_name
+from rbxcompose.manifest.secrets import FOLDER
+from rbxcompose.plain import plain
+
+OPEN_TO_OTHERS = kind(
+    "RBX9410",
+    """Others may open what is this user's alone
+
+The folder of a robot holds the socket through which it is commanded; a secret is read only if nobody else may read
+it. `up` refuses both.
+
+Bad: `chmod 755 /run/user/1000/rbxcompose`, `chmod 644 secrets/token`
+Good: `chmod 700 /run/user/1000/rbxcompose`, `chmod 600 secrets/token`
+""",
+)
+
+
+@examination
+def permissions(facts: Facts) -> Iterator[str | Finding]:
+    """Look at the folders of robots and at the secrets of their projects."""
+    folders = [path for path in (facts.base, *(one.folder.path for one in facts.running)) if path.exists()]
+    secrets = [path for folder in _secret_folders(facts) if folder.is_dir() for path in sorted(folder.iterdir())]
+    wrong = [*_wrong(folders, "700"), *_wrong(secrets, "600")]
+    yield from wrong
+    if not wrong:
+        yield f"{len(folders)} folders of robots and {len(secrets)} secrets are this user's alone"
+
+
+def _secret_folders(facts: Facts) -> list[Path]:
+    files = (Path(robot.manifest.root.span.file) for robot in facts.robots)
+    return list(dict.fromkeys(project_of(file) / FOLDER for file in files))
+
+
+def _wrong(paths: list[Path], mode: str) -> Iterator[Finding]:
+    for path in paths:
+        try:
+            found = path.lstat()
+        except FileNotFoundError:
+            continue  # it went while we looked
+        name = plain(shown_name(path))
+        if found.st_uid != os.getuid():
+            yield OPEN_TO_OTHERS.at(None, f"'{name}' belongs to another user", help=f"chown $USER {name}")
+        elif stat.S_IMODE(found.st_mode) & 0o077:
+            words = f"others may open '{name}' (mode {stat.S_IMODE(found.st_mode):04o})"
+            yield OPEN_TO_OTHERS.at(None, words, help=f"chmod {mode} {name}")

@@ -1,0 +1,77 @@
+"""Who listens at the ports of routers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.doctor.examining import examination
+from rbxcompose.doctor.facts import Facts, Listener, Running
+from rbxcompose.findings import Finding, Severity, kind
+from rbxcompose.manifest.models import Bus
+from rbxcompose.plain import plain
+
+PORT_TAKEN = kind(
+    "RBX9402",
+    """The port of the bus is taken
+
+A robot that starts takes the next free port instead, of twenty; `rbxcompose ps` tells which. A program that looks for
+the robot at its usual port then finds somebody else.
+
+Bad: a router of ROS 2 at 7447, and a robot with `bus: {port: 7447}` beside it.
+Good: `bus: {port: 7460}`, or `bus: {router: tcp/127.0.0.1:7447}` to use that router.
+""",
+    Severity.WARNING,
+)
+NO_LISTENER = kind(
+    "RBX9403",
+    """Nobody listens at the port of a running robot's router
+
+Its processes still talk with each other, but nobody new finds them. The supervisor starts a router that has ended
+again; if it cannot, somebody else may have taken the port.
+
+Bad: the router was killed together with the supervisor.
+Good: `rbxcompose down`, then `rbxcompose up`
+""",
+)
+
+
+@examination
+def ports(facts: Facts) -> Iterator[str | Finding]:
+    """Look at the routers of robots that are up, and at the port that the named robot wants."""
+    for one in facts.running:
+        yield from _router(one, facts)
+    names = {one.name for one in facts.running}
+    if facts.file is None:
+        wanted = [] if facts.running else [Bus().port]
+    else:
+        bus = facts.file.manifest.bus
+        wanted = [] if facts.file.manifest.name in names or bus.router else [bus.port]
+    for port in wanted:
+        taken = facts.listeners.get(port)
+        yield (
+            f"port {port} is free"
+            if taken is None
+            else PORT_TAKEN.at(
+                None, f"port {port} is taken by {_who(taken)}", help="choose another one with '--set bus.port=N'"
+            )
+        )
+
+
+def _router(one: Running, facts: Facts) -> Iterator[str | Finding]:
+    if one.state is None or one.state.router is None or "router" not in one.state.processes:
+        return  # it uses a router from elsewhere, or none is known
+    router, port = one.state.processes["router"], int(one.state.router.rpartition(":")[2])
+    taken = facts.listeners.get(port)
+    if taken is not None and taken.pid == router.pid:
+        yield f"port {port}: router of {one.name}"
+        return
+    words = "nobody listens there" if taken is None else f"{_who(taken)} listens there"
+    yield NO_LISTENER.at(
+        None,
+        f"the router of '{one.name}' should listen at port {port}, but {words}",
+        help=f"rbxcompose down {one.name}",
+    )
+
+
+def _who(taken: Listener) -> str:
+    return "a process of another user" if taken.pid is None else f"'{plain(taken.title)}' (process {taken.pid})"

@@ -1,0 +1,39 @@
+"""Which versions are installed, and which are locked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.doctor.examining import examination
+from rbxcompose.doctor.facts import Facts, Version
+from rbxcompose.findings import Finding, Severity, kind
+
+OTHER_VERSION = kind(
+    "RBX9401",
+    """A package is missing, or has another version than the one that is locked
+
+`requirements.lock` names the versions with which rbxcompose is tested. Others mostly work, too; when something odd
+happens, it is the first thing to look at.
+
+Bad: `pip install rbxcompose` over an environment that is years old.
+Good: `pip install -r requirements.lock`
+""",
+    Severity.WARNING,
+)
+
+
+@examination
+def versions(facts: Facts) -> Iterator[str | Finding]:
+    """Compare what is installed with what is locked, if there is a lock."""
+    wrong = [one for one in facts.versions if _is_wrong(one)]
+    for one in wrong:
+        there = f"{one.name} {one.installed} is installed" if one.installed else f"{one.name} is not installed"
+        locked = f", {one.locked} is locked" if one.locked else ""
+        todo = "pip install -r requirements.lock" if one.locked else f"pip install {one.name}"
+        yield OTHER_VERSION.at(None, there + locked, help=todo)
+    fine = ", ".join(f"{one.name} {one.installed}" for one in facts.versions if one not in wrong)
+    yield f"Python {facts.python}, {fine}" if fine else f"Python {facts.python}"
+
+
+def _is_wrong(one: Version) -> bool:
+    return one.installed is None or one.locked not in (None, one.installed)

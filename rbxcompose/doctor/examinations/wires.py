@@ -1,0 +1,47 @@
+"""Topics that have only one end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.bus.graph import Name
+from rbxcompose.doctor.examining import examination
+from rbxcompose.doctor.facts import Facts, Running
+from rbxcompose.findings import Finding, Severity, kind
+from rbxcompose.plain import plain
+from rbxcompose.sdk.ports import In
+
+NOBODY_PUBLISHES = kind(
+    "RBX9407",
+    """Somebody subscribes to a topic that nobody publishes
+
+It waits for ever. Inputs that the robot leaves open to the outside, such as `teleop` of a mux, are not meant.
+
+Bad: a node of ROS 2 that subscribes to `/odometry`, beside a robot that publishes `/odom`.
+Good: the same name at both ends: `ros2 run ... --ros-args -r odometry:=odom`
+""",
+    Severity.WARNING,
+)
+_MOST = 8  # names
+
+
+@examination
+def wires(facts: Facts) -> Iterator[str | Finding]:
+    """Tell which ends of wires are alone on the bus of each robot."""
+    for one in facts.running:
+        if one.bus is not None:
+            yield from _of(one, [topic for topic in one.bus.graph.topics if not topic.is_hidden])
+
+
+def _of(one: Running, topics: list[Name]) -> Iterator[str | Finding]:
+    ends = one.robot.ends if one.robot else ()
+    open_inputs = {end.topic for end in ends if isinstance(end.port, In) and end.port.is_open}
+    alone = [topic for topic in topics if topic.takers and not topic.givers and topic.name not in open_inputs]
+    for topic in alone:
+        nodes = ", ".join(sorted({end.node for end in topic.takers}))
+        words = f"{plain(nodes)} of '{one.name}' subscribes to {plain(topic.name)}, which nobody publishes"
+        yield NOBODY_PUBLISHES.at(None, words, help="'rbxcompose topic ls' shows what is published")
+    unheard = [plain(topic.name) for topic in topics if topic.givers and not topic.takers]
+    more = f" and {len(unheard) - _MOST} more" if len(unheard) > _MOST else ""
+    heard = f"; published, and nobody listens: {', '.join(unheard[:_MOST])}{more}" if unheard else ""
+    yield f"{one.name}: {len(topics) - len(alone)} topics are published or open to the outside{heard}"

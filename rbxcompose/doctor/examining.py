@@ -1,0 +1,62 @@
+"""How an examination is declared and run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rbxcompose.doctor.facts import Facts
+from rbxcompose.findings import Finding, Severity
+from rbxcompose.plugins import Plugins
+
+Examine = Callable[[Facts], Iterable[str | Finding]]
+"""Yields findings, and words on what is fine."""
+
+PLUGINS = Plugins("doctor", "rbxcompose.doctor.examinations")
+EXAMINATIONS: dict[str, Examine] = {}  # every one that has been imported, by name
+FINE = "ok"
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What one examination tells: words on what is fine, or a finding."""
+
+    examination: str
+    told: str | Finding
+
+    @property
+    def level(self) -> str:
+        """Return `ok`, `warning` or `error`."""
+        return FINE if isinstance(self.told, str) else self.told.severity.value
+
+    def to_data(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        data: dict[str, Any] = {"examination": self.examination, "level": self.level}
+        if isinstance(self.told, str):
+            return {**data, "message": self.told}
+        return {**data, "code": self.told.code, "message": self.told.message, "help": self.told.help}
+
+
+def examination(examine: Examine) -> Examine:
+    """Declare an examination under the name of its function.
+
+    Raises:
+        ValueError: if another one has this name.
+    """
+    name = getattr(examine, "__name__", "")
+    if EXAMINATIONS.setdefault(name, examine) is not examine:
+        raise ValueError(f"two examinations have the name {name!r}")
+    return examine
+
+
+def examine_all(facts: Facts) -> list[Answer]:
+    """Run every examination, by name."""
+    for name in PLUGINS.names():
+        PLUGINS.load(name)
+    return [Answer(name, told) for name in sorted(EXAMINATIONS) for told in EXAMINATIONS[name](facts)]
+
+
+def has_errors(answers: Sequence[Answer]) -> bool:
+    """Tell whether anything keeps a robot from running."""
+    return any(one.level == Severity.ERROR.value for one in answers)

@@ -1,0 +1,145 @@
+"""`mission` and its verbs on a robot whose executive answers within this process."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.cli import main as command
+from rbxcompose.cli.common.mission_watch import lines_of
+from rbxcompose.cli.common.robots import REFUSED, NotDoneError
+from rbxcompose.missions.picture import picture_from_data
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.sdk.bound import Outcome, Refused
+from rbxcompose.testing.golden import Golden
+from tests.executive.fake_robot import Robot
+
+ROUNDS = """
+name: rounds
+about: Looks at the corner again and again.
+data:
+  round: 0
+  seen: []
+interrupts:
+  low:
+    when: $battery < 20 %
+    do: recharge
+machine:
+  start: look
+  states:
+    look:
+      do:
+        - set:
+            round: $round + 1
+        - if: $round > 1
+          then:
+            go_to: corner
+            timeout: 30 s
+          else:
+            name: linger
+            wait: 2 s
+      next:
+        success: report
+        failure: failed
+    report:
+      do:
+        say: looked
+      next: look
+"""
+REST = "name: rest\nabout: Rests a while.\ndo:\n  wait: 1 s"
+
+
+@pytest.fixture
+def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Robot:
+    """A robot in the second round of a mission; `mission` commands reach it."""
+    made = Robot(ROUNDS, rest=REST)
+    made.level(80.0)
+    made.start()
+    made.advance(3.0)
+
+    def request(folder: RobotFolder, fields: dict[str, object]) -> object:
+        do = {"query": made.mission.query, "command": made.mission.command}[str(fields["verb"])]
+        try:
+            return do(str(fields["word"]))
+        except Refused as refusal:
+            raise NotDoneError(REFUSED.at(None, f"'bot' refuses: {refusal}")) from refusal
+
+    for module in ("rbxcompose.cli.mission", "rbxcompose.cli.common.asking"):
+        monkeypatch.setattr(f"{module}.request", request)
+        monkeypatch.setattr(f"{module}.find_robot", lambda wanted: RobotFolder(tmp_path / "bot"))
+    return made
+
+
+def arrive(robot: Robot) -> None:
+    """Be at the corner."""
+    robot.go_to.end(Outcome.SUCCEEDED)
+    robot.advance(0.0)
+
+
+def told(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> str:
+    """Return what a command prints, and what it complains about."""
+    assert command.main(["mission", *words]) == code
+    found = capsys.readouterr()
+    return found.out + found.err
+
+
+def test_each_verb_tells_what_a_person_wants_to_know(
+    robot: Robot, capsys: pytest.CaptureFixture[str], golden: Golden
+) -> None:
+    lines: list[str] = []
+    for words, code in (
+        ("ls", 0),
+        ("status", 0),
+        ("watch", 0),
+        ("show test", 0),
+        ("log rest", 0),
+        ("log test", 0),
+        ("run rest", 0),
+        ("pause test", 0),
+        ("ls", 0),
+        ("resume test", 0),
+        ("cancel test", 0),
+        ("ls", 0),
+        ("status rest", 0),
+        ("pause test", 1),
+        ("run rset", 1),
+    ):
+        lines.append(f"$ mission {words}\n{told(capsys, *words.split(), code=code)}")
+        robot.advance(0.0)
+    golden.check("mission.txt", "\n".join(lines))
+
+
+@pytest.mark.parametrize("ending", ["mermaid", "dot", "html"])
+def test_a_mission_that_runs_is_drawn_with_how_its_nodes_stand(
+    ending: str, robot: Robot, capsys: pytest.CaptureFixture[str], golden: Golden
+) -> None:
+    golden.check(f"mission_live.{ending}", told(capsys, "show", "test", "--format", ending))
+
+
+def test_the_tree_of_watch_is_coloured_by_status(robot: Robot, golden: Golden) -> None:
+    whole = json.loads(robot.mission.query("whole test"))
+    lines = lines_of(picture_from_data(whole["picture"]), whole, 60, colour=True)
+    golden.check("mission_colours.txt", "".join(f"{line}\n" for line in lines).replace("\x1b", "ESC"))
+
+
+def test_watch_tells_programs_the_whole_and_then_what_changes(
+    robot: Robot, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps: list[Callable[[], object]] = [
+        lambda: None,
+        lambda: arrive(robot),
+        lambda: robot.mission.command("cancel"),
+    ]
+    monkeypatch.setattr("rbxcompose.cli.common.mission_watch.time.sleep", lambda seconds: steps.pop(0)())
+    lines = [json.loads(line) for line in told(capsys, "watch", "--json").splitlines()]
+    assert [(one["whole"], one["state"]) for one in lines] == [(True, "running"), (False, "running"), (False, "halted")]
+    assert len(lines[1]["statuses"]) < len(lines[0]["statuses"])
+
+
+def test_programs_are_answered_in_json(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
+    assert [one["state"] for one in json.loads(told(capsys, "ls", "--json"))] == ["running", "idle"]
+    assert json.loads(told(capsys, "status", "--json"))["data"] == {"round": 2, "seen": []}
+    assert json.loads(told(capsys, "pause", "--json"))["answer"] == "mission test paused"

@@ -1,0 +1,80 @@
+"""`mission replay`: a log runs again as it was, and what was changed since is told."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rbxcompose.cli import main as command
+from rbxcompose.testing import Bench, check_file
+
+HEAD = "rbx: 1\nkind: Mission\nname: work\n"
+WORK = HEAD + "do:\n  - wait_for: $battery < 99 %\n  - log: low\n  - wait: 2 s\n  - say: done\n"
+ROBOT = """
+rbx: 1
+kind: Robot
+name: worker
+values: {battery: battery.battery_level}
+components: {battery: {type: battery_sim, runtime: 100 s}}
+missions: {work: work.yaml}
+start: work
+"""
+
+
+@pytest.fixture
+def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The log of a mission, beside its robot, in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    Path("robot.yaml").write_text(ROBOT)
+    Path("work.yaml").write_text(WORK)
+    plan = check_file(Path("robot.yaml")).compilation.plan
+    assert plan is not None
+    robot = Bench(plan=plan)
+    robot.advance(10.0)
+    mission: Any = robot.component("mission")
+    records = json.loads(mission.query("log 0"))["records"]
+    Path("work.log").write_text("".join(f"{json.dumps(one)}\n" for one in records))
+    return Path("work.log")
+
+
+def told(capsys: pytest.CaptureFixture[str], *, code: int) -> str:
+    assert command.main(["mission", "replay", "work.log", "robot.yaml"]) == code
+    found = capsys.readouterr()
+    return found.out + found.err
+
+
+def test_a_log_runs_again_as_it_was(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert told(capsys, code=0).startswith("work, run 1: the same, ")
+
+
+def test_another_mission_is_told_with_the_first_difference(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("work.yaml").write_text(WORK.replace("log: low", "log: very low"))
+    text = told(capsys, code=1)
+    assert "work, run 1: differs" in text
+    assert '"text": "low"' in text.splitlines()[1]
+    assert '"text": "very low"' in text.splitlines()[2]
+
+
+def test_a_mission_without_the_nodes_of_the_log_is_told(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("work.yaml").write_text(f"{HEAD}do:\n  wait: 1 h\n")
+    assert "it was changed too much to go on" in told(capsys, code=1)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "'work.log' is empty"),
+        ("no json\n", "'work.log' is no log: each line is a record in JSON"),
+        ("[1]\n", "'work.log' is no log"),
+        ('{"mission": "work", "run": 1, "event": "tick", "time": 1.0}\n', "does not begin with the beginning"),
+        ('{"mission": "wrok", "run": 1, "event": "tick", "time": 1.0}\n', "did you mean 'work'?"),
+    ],
+)
+def test_what_is_no_log_of_the_robot_is_told(
+    text: str, words: str, log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log.write_text(text)
+    assert words in told(capsys, code=1)

@@ -1,0 +1,188 @@
+"""`top`: pictures as lines, and on a robot in real processes."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import termios
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rbxcompose.cli.common.picture import Load, Part, Picture, Tree, lines_of
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plain import FORBIDDEN, columns
+from rbxcompose.runtime.records import Record
+from rbxcompose.testing.golden import Golden
+
+ROOT = Path(__file__).parents[2]
+PATIENCE = 20.0  # [s]
+PARTS = (
+    Part("battery", "battery_sim", "active", "world", 0, 1.0, Level.WARN, "Medium battery"),
+    Part("base", "diff_drive_sim", "active", "world", 0, 99.8, Level.OK, "active"),
+    Part("go_to", "go_to", "dead", "robot", 3),
+    Part("mission", "mission", "active", "mission", 0, 0.0, Level.OK, "running patrol"),
+)
+PICTURE = Picture(
+    robot="turtlebot",
+    is_supervised=True,
+    router="tcp/127.0.0.1:7447",
+    mission="running patrol",
+    batteries=(("battery", "48.2 %"),),
+    parts=PARTS,
+    loads=(Load("supervisor", 100, 0.001, 33_000_000), Load("world", 104, None, 58_000_000)),
+    health=(("power", Level.WARN, "battery: Medium battery"), ("motion", Level.OK, "OK"), ("Other", Level.OK, "OK")),
+    trees=(Tree("patrol", "running", ("▶ repeat", "  ▶ for corner in $route", "    ▶ go_to $corner  (retry 2)")),),
+    warnings=(Record(61.25, Level.WARN, "battery", "Medium battery: 50 %"), Record(70.0, Level.ERROR, "go_to", "died")),
+)
+
+
+def text_of(picture: Picture, width: int, height: int) -> str:
+    return "".join(f"{line}\n" for line in lines_of(picture, width, height))
+
+
+@pytest.mark.parametrize(
+    ("name", "picture"),
+    [
+        ("top.txt", PICTURE),
+        ("top_missions.txt", replace(PICTURE, parts=PARTS[:1], loads=PICTURE.loads[:1], warnings=())),
+        ("top_many.txt", replace(PICTURE, parts=[replace(PARTS[1], name=f"wheel_{one}") for one in range(40)])),
+        ("top_dead.txt", replace(PICTURE, is_supervised=False, router=None, mission="", batteries=(), health=())),
+    ],
+)
+def test_a_picture_is_its_golden_text(name: str, picture: Picture, golden: Golden) -> None:
+    golden.check(name, text_of(picture, 80, 24))
+
+
+words = st.text(max_size=30)
+parts = st.builds(Part, words, words, words, words, st.integers(0, 9), st.none() | st.floats(0, 1e6), st.none(), words)
+
+
+@given(
+    st.lists(parts, max_size=8),
+    st.lists(st.tuples(words, st.sampled_from(Level), words), max_size=4),
+    st.integers(4, 200),
+    st.integers(1, 60),
+)
+def test_a_picture_fits_whatever_it_shows(
+    shown: list[Part], health: list[tuple[str, Level, str]], width: int, height: int
+) -> None:
+    lines = lines_of(replace(PICTURE, parts=shown, health=health), width, height)
+    assert len(lines) <= height
+    assert all(columns(line) <= width for line in lines)
+    assert not any(FORBIDDEN.search(line) for line in lines)
+
+
+def test_colours_change_nothing_but_the_colour() -> None:
+    painted = "\n".join(lines_of(PICTURE, 80, 24, colour=True))
+    assert "\x1b[33mbattery" in painted
+    assert "\x1b[31mgo_to" in painted
+    for colour in (0, 1, 2, 31, 33, 35):
+        painted = painted.replace(f"\x1b[{colour}m", "")
+    assert painted == "\n".join(lines_of(PICTURE, 80, 24))
+
+
+class Robot:
+    """Only a battery and what every robot has."""
+
+    def __init__(self, base: Path) -> None:
+        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(base), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
+        self.file = base / "robot.yaml"
+        self.file.write_text(
+            "rbx: 1\nkind: Robot\nname: topped\nbus: {port: 7990}\n"
+            "components: {battery: {type: battery_sim, runtime: 1 h}, base: {type: diff_drive_sim}}\n",
+            encoding="utf-8",
+        )
+
+    def command(self, *words: str) -> list[str]:
+        return [sys.executable, "-m", "rbxcompose", *words]
+
+    def do(self, *words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            self.command(*words), env=self.environment, capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT
+        )
+
+    def seen(self) -> Any:
+        """Return what `top` sees."""
+        done = self.do("top", "--json")
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[Robot]:
+    base = Path(tempfile.mkdtemp(prefix="rbx"))
+    made = Robot(base)
+    up = made.do("up", "-d", str(made.file))
+    assert up.returncode == 0, up.stderr
+    yield made
+    assert made.do("down").returncode == 0
+    shutil.rmtree(base)
+
+
+def test_without_a_terminal_one_picture_is_shown(robot: Robot) -> None:
+    shown = robot.seen()
+    deadline = time.monotonic() + PATIENCE
+    while not shown["batteries"] and time.monotonic() < deadline:  # right after the start it has not reported yet
+        shown = robot.seen()
+    parts = {one["name"]: one for one in shown["components"]}
+    assert 20.0 < parts["base"]["rate"] < 200.0  # twice 50 Hz: odom and tf
+    assert {one["process"] for one in shown["processes"]} >= {"supervisor", "parent", "router", "world", "robot"}
+    assert all(one["memory"] > 1e6 and one["cpu"] is not None for one in shown["processes"])
+    assert {"battery"} == set(shown["batteries"])
+    assert "topped: router tcp/127.0.0.1:" in robot.do("top", str(robot.file)).stdout
+
+
+@pytest.mark.parametrize("end", ["q", "interrupt"])
+def test_on_a_terminal_it_is_live_and_leaves_the_terminal_as_it_was(robot: Robot, end: str) -> None:
+    ours, theirs = pty.openpty()
+    assert os.get_terminal_size(theirs) == (0, 0)  # as some terminals say, too
+    before = termios.tcgetattr(theirs)
+    with subprocess.Popen(
+        robot.command("top"), env=robot.environment, cwd=ROOT, stdin=theirs, stdout=theirs, stderr=theirs
+    ) as process:
+        seen = b""
+        while seen.count(b"\x1b[H") < 2:
+            assert select.select([ours], [], [], PATIENCE)[0], seen
+            seen += os.read(ours, 65536)
+        if end == "q":
+            os.write(ours, b"q")
+        else:
+            process.send_signal(signal.SIGINT)
+        while not seen.endswith(b"\x1b[?25h\x1b[?1049l"):
+            assert select.select([ours], [], [], PATIENCE)[0], seen
+            seen += os.read(ours, 65536)
+        assert process.wait(PATIENCE) == 0
+    assert seen.startswith(b"\x1b[?1049h\x1b[?25l")
+    assert b"battery_sim" in seen
+    assert termios.tcgetattr(theirs) == before
+    os.close(ours)
+    os.close(theirs)
+
+
+def test_the_doctor_looks_at_a_robot_that_is_up(robot: Robot) -> None:
+    done = robot.do("doctor", "topped", "--json")
+    assert done.returncode == 0, done.stdout + done.stderr
+    told = json.loads(done.stdout)
+    fine = {one["examination"] for one in told if one["level"] == "ok"}
+    assert {"ports", "clashes", "leftovers", "permissions", "limits"} <= fine
+    (alone,) = (one for one in told if one["examination"] == "wires" and one["level"] == "warning")
+    assert alone["message"] == "/base of 'topped' subscribes to /cmd_vel, which nobody publishes"
+
+
+def test_the_doctor_is_told_a_robot_that_is_there(robot: Robot) -> None:
+    done = robot.do("doctor", "topper")
+    assert (done.returncode, "did you mean 'topped'?" in done.stderr) == (1, True)

@@ -1,0 +1,253 @@
+"""Each examination on made-up facts: what is fine is told as fine, what is wrong as a finding with what to do."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.bus.graph import End, Graph, Kind, Name
+from rbxcompose.bus.wire import RosQos
+from rbxcompose.compiler import compile_robot
+from rbxcompose.doctor import machine
+from rbxcompose.doctor.examining import EXAMINATIONS, PLUGINS, Answer, examination, examine_all, has_errors
+from rbxcompose.doctor.facts import Bus, Clocks, Facts, Limits, Listener, Running, Version
+from rbxcompose.findings import Finding
+from rbxcompose.model.robot import Robot
+from rbxcompose.runtime.folder import RobotFolder, State
+from rbxcompose.runtime.processes import Process, boot_id
+
+HERE = Process.of(os.getpid())
+GONE = Process(HERE.pid, 1)
+FINE = Facts(
+    running=(),
+    file=None,
+    python="3.11.7",
+    versions=(Version("pydantic", "2.13", "2.13"), Version("numpy", "2.1", None)),
+    clocks=Clocks(wall=2e9, step=0.001, is_synchronised=True, oldest=1.9e9),
+    limits=Limits(open_files=4096, real_time_priority=0, locked_memory=None, shared_memory=64_000_000),
+    listeners={},
+    processes={},
+    base=Path("/nowhere"),
+)
+MANIFEST = "rbx: 1\nkind: Robot\nname: cart\n"
+
+
+def told(name: str, facts: Facts) -> list[tuple[str, str]]:
+    """Return what an examination tells: `ok` or the code, and the words."""
+    PLUGINS.load(name)
+    return [("ok", one) if isinstance(one, str) else (one.code, one.message) for one in EXAMINATIONS[name](facts)]
+
+
+def robot_of(folder: Path, text: str) -> Robot:
+    (folder / "robot.yaml").write_text(MANIFEST + text, encoding="utf-8")
+    robot = compile_robot(str(folder / "robot.yaml"), environment={}).robot
+    assert robot is not None
+    return robot
+
+
+def running(state: State | None = None, **fields: object) -> Running:
+    return replace(Running(RobotFolder(Path("/nowhere/cart")), state), **fields)  # type: ignore[arg-type]
+
+
+def state(supervisor: Process = HERE, processes: Mapping[str, Process] | None = None) -> State:
+    return State("cart", "robot.yaml", supervisor, processes or {}, (), "tcp/127.0.0.1:7447", boot_id())
+
+
+def name_of(topic: str, giver: str = "", taker: str = "", types: tuple[str, str] = ("a/msg/A", "a/msg/A")) -> Name:
+    ends = [
+        (End(node, Kind(type_, "RIHS01_1"), node.encode(), RosQos(depth=1)),) if node else ()
+        for node, type_ in zip((giver, taker), types, strict=True)
+    ]
+    return Name(topic, *ends)
+
+
+def on_bus(*topics: Name, ages: Mapping[str, float] | None = None) -> Facts:
+    return replace(FINE, running=(running(state(), bus=Bus(Graph((), topics, (), ()), ages or {})),))
+
+
+def test_on_a_machine_that_is_well_nothing_is_wrong() -> None:
+    answers = examine_all(FINE)
+    assert {one.level for one in answers} == {"ok"}
+    assert {one.examination for one in answers} == set(PLUGINS.names()) - {"clashes", "wires"}  # for these one must run
+    assert not has_errors(answers)
+
+
+def test_a_package_that_is_missing_or_another_is_told() -> None:
+    wrong = (Version("numpy", None, "2.1"), Version("pyyaml", "6.1", "6.0"), Version("mcap", None, None))
+    assert told("versions", replace(FINE, versions=wrong)) == [
+        ("RBX9401", "numpy is not installed, 2.1 is locked"),
+        ("RBX9401", "pyyaml 6.1 is installed, 6.0 is locked"),
+        ("RBX9401", "mcap is not installed"),
+        ("ok", "Python 3.11.7"),
+    ]
+
+
+def test_the_port_of_the_bus_is_free_or_taken_by_whom(tmp_path: Path) -> None:
+    assert told("ports", FINE) == [("ok", "port 7447 is free")]
+    taken = {7447: Listener(12, "zenohd\x1b[2J"), 7500: Listener(None, "")}
+    assert told("ports", replace(FINE, listeners=taken)) == [
+        ("RBX9402", "port 7447 is taken by 'zenohd\\x1b[2J' (process 12)")
+    ]
+    other = robot_of(tmp_path, "bus: {port: 7500}\n")
+    assert told("ports", replace(FINE, file=other, listeners=taken)) == [
+        ("RBX9402", "port 7500 is taken by a process of another user")
+    ]
+    foreign = robot_of(tmp_path, "bus: {router: tcp/10.0.0.1:7447}\n")
+    assert told("ports", replace(FINE, file=foreign, listeners=taken)) == []
+
+
+def test_a_router_listens_at_its_port_or_somebody_else_does() -> None:
+    up = replace(FINE, running=(running(state(processes={"router": HERE})),))
+    assert told("ports", replace(up, listeners={7447: Listener(HERE.pid, "")})) == [("ok", "port 7447: router of cart")]
+    assert told("ports", up) == [
+        ("RBX9403", "the router of 'cart' should listen at port 7447, but nobody listens there")
+    ]
+    assert (
+        "'zenohd' (process 1) listens there"
+        in told("ports", replace(up, listeners={7447: Listener(1, "zenohd")}))[0][1]
+    )
+
+
+@pytest.mark.parametrize(
+    ("clocks", "code"),
+    [
+        (Clocks(1e9, 0.0, True, 1.9e9), "RBX9404"),
+        (Clocks(2e9, 0.2, True, 1.9e9), "RBX9404"),
+        (Clocks(2e9, -0.2, None, 1.9e9), "RBX9404"),
+        (Clocks(2e9, 0.0, False, 1.9e9), "ok"),
+        (Clocks(2e9, 0.0, None, 1.9e9), "ok"),
+    ],
+)
+def test_a_clock_that_is_wrong_or_jumps_is_told(clocks: Clocks, code: str) -> None:
+    assert [one for one, _ in told("clocks", replace(FINE, clocks=clocks))] == [code]
+
+
+def test_a_node_whose_stamps_are_of_another_time_is_told() -> None:
+    _, *others = told("clocks", on_bus(ages={"/near": 0.01, "/ahead": -3.0, "/behind": 2.0}))
+    assert others == [
+        ("RBX9405", "the stamps of '/ahead' of 'cart' lie 3.00 s in the future"),
+        ("RBX9405", "the stamps of '/behind' of 'cart' lie 2.00 s in the past"),
+    ]
+    assert told("clocks", on_bus(ages={"/near": 0.01}))[1] == (
+        "ok",
+        "cart: the stamps of 1 nodes agree with this clock",
+    )
+
+
+def test_low_limits_are_told() -> None:
+    low = Limits(open_files=64, real_time_priority=0, locked_memory=8_000_000, shared_memory=1_000_000)
+    assert [code for code, _ in told("limits", replace(FINE, limits=low))] == ["RBX9406", "RBX9406", "ok"]
+    none = replace(FINE.limits, shared_memory=None)
+    assert told("limits", replace(FINE, limits=none))[0] == ("RBX9406", "shared memory: there is none")
+
+
+def test_a_subscription_without_a_publisher_is_told_unless_it_is_open(tmp_path: Path) -> None:
+    facts = on_bus(name_of("/odom", giver="/base"), name_of("/speed", taker="/radio"), name_of("/a/_b", taker="/x"))
+    assert told("wires", facts) == [
+        ("RBX9407", "/radio of 'cart' subscribes to /speed, which nobody publishes"),
+        ("ok", "cart: 1 topics are published or open to the outside; published, and nobody listens: /odom"),
+    ]
+    mux = "components: {base: {type: diff_drive_sim}}\nmuxes: {cmd_vel: {inputs: {pad: {priority: 1, timeout: 1 s}}}}\n"
+    opened = on_bus(name_of("/cmd_vel/pad", taker="/cmd_vel"))
+    with_robot = replace(opened, running=(replace(opened.running[0], robot=robot_of(tmp_path, mux)),))
+    assert told("wires", with_robot) == [("ok", "cart: 1 topics are published or open to the outside")]
+
+
+def test_ends_of_different_types_are_an_error() -> None:
+    facts = on_bus(name_of("/odom", "/base", "/map", types=("a/msg/A", "a/msg/B")))
+    assert told("clashes", facts) == [("RBX9408", "/odom of 'cart' has different types: a/msg/A, a/msg/B")]
+    assert has_errors(examine_all(facts))
+    assert told("clashes", on_bus(name_of("/odom", "/base", "/map")))[0][0] == "ok"
+
+
+def test_what_dead_robots_have_left_is_told() -> None:
+    dead = running(state(supervisor=GONE, processes={"world": HERE}))
+    torn = running(None, problem="its checksum is wrong")
+    titles = {
+        Process(5, 1): "rbxcompose cart: robot",
+        Process(6, 1): "rbxcompose lost: robot",
+        Process(7, 1): "rbxcompose other: supervisor",
+        Process(8, 1): "rbxcompose other: robot",
+    }
+    assert told("leftovers", replace(FINE, running=(dead, torn), processes=titles)) == [
+        ("RBX9409", "the supervisor of 'cart' is dead; these processes still run: world"),
+        ("RBX9409", "the state of 'cart' cannot be read: its checksum is wrong"),
+        ("RBX9409", "processes of 'lost' run without a supervisor and without a state: robot (6)"),
+    ]
+    assert told("leftovers", replace(FINE, running=(running(state()),)))[0] == ("ok", "cart: its supervisor runs")
+
+
+def test_folders_and_secrets_that_others_may_open_are_an_error(tmp_path: Path) -> None:
+    project = tmp_path / "project"
+    (project / "secrets").mkdir(parents=True)
+    robot = robot_of(project, "")
+    token = project / "secrets/token"
+    token.write_text("x")
+    base = tmp_path / "base"
+    base.mkdir(mode=0o700)
+    facts = replace(FINE, base=base, file=robot)
+    token.chmod(0o600)
+    assert told("permissions", facts) == [("ok", "1 folders of robots and 1 secrets are this user's alone")]
+    token.chmod(0o640)
+    base.chmod(0o755)
+    wrong = told("permissions", facts)
+    assert [code for code, _ in wrong] == ["RBX9410", "RBX9410"]
+    assert "(mode 0755)" in wrong[0][1]
+    assert "(mode 0640)" in wrong[1][1]
+
+
+def test_a_device_must_be_there_and_open(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, "components: {base: {type: diff_drive_sim}}\n")
+    part = robot.parts["base"]
+
+    def naming(device: str) -> Facts:
+        config = part.config.model_copy(update={"max_speed": {"ports": [device]}})
+        return replace(FINE, file=replace(robot, parts={"base": replace(part, config=config)}))
+
+    assert told("devices", naming("/dev/null")) == [("ok", "/dev/null of 'base' can be opened")]
+    assert told("devices", naming("/dev/no_such_tty")) == [
+        ("RBX9411", "'base' names /dev/no_such_tty, which is not there")
+    ]
+    assert told("devices", naming("/dev/shm")) == [("RBX9411", "'base' names /dev/shm, which is no device")]
+
+
+def test_an_answer_is_plain_data() -> None:
+    fine, wrong = (Answer("ports", one) for one in ("fine", next(iter(_taken()))))
+    assert fine.to_data() == {"examination": "ports", "level": "ok", "message": "fine"}
+    assert {key: wrong.to_data()[key] for key in ("level", "code")} == {"level": "warning", "code": "RBX9402"}
+
+
+def _taken() -> list[str | Finding]:
+    PLUGINS.load("ports")
+    return list(EXAMINATIONS["ports"](replace(FINE, listeners={7447: Listener(1, "a")})))
+
+
+def test_a_name_belongs_to_one_examination() -> None:
+    PLUGINS.load("ports")
+
+    def ports(facts: Facts) -> list[str]:
+        return []
+
+    with pytest.raises(ValueError, match="two examinations have the name 'ports'"):
+        examination(ports)
+
+
+def test_the_machine_tells_who_listens_what_it_may_and_what_is_installed() -> None:
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        found = machine.listeners()[listener.getsockname()[1]]
+    assert found.pid == os.getpid()
+    assert "python" in found.title or "pytest" in found.title
+    assert machine.limits().shared_memory is not None
+    versions = {one.name: one for one in machine.versions()}
+    assert versions["pydantic"].installed
+    assert versions["pydantic"].locked
+    clocks = machine.ClockWatch().clocks()
+    assert abs(clocks.step) < 0.05
+    assert clocks.oldest < clocks.wall
