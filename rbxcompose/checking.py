@@ -6,16 +6,20 @@ A check is a function from the robot to findings; its docstring is the docs page
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from rbxcompose.findings import Finding, Kind, Report, Severity, register_kind
 from rbxcompose.model.robot import Robot
-from rbxcompose.plugins import Plugins
+from rbxcompose.plain import plain
+from rbxcompose.plugins import LEFT_OUT, BrokenPluginError, Plugins
 
 Rule = Callable[[Robot], Iterable[Finding]]
 
 PLUGINS = Plugins("check", "rbxcompose.checks")
+OWN = "RBX"  # begins the codes of this project
+_CODE = re.compile(r"[A-Z]+\d+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +39,17 @@ CHECKS: dict[str, Check] = {}  # every check that has been imported, by code
 def check(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False) -> Callable[[Rule], Check]:
     """Declare a rule under its code.
 
+    Codes that begin with `RBX` are those of this project; somebody else's begin with a word of their own (`LAMP01`).
+
     Raises:
-        ValueError: if it has no docstring or its code is taken.
+        ValueError: if it has no docstring, or its code is taken, malformed or not for others.
     """
 
     def declare(rule: Rule) -> Check:
+        if not _CODE.fullmatch(code):
+            raise ValueError(f"'{code}' is no code: those are capital letters with digits behind them")
+        if _is_foreign(rule) and code.startswith(OWN):
+            raise ValueError(f"the code {code} begins with {OWN}, as only those of this project do")
         if not rule.__doc__:
             raise ValueError(f"check {code} has no docstring, so it would have no docs page")
         made = Check(code, inspect.cleandoc(rule.__doc__), severity, is_fixable, rule=rule)
@@ -51,10 +61,24 @@ def check(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = 
 
 
 def all_checks() -> list[Check]:
-    """Import every check and return them by code."""
+    """Import every check, those of other packages as far as they are not broken, and return them by code."""
     for name in PLUGINS.names():
-        PLUGINS.load(name)
+        _problem(name)
     return [CHECKS[code] for code in sorted(CHECKS)]
+
+
+def broken_checks() -> list[Finding]:
+    """Return what to tell of checks of other packages that are left out."""
+    return [LEFT_OUT.at(None, told) for name in sorted(PLUGINS.third_party) if (told := _problem(name))]
+
+
+def _problem(name: str) -> str:
+    """Import a check; return why it is left out, or nothing."""
+    try:
+        PLUGINS.load(name)
+    except BrokenPluginError as error:
+        return str(error)
+    return PLUGINS.overshadowed(name)
 
 
 def run_checks(robot: Robot, report: Report) -> None:
@@ -62,4 +86,24 @@ def run_checks(robot: Robot, report: Report) -> None:
     for severity in (Severity.ERROR, Severity.WARNING):
         for one in all_checks():
             if one.severity is severity and not (severity is Severity.WARNING and report.has_errors):
-                report.extend(one(robot))
+                report.extend(_found(one, robot))
+    report.extend(broken_checks())
+
+
+def _found(one: Check, robot: Robot) -> list[Finding]:
+    """Return what a check finds. One of another package that raises an error is no reason not to check the rest."""
+    if not _is_foreign(one.rule):
+        return list(one(robot))
+    try:
+        return list(one(robot))
+    except Exception as error:  # the code of others may raise anything
+        reason = plain(f"{type(error).__name__}: {error}")
+        return [LEFT_OUT.at(None, f"the check {one.code} of '{_package(one.rule)}' has failed: {reason}")]
+
+
+def _is_foreign(rule: Rule) -> bool:
+    return _package(rule) != __package__
+
+
+def _package(rule: Rule) -> str:
+    return rule.__module__.partition(".")[0]

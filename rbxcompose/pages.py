@@ -23,6 +23,7 @@ FAMILIES = {
     "31": "muxes",
     "35": "rates and units",
     "41": "missions",
+    "42": "tests of missions",
     "50": "diagnostics",
     "60": "placement",
     "70": "overlays",
@@ -30,6 +31,8 @@ FAMILIES = {
     "90": "commands and running robots",
     "91": "new manifests",
     "92": "recordings",
+    "93": "plug-ins of other packages",
+    "94": "this machine, and what runs on it",
 }
 """What the first two digits of a code stand for."""
 

@@ -11,10 +11,40 @@ import pkgutil
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from rbxcompose.findings import Severity, kind
+from rbxcompose.plain import plain
+
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 GROUP = "rbxcompose.plugins"
+
+BROKEN = kind(
+    "RBX9301",
+    """A plug-in of another package is broken
+
+The component type exists, but its package cannot be used: importing it raises an error, what it announces is no
+component type, or two packages announce the same name. The message names the package. Robots that do not use the type
+are not concerned.
+
+Upgrade the package, uninstall it, or tell its authors; `pip list` shows which version is there.
+""",
+)
+LEFT_OUT = kind(
+    "RBX9302",
+    """A plug-in of another package is left out
+
+It has the name of one that ships with the project, which is taken instead, or it is a check that cannot be imported or
+that raised an error. The message names the package. Everything else goes on without it.
+
+Upgrade the package, uninstall it, or tell its authors.
+""",
+    Severity.WARNING,
+)
+
+
+class BrokenPluginError(Exception):
+    """Raised when a plug-in of another package cannot be used; its text names plug-in and package, and says why."""
 
 
 class Plugins:
@@ -30,24 +60,55 @@ class Plugins:
         return frozenset(module.name for module in pkgutil.iter_modules(package.__path__))
 
     @cached_property
-    def third_party(self) -> dict[str, EntryPoint]:
-        """Entry points of other distributions, by name."""
+    def third_party(self) -> dict[str, tuple[EntryPoint, ...]]:
+        """Entry points of other distributions, by name; two of one name are a clash."""
         from importlib.metadata import entry_points  # slow to import, and most commands need no plug-in
 
         prefix = f"{self.family}."
-        found = [entry for entry in entry_points(group=GROUP) if entry.name.startswith(prefix)]
-        return {entry.name.removeprefix(prefix): entry for entry in found}
+        found: dict[str, tuple[EntryPoint, ...]] = {}
+        for entry in entry_points(group=GROUP):
+            if entry.name.startswith(prefix):
+                name = entry.name.removeprefix(prefix)
+                found[name] = (*found.get(name, ()), entry)
+        return found
 
     def names(self) -> list[str]:
         """Return all names, sorted."""
         return sorted(self.shipped | set(self.third_party))
 
     def load(self, name: str) -> bool:
-        """Import the plug-in of this name; return whether there is one."""
+        """Import the plug-in of this name; return whether there is one.
+
+        Raises:
+            BrokenPluginError: if it is one of another package and cannot be imported.
+        """
         if name in self.shipped:
             importlib.import_module(f"{self.package}.{name}")
-        elif name in self.third_party:
-            self.third_party[name].load()
-        else:
+            return True
+        if name not in self.third_party:
             return False
+        [entry, *others] = self.third_party[name]
+        if others:
+            raise self.broken(name, "more than one package announces it")
+        try:
+            entry.load()
+        except (Exception, SystemExit) as error:  # what the code of others raises while it is imported may be anything
+            raise self.broken(name, f"{type(error).__name__}: {error}") from error
         return True
+
+    def overshadowed(self, name: str) -> str:
+        """Return what to tell of a name of ours that other packages announce as well; empty if none does."""
+        if name not in self.shipped or name not in self.third_party:
+            return ""
+        return f"the {self.family} '{name}' of {self._packages(name)} is left out: rbxcompose has one of this name"
+
+    def broken(self, name: str, reason: str) -> BrokenPluginError:
+        """Return the error that tells why a plug-in of another package cannot be used."""
+        return BrokenPluginError(
+            f"the {self.family} '{plain(name, 60)}' of {self._packages(name)} cannot be used: {plain(reason)}"
+        )
+
+    def _packages(self, name: str) -> str:
+        entries = self.third_party[name]
+        packages = sorted({f"'{plain(one.dist.name, 60)}'" if one.dist else one.module for one in entries})
+        return f"package{'s' if len(packages) > 1 else ''} {' and '.join(packages)}"

@@ -54,6 +54,36 @@ encoding than `cdr`, or without a known type, cannot be published.
 """,
     Severity.WARNING,
 )
+SENT_ALREADY = kind(
+    "RBX9210",
+    """The recording has topics that somebody sends now
+
+Messages of then would stand beside those of now: an old `/tf` leads a robot astray that drives, an old status hides
+what is wrong. A stopped robot sends too. Choose other topics with `--topics` or `--class`, replay where no robot is, or
+take `--over` if old and new messages side by side are what you want.
+
+Bad: `rbxcompose replay run.mcap` while the robot is up
+Good: `rbxcompose replay run.mcap --topics '/camera/*'`
+""",
+)
+NOT_ENOUGH = kind(
+    "RBX9208",
+    """The recording has not enough to run a component again
+
+`replay --into` needs all inputs of the component, in their order, with the requests that it got and the replies to its
+own. Those are in what `rbxcompose up --rate max --record FILE` writes; `rbxcompose record` sees the topics only. The
+component must be one of the robot, and a secret of its configuration comes from the robot's file: `--robot PATH`.
+""",
+)
+DIFFERENT = kind(
+    "RBX9209",
+    """A component does not send what it sent when it was recorded
+
+The message names the first difference: the robot time, the topic, the field and both values. If code or configuration
+have changed on purpose, that is what they changed. If not, the component asks for something that is no input of it,
+such as a clock of the system or a random number without a seed, or somebody published to the recorded run from outside.
+""",
+)
 LOST = kind(
     "RBX9207",
     """Messages are missing from the recording

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+from rbxcompose.plain import plain
 from rbxcompose.recording.reader import NotARecordingError
 from rbxcompose.recording.recovery import recover
+from rbxcompose.replacing import sync_folder
 
 ENDING, PART = ".mcap", ".part"
 _NEW = ".new"
@@ -47,12 +49,22 @@ def create(path: Path) -> IO[bytes]:
     return file
 
 
+def write_problem(path: Path) -> str:
+    """Return why `create` would fail, or nothing: to be told before a run begins."""
+    name = plain(str(path))
+    if path.exists() or part_of(path).exists():
+        return f"'{name}' is there already"
+    if not path.parent.is_dir():
+        return f"'{name}' cannot be written: there is no folder '{plain(str(path.parent))}'"
+    return "" if os.access(path.parent, os.W_OK) else f"'{name}' cannot be written: its folder is read-only"
+
+
 def complete(path: Path, file: IO[bytes]) -> None:
     """Give a finished file its name, so that it is there as a whole or not at all, even if the power fails."""
     os.fsync(file.fileno())
     os.rename(part_of(path), path)
     file.close()
-    _sync_folder(path.parent)
+    sync_folder(path.parent)
 
 
 def recover_all(folder: Path) -> Iterator[Recovered]:
@@ -91,13 +103,5 @@ def _recover(file: IO[bytes], part: Path, path: Path) -> int:
         os.fsync(whole.fileno())
     os.rename(new, part)  # from here on the part is whole, and recovering it once more would change nothing
     os.rename(part, path)
-    _sync_folder(path.parent)
+    sync_folder(path.parent)
     return messages
-
-
-def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from typing import IO
 
 import lz4.frame
 import zstandard
 from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, McapRecord, Message, Schema
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from rbxcompose.plain import plain
 from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.topics import HASH, Topic, qos_of_metadata
+from rbxcompose.recording.topics import HASH, NODE, Topic, qos_of_metadata
 
 LARGEST = 64 * 1024 * 1024  # bytes of a record, and of a chunk once it is unpacked
 _MAGIC = b"\x89MCAP0\r\n"
@@ -31,6 +31,11 @@ class NotARecordingError(ValueError):
 class RecordingReader:
     """Reads one file once, from its beginning. `damage` tells afterwards why it ended early, if it did."""
 
+    @property
+    def topics(self) -> Collection[Topic]:
+        """Return the topics, as far as the file was read; also those without messages."""
+        return self._channels.values()
+
     def __init__(self, file: IO[bytes]) -> None:
         """Look at the first bytes.
 
@@ -42,6 +47,7 @@ class RecordingReader:
             raise NotARecordingError("it does not begin as MCAP does")
         file.seek(0)
         self.damage = ""
+        self.attachments: dict[str, bytes] = {}  # by name, as far as the file was read
         self._file = file
         self._reader = StreamReader(file, emit_chunks=True, record_size_limit=LARGEST)
         self._schemas: dict[int, Schema] = {}
@@ -66,6 +72,8 @@ class RecordingReader:
                 self._schemas[record.id] = record
             elif isinstance(record, Channel):
                 self._channels[record.id] = self._topic(record)
+            elif isinstance(record, Attachment):
+                self.attachments[record.name] = record.data
             elif isinstance(record, Message):
                 if record.channel_id not in self._channels:
                     raise ValueError("a message of an unknown channel")
@@ -86,6 +94,7 @@ class RecordingReader:
             qos_of_metadata(channel.metadata),
             schema.data.decode() if schema else "",
             channel.message_encoding,
+            channel.metadata.get(NODE, ""),
         )
 
 

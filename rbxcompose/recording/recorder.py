@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from rbxcompose.recording.files import complete, create, part_of
+from rbxcompose.recording.files import complete, create
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.topics import Topic
 from rbxcompose.recording.writer import RecordingWriter
@@ -46,6 +46,14 @@ class Recorder:
         self._writer.add(message)
         self.counts[message.topic] += 1
 
+    def attach(self, name: str, data: bytes) -> None:
+        """Add a file to the present recording."""
+        self._writer.attach(name, data)
+
+    def declare(self, topic: Topic) -> None:
+        """Make a topic known, also if it will have no messages."""
+        self._writer.declare(topic)
+
     def keep(self, now: float) -> None:
         """Do what is due: to be called several times a second."""
         if now - self._flushed >= FLUSH:
@@ -68,11 +76,6 @@ class Recorder:
         """Leave the file as it is; what was written is recovered later."""
         with contextlib.suppress(OSError):  # closing tries to write the rest once more, which is what has failed
             self._file.close()
-
-    def discard(self) -> None:
-        """Remove the file, in which nothing is yet."""
-        self._file.close()
-        part_of(self.paths[-1]).unlink()
 
     def _open(self, now: float) -> None:
         path = self._wanted

@@ -17,5 +17,9 @@ def recover(broken: IO[bytes], whole: IO[bytes]) -> int:
     reader, writer = RecordingReader(broken), RecordingWriter(whole)
     for message in reader.messages():
         writer.add(message)
+    for topic in reader.topics:
+        writer.declare(topic)
+    for name, data in reader.attachments.items():
+        writer.attach(name, data)
     writer.finish()
     return sum(writer.counts.values())

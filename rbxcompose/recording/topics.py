@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 from rbxcompose.bus.classes import ros_qos
@@ -14,6 +14,7 @@ from rbxcompose.qos import Qos
 
 CDR = "cdr"
 HASH, CLASS, ROS_QOS = "topic_type_hash", "rbxcompose.class", "offered_qos_profiles"  # keys of a channel's metadata
+NODE = "rbxcompose.node"
 
 _DDS_TYPE = re.compile(r"(\w+)::(msg|srv|action)::dds_::(\w+)_", re.ASCII)
 _TYPE = re.compile(r"\w+/(msg|srv|action)/\w+", re.ASCII)
@@ -25,7 +26,7 @@ _IS_LATCHED = re.compile(r"^[\s-]*durability: *(1|transient_local)\s*$", re.MULT
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A topic with one type; another type under the same name is another topic."""
+    """A topic with one type; another type, or another publisher, under the same name is another topic."""
 
     name: str  # with its leading slash
     type: str  # `geometry_msgs/msg/Twist`
@@ -33,6 +34,7 @@ class Topic:
     qos: Qos = Qos.STATE
     definition: str = ""  # text of the type and all that it is made of; empty if we have none
     encoding: str = CDR
+    node: str = ""  # who publishes; empty if that was not recorded
 
     def metadata(self) -> dict[str, str]:
         """Return what a channel tells beside name and type: hash and quality of service, for ROS and for us."""
@@ -43,7 +45,8 @@ class Topic:
             f"  deadline: {_FOREVER}\n  lifespan: {_FOREVER}\n"
             f"  liveliness: 1\n  liveliness_lease_duration: {_FOREVER}\n  avoid_ros_namespace_conventions: false\n"
         )
-        return {HASH: self.hash, CLASS: self.qos.value, ROS_QOS: profile}
+        node = {NODE: self.node} if self.node else {}
+        return {HASH: self.hash, CLASS: self.qos.value, ROS_QOS: profile, **node}
 
 
 def qos_of_metadata(metadata: Mapping[str, str]) -> Qos:
@@ -52,6 +55,15 @@ def qos_of_metadata(metadata: Mapping[str, str]) -> Qos:
     if written in set(Qos):
         return Qos(written)
     return Qos.LATCHED if _IS_LATCHED.search(metadata.get(ROS_QOS, "")) else Qos.STATE
+
+
+def by_name(counts: Mapping[Topic, int]) -> dict[Topic, int]:
+    """Return the numbers of messages with those of all publishers of a topic together."""
+    found: dict[Topic, int] = {}
+    for topic, count in counts.items():
+        whole = replace(topic, node="")
+        found[whole] = found.get(whole, 0) + count
+    return found
 
 
 def is_replayable(topic: Topic) -> bool:

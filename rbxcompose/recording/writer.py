@@ -33,11 +33,19 @@ class RecordingWriter:
         """Return how many bytes were written; those of the open chunk come on top."""
         return self._file.tell()
 
+    def attach(self, name: str, data: bytes) -> None:
+        """Add a file of JSON, which readers find by its name."""
+        self._writer.add_attachment(0, 0, name, "application/json", data)
+
+    def declare(self, topic: Topic) -> None:
+        """Make a topic known, also if it will have no messages."""
+        if topic not in self._channels:
+            self._channels[topic] = self._register(topic)
+
     def add(self, message: Recorded) -> None:
         """Add a message to the open chunk."""
         topic = message.topic
-        if topic not in self._channels:
-            self._channels[topic] = self._declare(topic)
+        self.declare(topic)
         self._writer.add_message(
             self._channels[topic],
             message.log_time,
@@ -56,7 +64,7 @@ class RecordingWriter:
         self._writer.finish()  # type: ignore[no-untyped-call]
         self._file.flush()
 
-    def _declare(self, topic: Topic) -> int:
+    def _register(self, topic: Topic) -> int:
         key = (topic.type, topic.definition)
         if key not in self._schemas:
             encoding = SCHEMA if topic.definition else ""

@@ -1,0 +1,137 @@
+"""A tape: all that happens on the bus of one process on a stepped clock, in its order, exactly enough to do it again.
+
+Besides the topics of the robot it holds, as ROS 2 records them, the events of services, and on two topics of its own
+the orders that the host was given and the instants whose time [s] cannot be told from nanoseconds.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+
+from rbxcompose.bus.attachment import decode_attachment
+from rbxcompose.bus.names import ADMIN
+from rbxcompose.bus.tokens import EndpointToken, gid, parse_token
+from rbxcompose.bus.transport import Answer, Arrival, Closable, Question, RemotePublisher, Transport
+from rbxcompose.bus.witness import Call
+from rbxcompose.clock import NANOSECONDS, Clock
+from rbxcompose.msgs.cdr import encode
+from rbxcompose.msgs.events import TOPIC, event_of
+from rbxcompose.msgs.service_msgs import ServiceEventInfo
+from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_msgs import Float64, String
+from rbxcompose.msgs.types import Message
+from rbxcompose.qos import Qos
+from rbxcompose.recording.definitions import definition_of
+from rbxcompose.recording.message import Recorded
+from rbxcompose.recording.topics import Topic, topic_of
+
+PLAN = "plan.json"  # name of the attachment that tells how the robot was composed
+ORDERS = "/rbxcompose/orders"
+INSTANTS = "/rbxcompose/instants"
+
+
+class Tape:
+    """Hands what happens to `write`, and topics as soon as they have a publisher to `declare`."""
+
+    def __init__(self, clock: Clock, declare: Callable[[Topic], None], write: Callable[[Recorded], None]) -> None:
+        self._clock, self._declare, self._write = clock, declare, write
+        self._instant = 0.0  # [s], the last one that was told
+        self._topics: dict[bytes, Topic] = {}  # by the GID of the publisher
+
+    def around(self, transport: Transport) -> Transport:
+        """Return a transport that does what this one does, and is recorded."""
+        return _Taped(self, transport)
+
+    def witness(self, call: Call) -> None:
+        """Record a request or a reply."""
+        event = event_of(call.service)
+        kind = ServiceEventInfo.RESPONSE_SENT if call.is_reply else ServiceEventInfo.REQUEST_SENT
+        stamp = to_time(self._clock.stamp())
+        info = ServiceEventInfo(event_type=kind, stamp=stamp, client_gid=call.client, sequence_number=call.sequence)
+        held = () if call.message is None else (call.message,)
+        message = event(info=info, response=held) if call.is_reply else event(info=info, request=held)
+        self._say(f"{call.name}/{TOPIC}", message, node=call.node, sequence=call.sequence)
+
+    def order(self, verb: str, *words: str) -> None:
+        """Record what the host was told to do."""
+        self._say(ORDERS, String(data=json.dumps([verb, *words])))
+
+    def announced(self, token: str) -> None:
+        """Learn of a publisher."""
+        endpoint = parse_token(token)
+        topic = topic_of(endpoint) if isinstance(endpoint, EndpointToken) else None
+        if isinstance(endpoint, EndpointToken) and topic is not None:
+            whole = replace(topic, definition=definition_of(topic.type), node=endpoint.node.name)
+            self._topics[gid(token)] = whole
+            self._declare(whole)
+
+    def published(self, payload: bytes, attachment: bytes) -> None:
+        """Record a message."""
+        source = decode_attachment(attachment)
+        self._keep(self._topics[source.gid], source.sequence, payload)
+
+    def _say(self, name: str, message: Message, *, node: str = "", sequence: int = 0) -> None:
+        topic = Topic(name, message.TYPE, message.HASH, Qos.EVENT, definition_of(message.TYPE), node=node)
+        self._keep(topic, sequence, encode(message))
+
+    def _keep(self, topic: Topic, sequence: int, payload: bytes) -> None:
+        now, stamp = self._clock.now(), self._clock.stamp()
+        if now != self._instant:
+            self._instant = now
+            if now != stamp / NANOSECONDS:
+                self._say(INSTANTS, Float64(data=now))
+        self._write(Recorded(topic, stamp, stamp, sequence, payload))
+
+
+class _Taped:
+    """A transport that tells a tape what leaves the process, also what nobody outside of it wants."""
+
+    def __init__(self, tape: Tape, inner: Transport) -> None:
+        self._tape, self._inner = tape, inner
+        self.session = inner.session
+
+    def wake(self, owner: str, callback: Callable[[], None]) -> None:
+        self._inner.wake(owner, callback)
+
+    def publisher(self, key: str, qos: Qos) -> RemotePublisher:
+        if key.startswith(ADMIN):  # what somebody looks at is no part of what the robot does
+            return self._inner.publisher(key, qos)
+        return _TapedPublisher(self._tape, self._inner.publisher(key, qos))
+
+    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Closable:
+        return self._inner.subscribe(key, qos, arrived)
+
+    def serve(self, key: str, asked: Callable[[Question], None]) -> Closable:
+        return self._inner.serve(key, asked)
+
+    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Closable:
+        return self._inner.ask(key, payload, attachment, answered)
+
+    def announce(self, token: str) -> Closable:
+        self._tape.announced(token)
+        return self._inner.announce(token)
+
+    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Closable:
+        return self._inner.watch(pattern, changed)
+
+    def close(self) -> None:
+        self._inner.close()
+
+
+class _TapedPublisher:
+    """A publisher that always has somebody who listens: the tape."""
+
+    has_match = True
+
+    def __init__(self, tape: Tape, inner: RemotePublisher) -> None:
+        self._tape, self._inner = tape, inner
+
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        self._tape.published(payload, attachment)
+        if self._inner.has_match:
+            self._inner.put(payload, attachment)
+
+    def close(self) -> None:
+        self._inner.close()

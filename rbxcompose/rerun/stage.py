@@ -1,0 +1,102 @@
+"""What stands in for the rest of the robot: a transport through which a recording speaks, and a bus over it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from rbxcompose.bus.attachment import Attachment, decode_attachment
+from rbxcompose.bus.bus import Bus
+from rbxcompose.bus.topics import Publisher
+from rbxcompose.bus.transport import Answer, Arrival, Nowhere, Question
+from rbxcompose.clock import Clock
+from rbxcompose.msgs.types import Message
+from rbxcompose.plan.model import Plan
+from rbxcompose.qos import Qos
+from rbxcompose.recording.tape import Tape
+from rbxcompose.scheduler import Scheduler
+
+M = TypeVar("M", bound=Message)
+
+
+@dataclass(frozen=True, slots=True)
+class Fed:
+    """Recorded bytes on their way in; as a request, it is answered to nobody: a witness has heard the reply."""
+
+    payload: bytes
+    attachment: bytes
+
+    def reply(self, payload: bytes, attachment: bytes) -> None:
+        """Leave the reply to the witness."""
+
+    def fail(self, error: str) -> None:
+        """Leave the failure to the witness."""
+
+
+@dataclass(slots=True)
+class Stage(Nowhere):
+    """A transport whose other side is a recording. Keys are those of topics and services."""
+
+    scheduler: Scheduler
+    served: Callable[[str], bool]  # tells whether a key of a token pattern has a server in the robot
+    session: str = "0"
+    subscribers: dict[str, list[Callable[[Arrival], None]]] = field(default_factory=dict)
+    servers: dict[str, Callable[[Question], None]] = field(default_factory=dict)
+    waiting: dict[tuple[str, bytes, int], Callable[[Answer], None]] = field(default_factory=dict)
+
+    def wake(self, owner: str, callback: Callable[[], None]) -> None:
+        """Have the callback run at this instant."""
+        self.scheduler.post(owner, callback)
+
+    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Nowhere:
+        """Receive what was recorded."""
+        self.subscribers.setdefault(key, []).append(arrived)
+        return self
+
+    def serve(self, key: str, asked: Callable[[Question], None]) -> Nowhere:
+        """Receive the requests that were recorded."""
+        self.servers[key] = asked
+        return self
+
+    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Nowhere:
+        """Wait for the reply that was recorded."""
+        source = decode_attachment(attachment)
+        self.waiting[key, source.gid, source.sequence] = answered
+        return self
+
+    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Nowhere:
+        """See a server where the robot has one."""
+        if self.served(pattern):
+            changed(pattern.replace("*", "recorded"), True)
+        return self
+
+    def publish(self, key: str, payload: bytes, source: Attachment) -> None:
+        """Let a recorded message arrive."""
+        for arrived in self.subscribers.get(key, ()):
+            arrived(Fed(payload, source.encode()))
+
+
+class StageBus(Bus):
+    """The bus of one component. What its host says of it reaches nobody: the recording has what the whole host said."""
+
+    def __init__(self, scheduler: Scheduler, clock: Clock, plan: Plan, owner: str, stage: Stage, tape: Tape) -> None:
+        names, wire = plan.bus, plan.bus.wire
+        super().__init__(
+            scheduler,
+            clock,
+            domain=names.domain,
+            namespace=names.namespace,
+            wire=wire,
+            transport=tape.around(stage),
+            witness=tape.witness,
+            log=lambda owner, text: None,
+        )
+        self._owner = owner
+        self._aside = Bus(scheduler, clock, wire=wire, log=lambda owner, text: None)
+
+    def publisher(self, owner: str, topic: str, message: type[M], qos: Qos) -> Publisher[M]:
+        """Declare a publisher of the component; one of somebody else reaches nobody."""
+        if owner != self._owner:
+            return self._aside.publisher(owner, topic, message, qos)
+        return super().publisher(owner, topic, message, qos)

@@ -1,0 +1,1 @@
+"""A lamp: what somebody else's package for rbxcompose looks like."""

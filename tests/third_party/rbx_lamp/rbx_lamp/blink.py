@@ -1,0 +1,38 @@
+"""The check of blinking that nobody can see."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Severity
+from rbxcompose.model.flow import setting, setting_span
+from rbxcompose.model.robot import Robot
+from rbxcompose.units import TIME, format_quantity
+
+TYPE = "lamp"
+SHORTEST = 0.1  # [s]
+
+
+@check("LAMP01", Severity.WARNING)
+def blink(robot: Robot) -> Iterator[Finding]:
+    """A lamp that blinks too fast
+
+    The component steps 20 times a second: a period below 0.1 s has no dark half.
+
+    Bad:
+    ```yaml
+    components:
+      lamp: {type: lamp, period: 50 ms}
+    ```
+    Good:
+    ```yaml
+    components:
+      lamp: {type: lamp, period: 500 ms}
+    ```
+    """
+    for part in robot.parts.values():
+        period = setting(part, "period") if part.type_name == TYPE else None
+        if period is not None and period < SHORTEST:
+            message = f"'{part.name}' blinks every {format_quantity(period, TIME)}, which nobody sees"
+            yield blink.at(setting_span(robot, (part, "period")), message, help="take 100 ms or more")
