@@ -90,7 +90,7 @@ def exact(fix: Fix | None, sources: Sources) -> Fix | None:
         if place is None or start is None:
             return None
         shift = place.start - start
-        span = replace(edit.span, column=edit.span.column + shift, end_column=edit.span.end_column - shift)
+        span = edit.span._replace(column=edit.span.column + shift, end_column=edit.span.end_column - shift)
         edits.append(replace(edit, span=span))
     return replace(fix, edits=tuple(edits))
 

@@ -11,6 +11,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import lru_cache
+from typing import NamedTuple
 
 SIMILAR = 0.6  # difflib ratio from which on a name is offered as "did you mean"
 MOST_NAMES = 6  # valid names listed when none is similar
@@ -28,9 +29,11 @@ class Severity(StrEnum):
     WARNING = "warning"
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Span:
-    """A place in a text: lines and columns count from 1, the end is exclusive and on the same or a later line."""
+class Span(NamedTuple):
+    """A place in a text: lines and columns count from 1, the end is exclusive and on the same or a later line.
+
+    A tuple, since the compiler makes thousands of them.
+    """
 
     file: str
     line: int
@@ -250,12 +253,19 @@ def surely_meant(name: str, valid: Iterable[str]) -> str | None:
     """Return the only name that `name` can be a slip of the hand for."""
     near = nearest(name, valid, most=2, cutoff=SURE - LEAD)
     ratios = [_similarity(one, name) for one in near]
-    is_clear = bool(near) and ratios[0] >= SURE and ratios[0] - sum(ratios[1:]) >= LEAD * len(near[1:])
+    is_near = bool(near) and (ratios[0] >= SURE or _is_swap(name, near[0]))
+    is_clear = is_near and ratios[0] - sum(ratios[1:]) >= LEAD * len(near[1:])
     return near[0] if is_clear and _is_slip(name, near[0]) else None
 
 
 def _similarity(one: str, other: str) -> float:
     return difflib.SequenceMatcher(None, one, other).ratio()
+
+
+def _is_swap(name: str, meant: str) -> bool:
+    """Tell whether two neighbouring characters have changed places."""
+    swaps = (name[:at] + name[at + 1] + name[at] + name[at + 2 :] for at in range(len(name) - 1))
+    return meant in swaps
 
 
 def _is_slip(name: str, meant: str) -> bool:

@@ -267,24 +267,27 @@ def to_si(value: object, dimension: Dimension) -> float:
     Raises:
         UnitError: if it is not; a bare number is no angle, ratio or temperature, for which two conventions exist.
     """
-    must_be = f"must be {dimension.phrase}, such as '{example(dimension)}'"
     if isinstance(value, str):
         try:
             read = parse_quantity(value)
         except UnitError as error:
-            raise UnitError(must_be, detail=error.message, help=error.help) from None
+            raise UnitError(_must_be(dimension), detail=error.message, help=error.help) from None
     elif isinstance(value, Quantity):
         read = value
     elif isinstance(value, int | float) and not isinstance(value, bool):
         read = _bare(value)
     else:
-        raise UnitError(must_be)
+        raise UnitError(_must_be(dimension))
     if read.dimension == NUMBER and (fix := bare_number_help(dimension)):
-        raise UnitError(must_be, detail="the unit is missing", help=fix)
+        raise UnitError(_must_be(dimension), detail="the unit is missing", help=fix)
     if read.dimension not in (dimension, NUMBER):
-        raise UnitError(must_be, detail=f"this is {read.dimension.phrase}")
+        raise UnitError(_must_be(dimension), detail=f"this is {read.dimension.phrase}")
     _require_moderate(read.value)
     return read.value
+
+
+def _must_be(dimension: Dimension) -> str:
+    return f"must be {dimension.phrase}, such as '{example(dimension)}'"
 
 
 def _bare(value: float) -> Quantity:

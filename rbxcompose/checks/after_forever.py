@@ -7,7 +7,9 @@ from itertools import pairwise
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.missions.facts import never_fails, never_succeeds, starts_always
+from rbxcompose.missions.facts import never_fails, starts_always
+from rbxcompose.missions.in_turn import RANDOM, InTurnOptions
+from rbxcompose.missions.outcomes import SUCCEEDS, Ending
 from rbxcompose.missions.program import Node, Program
 from rbxcompose.model.robot import Robot
 
@@ -37,8 +39,9 @@ def after_forever(robot: Robot) -> Iterator[Finding]:
     ```
     """
     for mission in robot.missions.values():
+        ending = Ending(mission.program, robot.names)
         for node in mission.program.nodes:
-            if node.kind in ("sequence", "fallback") and (found := _barrier(mission.program, node)):
+            if node.kind in ("sequence", "fallback") and (found := _barrier(mission.program, node, ending)):
                 barrier, following, why = found
                 yield after_forever.at(
                     following.span,
@@ -47,11 +50,13 @@ def after_forever(robot: Robot) -> Iterator[Finding]:
                 )
 
 
-def _barrier(program: Program, node: Node) -> tuple[Node, Node, str] | None:
+def _barrier(program: Program, node: Node, ending: Ending) -> tuple[Node, Node, str] | None:
     """Return the first step that none can follow, the step behind it, and why."""
+    if isinstance(node.options, InTurnOptions) and node.options.order == RANDOM:
+        return None
     steps = [program.nodes[child] for child in node.children]
     for step, following in pairwise(steps):
-        if node.kind == "sequence" and never_succeeds(program, step):
+        if node.kind == "sequence" and not ending.of(step.number).counting_as(SUCCEEDS):
             return step, following, "never ends in success"
         if node.kind == "fallback" and _holds_on(step):
             return step, following, "never fails"

@@ -76,7 +76,7 @@ class Excess:
 
 def excesses(robot: Robot) -> Iterator[Excess]:
     """Yield the speeds and turn rates above the limits of the base that they are for."""
-    for driver, base in Flow.of(robot).drives():
+    for driver, base in Flow(robot).drives():
         for name, limiting, dimension in LIMITS:
             wanted, limit = setting(driver, name), setting(base, limiting)
             if wanted is not None and limit is not None and wanted > limit:

@@ -32,7 +32,7 @@ def command_timeout(robot: Robot) -> Iterator[Finding]:
         command_timeout: 0.5 s
     ```
     """
-    flow = Flow.of(robot)
+    flow = Flow(robot)
     for base in robot.parts.values():
         allowed = setting(base, "command_timeout")
         if allowed is None:

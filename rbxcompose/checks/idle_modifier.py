@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.facts import never_fails, place_in_text
-from rbxcompose.missions.modifiers import Tries
+from rbxcompose.missions.modifiers.limits import Tries
 from rbxcompose.model.robot import Robot
 
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related
-from rbxcompose.model.flow import Flow
 from rbxcompose.model.robot import Robot
 
 
@@ -37,12 +36,11 @@ def mux_type(robot: Robot) -> Iterator[Finding]:
             timeout: 0.5 s
     ```
     """
-    flow = Flow.of(robot)
     for mux, entry in robot.manifest.muxes.items():
         for name, one in entry.inputs.items():
             own = robot.parts[mux].end(name)
             component = (one.source or "").partition(".")[0]
-            for writer in flow.writers.get(own.topic, ()) if own else ():
+            for writer in robot.writers.get(own.topic, ()) if own else ():
                 if own and writer.instance == component and writer.type_name != own.type_name:
                     yield mux_type.at(
                         robot.value("muxes", mux, "inputs", name, "from"),

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.model.flow import Flow
 from rbxcompose.model.robot import Part, Robot
 from rbxcompose.model.wiring import End
 from rbxcompose.qos import Qos
@@ -42,9 +41,8 @@ def needed_port(robot: Robot) -> Iterator[Finding]:
         runtime: 45 s
     ```
     """
-    flow = Flow.of(robot)
     given = {(type(end.port), end.topic) for end in robot.ends}
-    lost = {end.type_name for ends in flow.writers.values() for end in ends if is_unheard(flow, end)}
+    lost = {end.type_name for ends in robot.writers.values() for end in ends if is_unheard(robot, end)}
     for part in robot.parts.values():
         if part.name == MISSION:
             continue
@@ -56,9 +54,9 @@ def needed_port(robot: Robot) -> Iterator[Finding]:
             yield _finding(robot, part, ends)
 
 
-def is_unheard(flow: Flow, end: End) -> bool:
+def is_unheard(robot: Robot, end: End) -> bool:
     """Tell whether commands leave at this end and nobody hears them."""
-    return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND and end.topic not in flow.readers
+    return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND and end.topic not in robot.readers
 
 
 def _is_command(end: End) -> bool:

@@ -7,6 +7,7 @@ from itertools import groupby
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related
+from rbxcompose.model.flow import MUX
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wiring import resolve
 from rbxcompose.sdk.ports import Looks
@@ -45,7 +46,11 @@ def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
     for topic, group in groupby(sorted(ends, key=lambda end: end.topic), key=lambda end: end.topic):
         first, *others = sorted(group, key=robot.end_span)
         for other in others:
-            if other.type_name != first.type_name:
+            if other.type_name == first.type_name:
+                continue
+            if other.instance == first.instance and robot.parts[first.instance].type_name == MUX:
+                yield _name_used_twice(robot, first.instance, topic.rpartition("/")[-1])
+            else:
                 yield one_topic_two_types.at(
                     robot.end_span(other),
                     f"'{topic}' is {first.type_name} for '{first.instance}', "
@@ -54,3 +59,14 @@ def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
                     help="give one of them another topic with 'connect:'",
                     related=[Related(robot.end_span(first), f"its port '{first.name}'")],
                 )
+
+
+def _name_used_twice(robot: Robot, mux: str, name: str) -> Finding:
+    """Return the finding for a mux of which an input and a lock have one name, and so one topic."""
+    return one_topic_two_types.at(
+        robot.key("muxes", mux, "locks", name),
+        f"mux '{mux}' uses the name '{name}' twice, for an input and for a lock: both are the topic '{mux}/{name}'",
+        label="the lock",
+        help="give the lock a name of its own",
+        related=[Related(robot.key("muxes", mux, "inputs", name), "the input")],
+    )

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related
-from rbxcompose.model.flow import MUX, Flow
+from rbxcompose.model.flow import MUX
 from rbxcompose.model.robot import Robot
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.ports import In
@@ -33,7 +33,7 @@ def past_the_mux(robot: Robot) -> Iterator[Finding]:
         type: diff_drive_sim
     ```
     """
-    for topic, ends in Flow.of(robot).readers.items():
+    for topic, ends in robot.readers.items():
         muxed = [end for end in ends if robot.parts[end.instance].type_name == MUX]
         for end in ends:
             if muxed and end not in muxed and isinstance(end.port, In) and end.port.qos is Qos.COMMAND:

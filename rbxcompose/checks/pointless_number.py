@@ -9,7 +9,7 @@ from rbxcompose.expressions.tree import Expression, Minus, Number
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.facts import place_in_text
 from rbxcompose.missions.kinds.repeat import RepeatOptions
-from rbxcompose.missions.modifiers import Tries
+from rbxcompose.missions.modifiers.limits import Tries
 from rbxcompose.missions.program import Node
 from rbxcompose.model.robot import Robot
 

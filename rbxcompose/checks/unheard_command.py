@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from rbxcompose.checking import check
 from rbxcompose.checks.needed_port import is_unheard
 from rbxcompose.findings import Finding, Related, Severity, suggest
-from rbxcompose.model.flow import Flow
 from rbxcompose.model.robot import Robot
 
 
@@ -33,11 +32,10 @@ def unheard_command(robot: Robot) -> Iterator[Finding]:
         type: diff_drive_sim
     ```
     """
-    flow = Flow.of(robot)
     for end in robot.ends:
-        if is_unheard(flow, end):
-            waiting = [one for ends in flow.readers.values() for one in ends if one.type_name == end.type_name]
-            starving = [one for one in waiting if one.topic not in flow.writers and one.instance != end.instance]
+        if is_unheard(robot, end):
+            waiting = [one for ends in robot.readers.values() for one in ends if one.type_name == end.type_name]
+            starving = [one for one in waiting if one.topic not in robot.writers and one.instance != end.instance]
             topics = [one.topic.strip("/") for one in starving]
             yield unheard_command.at(
                 robot.end_span(end),

@@ -44,6 +44,8 @@ def _missing(robot: Robot, name: str, source: str) -> Wrong | None:
         message = f"comes from a component that the robot does not have: '{component}'"
         return Wrong(message, suggest(component, robot.parts, "components of this robot"), component, robot.parts)
     outputs = [end.name for end in part.ends if isinstance(end.port, Out)]
+    if name in robot.values:
+        return None  # also the level of a group of the diagnostics
     if not dot:
         message = f"names a component; it must name one of its outputs, as '{component}.PORT'"
         return Wrong(message, suggest("", outputs, "ports"))

@@ -39,8 +39,9 @@ from rbxcompose.expressions.types import (
     list_of,
     quantity_of,
 )
+from rbxcompose.expressions.written import is_bare, missing_unit, other_unit
 from rbxcompose.findings import suggest, surely_meant
-from rbxcompose.units import LENGTH, NUMBER, QUOTIENT, RATIO, TIME, Dimension, bare_number_help, format_number
+from rbxcompose.units import LENGTH, NUMBER, QUOTIENT, TIME
 
 
 class StaticScope(Protocol):
@@ -150,8 +151,8 @@ class _Checker:
         found = self.type_of(node, expected)
         if accepts(expected, found):
             return expected
-        if expected.dimension and _is_bare(node):
-            if fix := _missing_unit(node, expected.dimension):
+        if expected.dimension and is_bare(node):
+            if fix := missing_unit(node, expected.dimension):
                 self.wrong(node, f"this must be {expected.phrase}; the unit is missing", fix)
             return expected
         what = "true or false" if expected == FLAG else expected.detail
@@ -259,11 +260,15 @@ class _Checker:
         if one.is_comparable(other):
             return _wider(left.type, right.type)
         for bare, measured in ((left, right), (right, left)):
-            if _is_bare(bare.node) and measured.type.dimension:
-                if fix := _missing_unit(bare.node, measured.type.dimension):
+            if is_bare(bare.node) and measured.type.dimension:
+                if fix := missing_unit(bare.node, measured.type.dimension):
                     return self.wrong(node, f"{measured.type.phrase} {verb} a bare number", fix)
                 return measured.type
-        return self.wrong(node, f"{left.type.phrase} {verb} {right.type.phrase}")
+        return self.wrong(
+            node,
+            f"{left.type.phrase} {verb} {right.type.phrase}",
+            other_unit((left.node, left.type), (right.node, right.type)),
+        )
 
     def is_measured(self, typed: _Typed) -> bool:
         """Tell whether a value can be computed with, and say so if not."""
@@ -353,21 +358,6 @@ _RESULTS = {
     "distance": quantity_of(LENGTH),
     "round": COUNT,
 }
-
-
-def _is_bare(node: Node) -> bool:
-    """Tell whether a node is a number as written, without a unit."""
-    while isinstance(node, Minus):
-        node = node.operand
-    return isinstance(node, Number) and node.dimension == NUMBER
-
-
-def _missing_unit(node: Node, dimension: Dimension) -> str:
-    """Return what to write instead of a bare number, or nothing if it is understood as SI."""
-    if dimension == RATIO and isinstance(node, Number):
-        percentage = node.value * 100 if node.value < 1 else node.value
-        return f"write '{format_number(percentage)} %'"
-    return bare_number_help(dimension)
 
 
 def _wider(one: Type, other: Type) -> Type:

@@ -11,7 +11,7 @@ from typing import Any
 from rbxcompose.lsp.document import Document, Spot
 from rbxcompose.lsp.names import PLACE, SKILL, named_by_key, named_by_value
 from rbxcompose.lsp.variables import fills, variables
-from rbxcompose.missions.keys import ANYWHERE
+from rbxcompose.missions.keys import anywhere
 from rbxcompose.schema.guide import Guide, Value
 from rbxcompose.schema.scalars import Schema, units_of
 from rbxcompose.units import NUMBER_TEXT, Dimension
@@ -68,8 +68,8 @@ def _open_keys(spot: Spot) -> dict[str, Schema]:
     """Return the keys that may stand at the position; beside a skill there is no second step."""
     guide = spot.guide
     schemas = Guide(guide.schema, spot.cursor.around, guide.types).keys(spot.cursor.path)
-    if _takes_nodes(schemas) and any(key not in ANYWHERE for key in spot.cursor.siblings):
-        return {key: schemas[key] for key in ANYWHERE if key in schemas}
+    if _takes_nodes(schemas) and any(key not in anywhere() for key in spot.cursor.siblings):
+        return {key: schemas[key] for key in anywhere() if key in schemas}
     return schemas
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from lsprotocol import types
@@ -12,7 +13,6 @@ from pygls.workspace.position_codec import ServerTextPosition
 from rbxcompose.findings import Finding, Severity, Span
 from rbxcompose.lsp.completion import Item
 from rbxcompose.lsp.fixes import Action, Change
-from rbxcompose.lsp.project import Project
 
 SOURCE = "rbxcompose"
 _SEVERITIES = {
@@ -31,8 +31,8 @@ _SORTS = {
 class Converter:
     """Knows the units in which the editor counts, and how it calls its files."""
 
-    def __init__(self, project: Project, codec: PositionCodec) -> None:
-        self.project = project
+    def __init__(self, text: Callable[[Path], str], codec: PositionCodec) -> None:
+        self.text = text
         self.codec = codec
         self._uris: dict[Path, str] = {}
 
@@ -63,7 +63,7 @@ class Converter:
     def location(self, span: Span) -> types.Location:
         """Return a place in a file."""
         path = Path(span.file).resolve()
-        return types.Location(self.uri(path), self._span(self.project.text(path), span))
+        return types.Location(self.uri(path), self._span(self.text(path), span))
 
     def _span(self, text: str, span: Span) -> types.Range:
         return self.range(text, (span.line - 1, span.column - 1), (span.end_line - 1, span.end_column - 1))
@@ -74,7 +74,7 @@ class Converter:
         related = [types.DiagnosticRelatedInformation(self.location(one.span), one.message) for one in finding.related]
         span = finding.span or Span("", 1, 1, 1, 1)
         return types.Diagnostic(
-            range=self._span(self.project.text(path), span),
+            range=self._span(self.text(path), span),
             message=f"{words}\n{finding.help}" if finding.help else words,
             severity=_SEVERITIES[finding.severity],
             code=finding.code,
@@ -109,4 +109,4 @@ class Converter:
         )
 
     def _edit(self, path: Path, change: Change) -> types.TextEdit:
-        return types.TextEdit(self.range(self.project.text(path), change.start, change.end), change.text)
+        return types.TextEdit(self.range(self.text(path), change.start, change.end), change.text)

@@ -38,7 +38,8 @@ def _here(spot: Spot, span: Span) -> Span:
 
 def _file(spot: Spot) -> Span | None:
     path = below_profile(spot.cursor.path)
-    is_path = path[:1] in (("missions",), ("include",)) and (len(path) == 2 or (len(path) == 3 and path[2] in _FILES))
+    is_entry = path[:1] in (("missions",), ("include",)) and (len(path) == 2 or (len(path) == 3 and path[2] in _FILES))
+    is_path = is_entry or path == ("body", "urdf")
     if spot.document.is_mission or spot.cursor.is_key or not is_path:
         return None
     place = Span("", 1, 1, 1, 1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -22,6 +22,10 @@ _MOST_ROBOTS = 200  # of one project, that are looked at
 _BEGINNING = 4_000  # characters in which the header of a manifest stands
 
 Found = dict[Path, list[Finding]]
+
+
+class OutdatedError(Exception):
+    """Raised where a project is compiled whose texts have changed meanwhile."""
 
 
 def kind_of(text: str) -> str:
@@ -45,8 +49,13 @@ class Project:
 
     environment: Mapping[str, str]
     unsaved: dict[Path, str] = field(default_factory=dict)
+    is_outdated: Callable[[], bool] = lambda: False
     _watched: dict[Path, _Watched] = field(default_factory=dict)
     _alone: Found = field(default_factory=dict)  # findings in files that belong to no robot
+
+    def copy(self, is_outdated: Callable[[], bool]) -> Project:
+        """Return a project that can change without this one; it raises `OutdatedError` once it is outdated."""
+        return Project(self.environment, dict(self.unsaved), is_outdated, dict(self._watched), dict(self._alone))
 
     def has(self, path: Path, text: str) -> bool:
         """Tell whether a text is one of ours: editors send every YAML file."""
@@ -74,10 +83,21 @@ class Project:
         robots = self._robots_of(path)
         for robot in robots:
             self._compile(robot)
+        if not robots and (base := self._base_of(path)):
+            self._robots_of(base)
         if not robots:
             self._alone[path] = self._lone_findings(path)
         after = {file for robot in robots for file in self._watched[robot].files}
         return {file: self.findings(file) for file in sorted({path} | before | after)}
+
+    def change_all(self, texts: Mapping[Path, str | None]) -> Found:
+        """Take several new texts, as `change` takes one.
+
+        Raises:
+            OutdatedError: when the project has become outdated; it is of no more use then.
+        """
+        files = {file: None for path, text in texts.items() for file in self.change(path, text)}
+        return {file: self.findings(file) for file in files}
 
     def findings(self, path: Path) -> list[Finding]:
         """Return what is known to be wrong in a file, whichever robot it was found in."""
@@ -85,11 +105,16 @@ class Project:
         return list(dict.fromkeys([*found, *self._alone.get(path, ())]))
 
     def robot_of(self, path: Path) -> Robot | None:
-        """Return a robot that a file belongs to, as it was when it could last be read."""
-        robots = self._concerned(path) or self._robots_of(path)
-        if not robots and (base := _beside(path)) and kind_of(self.text(path)) == OVERLAY:
-            robots = self._robots_of(base)
+        """Return a robot that a file belongs to, as it was when it could last be read; None before it was compiled."""
+        robots = self._concerned(path)
+        if not robots and (base := self._base_of(path)):
+            robots = self._concerned(base)
         return next((robot for one in robots if one in self._watched and (robot := self._watched[one].robot)), None)
+
+    def _base_of(self, path: Path) -> Path | None:
+        """Return the robot that an overlay is taken to be for: the one beside it."""
+        robot = path.parent / ROBOT_FILE
+        return robot if kind_of(self.text(path)) == OVERLAY and robot.is_file() else None
 
     def _of(self, robot: Path, path: Path) -> Iterator[Finding]:
         for finding in self._watched[robot].compilation.report:
@@ -111,6 +136,8 @@ class Project:
         return self._concerned(path)
 
     def _compile(self, path: Path) -> None:
+        if self.is_outdated():
+            raise OutdatedError
         made = compile_robot(str(path), environment=self.environment, unsaved=self.unsaved)
         before = self._watched.get(path)
         files = frozenset({path, *(Path(shown).resolve() for shown in made.sources)})
@@ -124,7 +151,7 @@ class Project:
             root = read_mission(path, robot="", report=report, sources=sources, environment=self.environment)
             if root is not None:
                 read_program(root, report)
-        elif kind_of(self.text(path)) == OVERLAY and (base := _beside(path)):
+        elif base := self._base_of(path):
             return self._overlay_findings(path, base)
         else:
             report.extend(read_file(path, shown_name(path), sources)[1])
@@ -134,12 +161,6 @@ class Project:
         """Return what is wrong in an overlay when it is laid over the robot beside it."""
         made = compile_robot(str(base), overlays=[str(path)], environment=self.environment, unsaved=self.unsaved)
         return [one for one in made.report if one.span and Path(one.span.file).resolve() == path]
-
-
-def _beside(path: Path) -> Path | None:
-    """Return the robot beside an overlay, which is taken for the one that it is for."""
-    robot = path.parent / ROBOT_FILE
-    return robot if robot.is_file() else None
 
 
 def _robot_files(path: Path) -> list[Path]:

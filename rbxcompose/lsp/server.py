@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
+import sys
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Protocol, TypeVar
 
 from lsprotocol import types
@@ -17,11 +16,12 @@ from rbxcompose.lsp.definition import define
 from rbxcompose.lsp.document import Document
 from rbxcompose.lsp.fixes import actions
 from rbxcompose.lsp.hover import describe
-from rbxcompose.lsp.project import Project
+from rbxcompose.lsp.newest import PAUSE, Newest
+from rbxcompose.lsp.project import Found, Project
 
 P = TypeVar("P")
 R = TypeVar("R")
-PAUSE = 0.1  # [s] without a key stroke before the robot is compiled anew
+SWITCH = 0.001  # [s] that an answer waits for its turn while the other thread compiles
 TRIGGERS = (" ", ":", "$", "{", ".", "-", "[", ",")
 
 
@@ -30,42 +30,48 @@ class Session:
 
     def __init__(self, server: LanguageServer, environment: Mapping[str, str]) -> None:
         self.server = server
-        self.project = Project(environment)
+        self.newest = Newest(Project(environment), self._publish)
         self._converter: Converter | None = None
-        self._waiting: dict[str, asyncio.TimerHandle] = {}
+
+    @property
+    def project(self) -> Project:
+        """Return the project as it was compiled last."""
+        return self.newest.project
 
     @property
     def convert(self) -> Converter:
         """Return the converter, which needs what was agreed upon at the start."""
         if self._converter is None:
-            self._converter = Converter(self.project, self.server.workspace.position_codec)
+            self._converter = Converter(lambda path: self.project.text(path), self.server.workspace.position_codec)
         return self._converter
 
-    def opened(self, uri: str) -> None:
-        """Check a document at once."""
-        if handle := self._waiting.pop(uri, None):
-            handle.cancel()
+    def opened(self, uri: str, pause: float = 0.0) -> None:
+        """Check a document."""
         path = self.convert.path(uri)
         text = self._text(uri)
-        if path is not None and self.project.has(path, text):
-            self._publish(path, text)
+        if path is not None and (self.newest.has(path) or self.project.has(path, text)):
+            self.newest.change(path, text, pause)
 
     def changed(self, uri: str) -> None:
         """Check a document when nothing has been typed for a moment."""
-        if handle := self._waiting.pop(uri, None):
-            handle.cancel()
-        self._waiting[uri] = asyncio.get_running_loop().call_later(PAUSE, self.opened, uri)
+        self.opened(uri, PAUSE)
 
     def closed(self, uri: str) -> None:
         """Take the saved text again."""
-        if handle := self._waiting.pop(uri, None):
-            handle.cancel()
         path = self.convert.path(uri)
-        if path is not None and path in self.project.unsaved:
-            self._publish(path, None)
+        if path is not None and self.newest.has(path):
+            self.newest.change(path, None)
 
-    def _publish(self, path: Path, text: str | None) -> None:
-        for file, findings in self.project.change(path, text).items():
+    def begun(self, _: object) -> None:
+        """Make ready for the first question."""
+        self.newest.prepare()
+
+    def ended(self, _: object) -> None:
+        """Let the thread end."""
+        self.newest.close()
+
+    def _publish(self, found: Found) -> None:
+        for file, findings in found.items():
             shown = [self.convert.diagnostic(file, finding) for finding in findings]
             uri = self.convert.uri(file)
             self.server.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, shown))
@@ -105,14 +111,17 @@ class Session:
 
     def code_action(self, params: types.CodeActionParams) -> list[types.CodeAction]:
         """Offer the fixes of what is wrong here."""
-        path = self.convert.path(params.text_document.uri)
-        findings = self.project.findings(path) if path else []
+        path, text = self.convert.path(params.text_document.uri), self._text(params.text_document.uri)
+        if path is None or not self.newest.is_compiled(path, text):
+            return []  # the places of an older text would be the wrong ones
+        findings = self.project.findings(path)
         lines = params.range.start.line, params.range.end.line
         return [self.convert.action(one) for one in actions(self.project, findings, *lines)]
 
 
 def make_server(environment: Mapping[str, str]) -> LanguageServer:
     """Return a server; `environment` is what `${env.NAME}` sees."""
+    sys.setswitchinterval(SWITCH)
     server = LanguageServer("rbxcompose", rbxcompose.__version__)
     session = Session(server, environment)
 
@@ -123,6 +132,8 @@ def make_server(environment: Mapping[str, str]) -> LanguageServer:
         (types.TEXT_DOCUMENT_DID_CLOSE, session.closed),
     ):
         server.feature(notice)(_of_document(take))
+    server.feature(types.INITIALIZED)(_function(session.begun))
+    server.feature(types.SHUTDOWN)(_function(session.ended))
     triggers = types.CompletionOptions(trigger_characters=list(TRIGGERS))
     fixes = types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix])
     server.feature(types.TEXT_DOCUMENT_COMPLETION, triggers)(_function(session.completion))

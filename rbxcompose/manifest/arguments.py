@@ -121,10 +121,10 @@ def read_value(node: Node, expected: Type, name: str, report: Report) -> object:
         case TypeKind.TEXT if isinstance(node, Scalar) and value is not None:
             read = node.text if node.filled is None else value if isinstance(value, Secret) else show(value)
         case TypeKind.CHOICE if isinstance(node, Scalar):
-            if node.text not in expected.choices:
+            read = node.text if node.filled is None else value
+            if read not in expected.choices:
                 report.add(not_a_choice(node.span, name, node, list(expected.choices)))
                 return BROKEN
-            read = node.text
         case TypeKind.PLACE | TypeKind.POSE if isinstance(value, str):
             read = value
         case TypeKind.POSE | TypeKind.MAP if isinstance(node, Mapping):

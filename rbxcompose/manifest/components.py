@@ -9,10 +9,11 @@ from difflib import get_close_matches
 
 from rbxcompose.config import Place
 from rbxcompose.findings import SIMILAR, Related, Report, kind
-from rbxcompose.manifest.models import ALWAYS_THERE, OPTIONS, SECTIONS, ComponentEntry, ComponentOptions
+from rbxcompose.manifest.models import ALWAYS_THERE, DESCRIPTION, OPTIONS, SECTIONS, ComponentEntry, ComponentOptions
 from rbxcompose.manifest.tree import Entry, Mapping, Scalar
 from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, label_of, validate
 from rbxcompose.plain import plain
+from rbxcompose.plugins import BROKEN, LEFT_OUT, BrokenPluginError
 from rbxcompose.sdk import registry
 
 UNKNOWN_TYPE = kind(
@@ -96,6 +97,9 @@ def _check_name(name: str, entry: Entry, root: Mapping, report: Report) -> None:
         report.add(TAKEN_NAME.at(entry.key.span, f"a component cannot be named like the section '{name}'"))
     elif name in ALWAYS_THERE:
         report.add(TAKEN_NAME.at(entry.key.span, f"every robot runs a component '{name}' already"))
+    elif name == DESCRIPTION and "body" in root.entries:
+        related = [Related(root.entries["body"].key.span, "the body")]
+        report.add(TAKEN_NAME.at(entry.key.span, f"the body brings a component '{name}' already", related=related))
     elif isinstance(muxes, Mapping) and name in muxes:
         related = [Related(muxes.entries[name].key.span, "the mux")]
         report.add(TAKEN_NAME.at(entry.key.span, f"a component and a mux are both named '{name}'", related=related))
@@ -117,8 +121,15 @@ def _type_name(name: str, entry: Entry, node: Mapping, report: Report) -> str | 
         return None
     if is_broken(written):
         return None
+    if told := registry.PLUGINS.overshadowed(written.text):
+        report.add(LEFT_OUT.at(written.span, told))
     if written.text not in registry.component_names():
         message = f"component '{name}' is of a type that does not exist: '{plain(written.text, 60)}'"
         report.add(UNKNOWN_TYPE.misspelt(written.span, message, written.text, registry.component_names(), "types"))
+        return None
+    try:
+        registry.component_type(written.text)
+    except BrokenPluginError as error:
+        report.add(BROKEN.at(written.span, str(error)))
         return None
     return written.text

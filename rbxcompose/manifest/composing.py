@@ -15,8 +15,11 @@ TOO_LARGE = kind(
     """Larger than a manifest may be
 
 A manifest has limits, so that no file can use up time or memory: 2 MB, 200,000 values, 64 levels, 64 kB for one text,
-200 characters for a key, 40 for a number, 10,000 values reached through aliases. Split a large robot into several
-files.
+200 characters for a key, 40 for a number, 10,000 values reached through aliases, 10,000 values in one datum of a
+mission. All files of a robot have at most 8 MB together, and so has all that `${...}` fills in. Split a large robot
+into several files.
+
+A URDF file has at most 4 MB, 200,000 elements and 64 levels.
 
 Bad:
 ```yaml

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from dataclasses import replace as changed
 from pathlib import Path
+from typing import Any
 
 from rbxcompose.findings import Finding, Related, Report, Span, kind
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.models import Header
 from rbxcompose.manifest.reader import read_file
-from rbxcompose.manifest.tree import Mapping, Node, Scalar
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
 from rbxcompose.manifest.validate import validate
 
 OTHER_KIND = kind(
@@ -64,8 +65,13 @@ class Documents:
         return self.files.get(span.file, robot)
 
     def check(self, model: type[Header], root: Mapping) -> None:
-        """Add what is wrong with the keys of a whole file."""
-        validate(model, root, (), self.report)
+        """Add what is wrong with the keys of a whole file; what a section holds is looked at where it is read."""
+        anything = {name for name, field in model.model_fields.items() if field.annotation is Any}
+        keys = {
+            name: Entry(entry.key, Scalar("", entry.value.span)) if name in anything else entry
+            for name, entry in root.entries.items()
+        }
+        validate(model, changed(root, entries=keys), (), self.report)
 
 
 def _trouble(root: Node, wanted: str) -> Finding | None:

@@ -28,8 +28,8 @@ _PLAIN = re.compile(r"(?!- |-$|---|\.\.\.)[\w./+-](?:[^\n:#]|:(?! |$)|(?<! )#)*(
 def dump_robot(manifest: RobotManifest, note: Note = lambda path, node: "") -> str:
     """Return a robot with its parts, profiles, overlays and values put together and filled in, as one file.
 
-    It is meant for the folder of the robot's file: paths of missions are relative to that. `note` gives the comment
-    behind a value. Secrets keep their names: `${secret.NAME}`.
+    It is meant for the folder of the robot's file: paths of missions and of the URDF are relative to that. `note` gives
+    the comment behind a value. Secrets keep their names: `${secret.NAME}`.
     """
     return dump(_in_one_file(manifest), note)
 
@@ -40,20 +40,19 @@ def dump(root: Mapping, note: Note = lambda path, node: "") -> str:
 
 
 def _in_one_file(manifest: RobotManifest) -> Mapping:
-    """Return the tree with each mission's file as the robot's own file would name it."""
-    missions = manifest.root.get("missions")
-    if not isinstance(missions, Mapping):
-        return manifest.root
-    entries = dict(missions.entries)
+    """Return the tree with each file that it names as the robot's own file would name it."""
+    root = manifest.root
     for name, one in manifest.missions.items():
-        written = entries[name].value
-        if isinstance(written, Mapping):
-            file = written.entries["file"]
-            text = _path_from(manifest.path, one.path)
-            path = Entry(file.key, Scalar(text, file.value.span))
-            entries[name] = replace(entries[name], value=replace(written, entries={**written.entries, "file": path}))
-    changed = replace(manifest.root.entries["missions"], value=replace(missions, entries=entries))
-    return replace(manifest.root, entries={**manifest.root.entries, "missions": changed})
+        root = _with_path(root, ("missions", name, "file"), _path_from(manifest.path, one.path))
+    return _with_path(root, ("body", "urdf"), _path_from(manifest.path, manifest.body.path)) if manifest.body else root
+
+
+def _with_path(root: Mapping, path: Path, text: str) -> Mapping:
+    """Return a tree with another text at `path`; what stands there keeps its place."""
+    entry = root.entries[str(path[0])]
+    inner = entry.value
+    changed = _with_path(inner, path[1:], text) if isinstance(inner, Mapping) else Scalar(text, inner.span)
+    return replace(root, entries={**root.entries, str(path[0]): Entry(entry.key, changed)})
 
 
 def _path_from(robot: FilePath, file: FilePath) -> str:

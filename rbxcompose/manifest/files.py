@@ -31,6 +31,7 @@ missions:
 )
 ROBOT_FILE = "robot.yaml"  # what a folder stands for
 _MOST_NEIGHBOURS = 1000
+_MOST_NAMESAKES = 3
 
 
 def shown_name(path: Path) -> str:
@@ -56,7 +57,7 @@ def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
         message, folder = f"'{plain(written)}' leads out of the project", plain(shown_name(project_of(writer)))
         where = f"'{folder}'" if folder != "." else "this folder"
         return OUTSIDE.at(span, message, help=f"the project is {where}: move the file there, or use what 'rbx:' has")
-    return path if path.is_file() else _missing(written, path, span)
+    return path if path.is_file() else _missing(written, path, span, writer)
 
 
 def find(written: str) -> Path | Finding:
@@ -80,13 +81,29 @@ def _absolute(written: str, folder: Path) -> Path | None:
     return None if is_library and not path.is_relative_to(base) else path
 
 
-def _missing(written: str, path: Path, span: Span | None) -> Finding:
+def _missing(written: str, path: Path, span: Span | None, writer: Path | None = None) -> Finding:
+    if writer is not None and (namesakes := _namesakes(path.name, writer)):
+        message = f"'{plain(written)}' does not exist"
+        return UNREADABLE.at(span, message, help=f"did you mean {' or '.join(namesakes)}?")
     try:
         neighbours = [entry.name for entry in list(path.parent.iterdir())[:_MOST_NEIGHBOURS]]
     except OSError:
         return UNREADABLE.at(span, f"'{plain(written)}' does not exist", help=_nearest_folder(path))
     message, there = f"'{plain(written)}' does not exist", f"in '{plain(shown_name(path.parent))}'"
     return UNREADABLE.misspelt(span, message, path.name, neighbours, there, within=written)
+
+
+def _namesakes(name: str, writer: Path) -> list[str]:
+    """Return the files of a name elsewhere in the writer's project, quoted, as the writer has to name them."""
+    file, found, looked_at = writer.resolve(), [], 0
+    for above, folders, files in os.walk(project_of(writer)):
+        folders[:] = sorted(one for one in folders if not one.startswith("."))
+        looked_at += len(folders) + len(files)
+        if name in files and (path := Path(above, name)) != file:
+            found.append(f"'{plain(Path(os.path.relpath(path, file.parent)).as_posix())}'")
+        if looked_at > _MOST_NEIGHBOURS or len(found) >= _MOST_NAMESAKES:
+            break
+    return found
 
 
 def _nearest_folder(path: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from operator import is_
 
 from rbxcompose.config import Secret
 from rbxcompose.expressions.check import check
@@ -16,6 +17,7 @@ from rbxcompose.findings import Report, correction, kind, replacement, suggest
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.arguments import show
 from rbxcompose.manifest.composing import TOO_LARGE
+from rbxcompose.manifest.given import given_span
 from rbxcompose.manifest.limits import ALL_BYTES
 from rbxcompose.manifest.names import Names, NameTypes, NameValues
 from rbxcompose.manifest.parts import part_span
@@ -171,27 +173,26 @@ class _Filler:
                 return self.scalar(node) if "$" in node.text else node
             case Sequence(items=items):
                 filled = tuple(map(self.node, items))
-                return node if all(a is b for a, b in zip(filled, items, strict=True)) else replace(node, items=filled)
+                return node if all(map(is_, filled, items)) else replace(node, items=filled)
         return self.mapping(node)
 
     def mapping(self, mapping: tree.Mapping) -> tree.Mapping:
-        entries = {}
+        changed = {}
         for name, entry in mapping.entries.items():
-            value = self.node(entry.value)
-            entries[name] = entry if value is entry.value else Entry(entry.key, value)
-        is_same = all(entries[name] is entry for name, entry in mapping.entries.items())
-        return mapping if is_same else replace(mapping, entries=entries)
+            if (value := self.node(entry.value)) is not entry.value:
+                changed[name] = Entry(entry.key, value)
+        return replace(mapping, entries={**mapping.entries, **changed}) if changed else mapping
 
     def scalar(self, scalar: Scalar) -> Node:
         if scalar.scope != self.scope:
             self.scope, self.known = scalar.scope, self.names.known(scalar.scope)
         pieces = list(_PIECE.finditer(scalar.text))
         values = {piece: value for piece in pieces if (value := self.piece(scalar, piece)) is not None}
-        is_whole = len(pieces) == 1 and pieces[0].group() == scalar.text
+        is_whole = len(pieces) == 1 and pieces[0].group() == scalar.text and pieces[0]["body"] is not None
         if any(value is BROKEN for value in values.values()):
             return replace(scalar, filled=BROKEN)
         if is_whole and values:
-            return self.within(scalar, _typed(scalar, values[pieces[0]]))
+            return self.within(scalar, self.where_given(_typed(scalar, values[pieces[0]]), pieces[0]))
         for piece, value in values.items():
             if isinstance(value, Secret):
                 broken = self.shown_secret(scalar, piece, "a secret cannot stand inside a text")
@@ -207,6 +208,13 @@ class _Filler:
             parts += [scalar.text[position : piece.start()], _as_text(value)]
             position = piece.end()
         return self.within(scalar, replace(scalar, text="".join(parts) + scalar.text[position:])) if parts else scalar
+
+    def where_given(self, filled: Node, piece: re.Match[str]) -> Node:
+        """Return what was filled in for one `${...}` with its place, where it is an argument that was given a value."""
+        named = self.known.get((piece["body"] or "").strip())
+        if named is None or named.given is None or not isinstance(filled, Scalar):
+            return filled  # lists and maps are as they were written, with their own places
+        return replace(filled, span=given_span(named.given, filled.span))
 
     def within(self, scalar: Scalar, filled: Node) -> Node:
         """Return what was filled in, or `BROKEN` after a finding if all of it together has become too large."""
@@ -288,11 +296,11 @@ class _Filler:
             fix = correction(word.name, known, span)
             message = f"unknown name '{word.name}'"
             self.report.add(UNKNOWN_NAME.at(span, message, help=self.name_help(word.name), fix=fix))
-        if unknown or any(known[word.name][1] is BROKEN for word in expression.words):
+        if unknown or any(known[word.name].value is BROKEN for word in expression.words):
             return BROKEN
         if expression.text.strip() in known:
-            return known[expression.text.strip()][1]
-        if secret := next((word for word in expression.words if isinstance(known[word.name][1], Secret)), None):
+            return known[expression.text.strip()].value
+        if secret := next((word for word in expression.words if isinstance(known[word.name].value, Secret)), None):
             span = part_span(scalar, offset + secret.start, offset + secret.end)
             self.report.add(SHOWN_SECRET.at(span, "nothing can be computed with a secret", help="it stands alone"))
             return BROKEN

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Node, Path, at
+from rbxcompose.manifest.tree import Mapping, Node, Path, at
 
 ROBOT_LAYER = "the robot"
 
@@ -50,6 +50,13 @@ class History:
             if step.node is not None or (found and found[-1].node is not None):
                 found.append(step)
         return tuple(found)
+
+    def removed(self, section: str) -> dict[str, Span]:
+        """Return the entries of a section that were there and are gone, each with the place that took it away."""
+        names = {path[1] for path in self._steps if len(path) == 2 and path[0] == section}
+        names |= {name for step in self.of((section,)) if isinstance(step.node, Mapping) for name in step.node.entries}
+        last = {str(name): steps[-1] for name in names if (steps := self.of((section, name)))}
+        return {name: step.span for name, step in last.items() if step.node is None}
 
     def layer(self, path: Path) -> str:
         """Return the layer whose value at `path` holds, of the nearest path above it that has one."""

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from rbxcompose.findings import Finding, Related, Span
+from rbxcompose.manifest.given import told_where_given
 
 _MOST_CHAINS = 3  # of one finding: a part may have many instances
 
@@ -38,11 +39,11 @@ class Inclusions:
     def told(self, findings: Iterable[Finding]) -> list[Finding]:
         """Return the findings with the chain of includes for each one inside a part.
 
-        A mistake of a part that has several instances is told once.
+        A mistake of a part that has several instances is told once, one in a given value where that was given.
         """
         said: set[tuple[str, Span]] = set()
         out = []
-        for finding in findings:
+        for finding in map(told_where_given, findings):
             inclusions = self.of_file.get(finding.span.file, []) if finding.span else []
             if not inclusions or finding.span is None:
                 out.append(finding)

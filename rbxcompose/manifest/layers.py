@@ -113,7 +113,7 @@ def profile_spans(root: Mapping) -> dict[str, Span]:
     there = root.get("profiles")
     named = there.entries if isinstance(there, Mapping) else {}
     return {
-        name: replace(one.key.span, end_line=one.value.span.end_line, end_column=one.value.span.end_column)
+        name: one.key.span._replace(end_line=one.value.span.end_line, end_column=one.value.span.end_column)
         for name, one in named.items()
         if isinstance(one.value, Mapping)
     }

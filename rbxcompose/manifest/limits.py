@@ -1,14 +1,16 @@
 """How large a manifest may be: what lies above is a finding before it costs time or memory."""
 
 FILE_BYTES = 2_000_000
+URDF_BYTES = 4_000_000
 ALL_BYTES = 8_000_000  # sum over the files of one robot
 FILES = 500
 INSTANCES = 500  # of parts; each instance counts its file's text towards `ALL_BYTES`
 INCLUDE_DEPTH = 16
 SECRET = 64_000  # bytes of a secret's file
-NODES = 200_000  # per file
+NODES = 200_000  # per file; in a URDF file elements
 DEPTH = 64
 ALIAS_NODES = 10_000  # reached through aliases and merge keys
+DATA_NODES = 10_000  # of one datum or input of a mission, which is read, checked and copied as a whole
 TEXT = 64_000  # characters of one value
 KEY = 200
 NUMBER = 40

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, StringConstraints
 
-from rbxcompose.config import Angle, Config, Length, Name, Place, Time
+from rbxcompose.config import Angle, Config, Frequency, Length, Name, Place, Time
 from rbxcompose.findings import Span
 from rbxcompose.manifest.history import History
 from rbxcompose.manifest.inclusions import Inclusions
@@ -26,6 +26,9 @@ SECTIONS = (
 
 ALWAYS_THERE = ("transforms", "mission")
 """Components that every robot runs, beside `diagnostics`."""
+
+DESCRIPTION = "robot_description"
+"""The component that a robot with a body runs."""
 
 TopicName = Annotated[str, StringConstraints(pattern=r"^/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*$", max_length=255)]
 InterfaceName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(/(msg|srv|action))?/[A-Z][A-Za-z0-9]*$")]
@@ -45,7 +48,7 @@ class Header(Config):
     rbx: Literal[1]
     """Version of the language."""
     kind: str
-    """What this file describes: `Robot`, `Part`, `Overlay` or `Mission`."""
+    """What this file describes: `Robot`, `Part`, `Overlay`, `Mission` or `Test`."""
     name: Name
     """Its name: small letters, digits and underscores."""
     about: str = ""
@@ -59,6 +62,8 @@ class Sections(Header):
     """Arguments by name: what a user of the robot or part may want to set, read by `${args.NAME}`."""
     include: Any = None
     """Parts of which the robot is made, by the name of the instance, which stands before all names of the part."""
+    body: Any = None
+    """What the robot looks like and how it moves: its URDF, which is published for viewers and other programs."""
     components: Any = None
     """What runs, by name: a `type`, the settings of that type, and options that every type takes."""
     muxes: Any = None
@@ -144,6 +149,15 @@ class Bus(Config):
     """The ROS 2 distribution whose wire format is spoken."""
     router: str | None = None
     """An existing router to use instead of an own one, such as `tcp/192.168.0.2:7447`."""
+    clock: Literal["own", "external"] = "own"
+    """Whose time the robot follows: its own, or that of a simulator outside, which publishes it on `/clock`."""
+
+
+class Body(Config):
+    """What the robot looks like and how it moves."""
+
+    urdf: str
+    """The URDF file, relative to this one; it goes out on the topic `robot_description`, as it is."""
 
 
 RestartModel = Annotated[Restart, _short_for("when", Restart, When)]
@@ -158,6 +172,8 @@ class ComponentOptions(Config):
     """Components that are active before this one."""
     restart: RestartModel = DEFAULT
     """When it is tried again after a failure: a word, or a map with `when`, `max`, `within` and `backoff`."""
+    log: Literal["info", "warn", "error"] = "info"
+    """The least level of what it writes to the log."""
     connect: dict[Name, TopicName] = {}
     """Topics by port, where they differ from the port's name."""
 
@@ -174,6 +190,8 @@ class MuxInput(Config):
     """It has lost its turn after this long without a message."""
     source: PortName | None = Field(None, alias="from")
     """The component, or `component.port`, whose output this is; without it the input is open to the outside."""
+    max_rate: Frequency | None = Field(None, gt=0)
+    """More is not taken from one publisher elsewhere: it is dropped, and told in diagnostics. 1000 Hz if left out."""
 
 
 class MuxLock(Config):
@@ -275,6 +293,14 @@ class MissionEntry:
     span: Span
 
 
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What describes the robot's body: a URDF file and its text, which has been read without mistakes."""
+
+    path: Path
+    text: str
+
+
 class About(StrEnum):
     """What a claim of a part is about."""
 
@@ -320,6 +346,7 @@ class RobotManifest:
     root: Mapping  # composed and filled; the places of everything below
     is_simulated: bool
     bus: Bus
+    body: Description | None = None
     components: AnyMapping[str, ComponentEntry] = field(default_factory=dict)
     muxes: AnyMapping[str, Mux] = field(default_factory=dict)
     diagnostics: Diagnostics = field(default_factory=Diagnostics)

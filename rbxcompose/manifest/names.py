@@ -4,16 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from rbxcompose.expressions import types
 from rbxcompose.expressions.types import Type
+from rbxcompose.findings import Span
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.secrets import Secrets
 from rbxcompose.manifest.tree import Scalar, Sequence
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.units import Quantity
 
-Typed = tuple[Type, object]
+
+class Typed(NamedTuple):
+    """A type and a value of it; `given` is where another than the author of the default wrote that."""
+
+    type: Type
+    value: object
+    given: Span | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +43,7 @@ class Names:
 
 def names_of(robot: str, sim: bool, environment: Mapping[str, str], secrets: Secrets | None = None) -> Names:
     """Return the names that every file of a robot knows."""
-    return Names({"robot.name": (types.TEXT, robot), "sim": (types.FLAG, sim)}, environment, secrets)
+    return Names({"robot.name": Typed(types.TEXT, robot), "sim": Typed(types.FLAG, sim)}, environment, secrets)
 
 
 def with_arguments(names: Names, arguments: Mapping[str, Typed], scope: str = "") -> Names:
@@ -56,7 +64,7 @@ class NameTypes:
 
     def word(self, name: str) -> Type | None:
         """Return the type of a name."""
-        return self.names[name][0] if name in self.names else None
+        return self.names[name].type if name in self.names else None
 
     def variables(self) -> Iterable[str]:
         """Return nothing, see `variable`."""
@@ -79,7 +87,7 @@ class NameValues:
 
     def word(self, name: str) -> object:
         """Return the value of a name."""
-        value = self.names[name][1]
+        value = self.names[name].value
         if isinstance(value, Quantity):
             return value.value
         return to_plain(value) if isinstance(value, Scalar | Sequence | tree.Mapping) else value

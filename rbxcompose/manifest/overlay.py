@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from operator import is_
 
 from rbxcompose.findings import Related, Report, Span, correction, kind, suggest
 from rbxcompose.manifest.history import History, Step
@@ -106,7 +107,7 @@ INCLUDE = "include"
 NAMED_MAPS = ("components", "muxes", "args", "places", "values", "missions", INCLUDE)
 """Sections whose keys are names that the user gives."""
 
-SETTABLE = (*NAMED_MAPS, "about", "bus", "diagnostics", "start")
+SETTABLE = (*NAMED_MAPS, "about", "body", "bus", "diagnostics", "start")
 """Sections that a path of `--set` may begin with."""
 
 SET = "--set"
@@ -118,8 +119,8 @@ _JOINED = ("components", "diagnostics", "missions", "muxes", "places", "values")
 def compose(
     base: Mapping, overlays: Iterable[tuple[Mapping, str]], report: Report, history: History | None = None
 ) -> Mapping:
-    """Return `base` changed by each overlay in turn; each comes with its name for findings ("profile 'tired'")."""
-    composed = settled(base, report)
+    """Return `base`, which is settled, changed by each overlay in turn; each comes with its name for findings."""
+    composed = base
     for overlay, name in overlays:
         composed = _Merge(name, report, history or History()).mapping(composed, _spelt_out(overlay), ())
     return composed
@@ -180,7 +181,7 @@ class _Merge:
         """Lay one entry over those of the map above it."""
         name = entry.key.text
         below = entries.get(name)
-        is_removal = isinstance(entry.value, Mapping) and entry.value.tag == REMOVE
+        is_removal = _is_removal(entry.value)
         if below is None:
             (self._nothing_to_remove if is_removal else self._add)(entries, entry, path)
         elif isinstance(below.value, Mapping) and isinstance(entry.value, Mapping) and not entry.value.tag:
@@ -250,7 +251,7 @@ class _Join(_Merge):
         other = self.history.layer(path)
         what = f"'{names[-1]}' of '{section}'" if names else f"'{section}'"
         message = f"{self.overlay} and {other} both bring {what}"
-        help_text = "rename one of the two instances"
+        help_text = "rename one of the two instances" if names else f"a robot has one '{section}': leave one out"
         if section == "muxes" and len(names) > 1:
             mux, *_, name = names
             message = f"{self.overlay} and {other} both bring '{name}' of mux '{mux}'"
@@ -275,23 +276,33 @@ def _settled(node: Node, report: Report) -> Node:
     A list keeps its `!replace`, which says that what is not in it any more was meant to go.
     """
     match node:
+        case Scalar():
+            return node
         case Mapping():
             return _settled_map(node, report)
         case NodeSequence(items=items):
-            return NodeSequence(tuple(_settled(item, report) for item in items), node.span, node.tag)
-    return node
+            inner = tuple(_settled(item, report) for item in items)
+            return node if all(map(is_, inner, items)) else replace(node, items=inner)
+
+
+def _is_removal(node: Node) -> bool:
+    return isinstance(node, Mapping) and node.tag == REMOVE
 
 
 def _settled_map(node: Mapping, report: Report) -> Mapping:
-    entries = {}
+    """Return a map without tags; the same object if there are none."""
+    changed: dict[str, Entry] = {}
     for name, entry in node.entries.items():
-        if isinstance(entry.value, Mapping) and entry.value.tag == REMOVE:
+        value = entry.value
+        if isinstance(value, Scalar):
+            continue
+        if _is_removal(value):
             message = f"'!remove' has nothing to remove '{name}' from"
-            report.add(NOT_AN_OVERLAY.at(entry.value.span, message, help="it belongs in a profile"))
-            entries[name] = Entry(entry.key, Scalar("", entry.value.span, filled=BROKEN))  # so that nobody misses it
-        else:
-            entries[name] = Entry(entry.key, _settled(entry.value, report))
-    return Mapping(entries, node.span)
+            report.add(NOT_AN_OVERLAY.at(value.span, message, help="it belongs in a profile"))
+            changed[name] = Entry(entry.key, Scalar("", value.span, filled=BROKEN))  # so that nobody misses it
+        elif (inner := _settled(value, report)) is not value:
+            changed[name] = Entry(entry.key, inner)
+    return Mapping({**node.entries, **changed}, node.span) if changed or node.tag else node
 
 
 def read_sets(
@@ -325,6 +336,10 @@ def _set_overlay(text: str, line: int, root: Mapping, report: Report) -> Mapping
     value = _set_value(value_text, line, len(written) + 1, report)
     if value is None:
         return None
+    if len(path) == 2 and path[0] in ("components", "muxes") and not _is_removal(value):
+        message = f"'{SET}' does not say what of '{path[1]}' to change"
+        report.add(BAD_SET.at(span, message, help=f"write {SET} {path[1]}.KEY=VALUE"))
+        return None
     for name in reversed(path):
         value = Mapping({name: Entry(Scalar(name, span), value)}, span)
     return value if isinstance(value, Mapping) else None
@@ -339,14 +354,19 @@ def _set_path(names: list[str], span: Span, root: Mapping, report: Report) -> li
         if not rest or rest[0] not in there:
             message = f"'{SET}' changes '{'.'.join(names)}', which the robot does not have"
             choices = there if section == names[0] else [*there, *SETTABLE]
-            fix = suggest(rest[0] if rest else "", choices, "a path begins with")
+            fix = in_section(names, root) or suggest(rest[0] if rest else "", choices, "a path begins with")
             report.add(NOTHING_TO_CHANGE.at(span, message, help=fix))
             return None
-        if len(rest) == 1 and section in ("components", "muxes"):
-            message = f"'{SET}' does not say what of '{rest[0]}' to change"
-            report.add(BAD_SET.at(span, message, help=f"write {SET} {rest[0]}.KEY=VALUE"))
-            return None
     return [section, *rest]
+
+
+def in_section(names: Sequence[str], root: Mapping) -> str:
+    """Return the help for a path that begins with a name of a section, not with the section; else nothing."""
+    for section in NAMED_MAPS:
+        named = root.get(section)
+        if isinstance(named, Mapping) and names[0] in named:
+            return f"did you mean '{section}.{'.'.join(names)}'?"
+    return ""
 
 
 def _set_value(text: str, line: int, column: int, report: Report) -> Node | None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Scalar
 
@@ -14,4 +12,4 @@ def part_span(scalar: Scalar, start: int, end: int) -> Span:
     if span.line != span.end_line or span.end_column - span.column != len(scalar.text) + 2 * quote:
         return span
     first = span.column + quote
-    return replace(span, column=first + start, end_column=first + max(end, start + 1))
+    return span._replace(column=first + start, end_column=first + max(end, start + 1))

@@ -62,25 +62,36 @@ class Texts(dict[str, str]):
 
 def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> tuple[Node | None, list[Finding]]:
     """Read one manifest and enter its text into `sources` under the name that findings show."""
-    data = _bytes(path, shown, sources)
+    text, findings = read_source(path, shown, sources)
+    return (None, findings) if text is None else read_text(text, shown)
+
+
+def read_source(
+    path: Path, shown: str, sources: MutableMapping[str, str], most: int = FILE_BYTES, what: str = "a manifest"
+) -> tuple[str | None, list[Finding]]:
+    """Read the text of one file and enter it into `sources`; None with what keeps it from being text.
+
+    `most` is the limit [B] of a file of this kind, `what` the kind in words.
+    """
+    data = _bytes(path, shown, sources, most, what)
     if isinstance(data, Finding):
         return None, [data]
     text, findings = _decode(data, shown)
     sources[shown] = text
-    return (None, findings) if findings else read_text(text, shown)
+    return (None, findings) if findings else (text, [])
 
 
-def _bytes(path: Path, shown: str, sources: MutableMapping[str, str]) -> bytes | Finding:
+def _bytes(path: Path, shown: str, sources: MutableMapping[str, str], most: int, what: str) -> bytes | Finding:
     if len(sources) >= FILES:
         return TOO_LARGE.at(None, f"'{shown}' would be file number {FILES + 1} of this robot, {FILES} are the limit")
     if isinstance(sources, Texts) and path in sources.unsaved:
         data = sources.unsaved[path].encode(errors="surrogatepass")
-    elif isinstance(saved := _saved(path, shown), Finding):
+    elif isinstance(saved := _saved(path, shown, most), Finding):
         return saved
     else:
         data = saved
-    if len(data) > FILE_BYTES:
-        return TOO_LARGE.at(None, f"'{shown}' is larger than {FILE_BYTES:,} bytes, the limit of a manifest")
+    if len(data) > most:
+        return TOO_LARGE.at(None, f"'{shown}' is larger than {most:,} bytes, the limit of {what}")
     if sum(map(len, sources.values())) + len(data) > ALL_BYTES:
         return TOO_LARGE.at(
             None, f"with '{shown}' the files of this robot are larger than {ALL_BYTES:,} bytes together"
@@ -88,13 +99,13 @@ def _bytes(path: Path, shown: str, sources: MutableMapping[str, str]) -> bytes |
     return data
 
 
-def _saved(path: Path, shown: str) -> bytes | Finding:
+def _saved(path: Path, shown: str, most: int) -> bytes | Finding:
     try:
         # A pipe without a writer must not hold us up, hence O_NONBLOCK before we know what it is.
         with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 return UNREADABLE.at(None, f"'{shown}' is no regular file")
-            return file.read(FILE_BYTES + 1)
+            return file.read(most + 1)
     except OSError as error:
         is_missing = error.errno == errno.ENOENT
         reason = "does not exist" if is_missing else f"cannot be read: {os.strerror(error.errno or 0)}"

@@ -18,6 +18,7 @@ from pydantic import BaseModel
 from rbxcompose.config import Place
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence, at
+from rbxcompose.plugins import BrokenPluginError
 from rbxcompose.sdk import registry
 from rbxcompose.sdk.ports import Port
 
@@ -260,7 +261,10 @@ def _type(component: Node | None) -> type[Any] | None:
     written = at(component, ("type",)) if component else None
     if not isinstance(written, Scalar) or written.text not in registry.component_names():
         return None
-    return registry.component_type(written.text)
+    try:
+        return registry.component_type(written.text)
+    except BrokenPluginError:  # told where the section is read
+        return None
 
 
 def _with(node: Mapping, key: str, change: Callable[[Node], Node]) -> Mapping:

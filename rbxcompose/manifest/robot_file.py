@@ -8,7 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.findings import Finding, Report
+from rbxcompose.manifest.body import read_body
 from rbxcompose.manifest.collection import paused_collection
+from rbxcompose.manifest.data import is_moderate
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.fill import fill
@@ -71,6 +73,7 @@ def _manifest(
     manifest = read_sections(root, file, sim, report, documents.files)
     return replace(
         manifest,
+        body=read_body(root, file, documents),
         parts=included_parts(composed.instances),
         include=include,
         history=composed.history,
@@ -96,7 +99,8 @@ def read_mission(
         return None
     header = {name: entry for name, entry in root.entries.items() if name in Header.model_fields}
     documents.check(Header, replace(root, entries=header))
-    return fill(root, names_of(robot, sim, environment or {}), report, runs=True)
+    filled = fill(root, names_of(robot, sim, environment or {}), report, runs=True)
+    return filled if is_moderate(filled.get("data"), "datum", report) else None
 
 
 def _name(root: Mapping) -> str:

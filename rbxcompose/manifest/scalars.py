@@ -28,8 +28,8 @@ def plain_value(scalar: Scalar) -> PlainValue:
     text = scalar.text
     if not scalar.plain:
         return text
-    if text in _WORDS:
-        return _WORDS[text]
+    if text[:1] not in _MAY_BE_NUMBER:
+        return _WORDS.get(text, text)
     form = _number_form(text)
     if not form or _trouble(text, form):
         return text
@@ -40,13 +40,15 @@ def plain_value(scalar: Scalar) -> PlainValue:
 
 def number_trouble(scalar: Scalar) -> str:
     """Return why the number that a scalar writes cannot be taken, in words after "this number"; else nothing."""
-    form = _number_form(scalar.text) if scalar.plain else ""
+    if scalar.text[:1] not in _MAY_BE_NUMBER or not scalar.plain:
+        return ""
+    form = _number_form(scalar.text)
     return _trouble(scalar.text, form) if form else ""
 
 
 def _number_form(text: str) -> str:
     """Return how a text writes a number (a group of `_NUMBER`), or nothing if it writes none."""
-    match = _NUMBER.fullmatch(text) if text[:1] in _MAY_BE_NUMBER else None
+    match = _NUMBER.fullmatch(text)
     return match.lastgroup or "" if match else ""
 
 

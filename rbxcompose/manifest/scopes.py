@@ -8,6 +8,7 @@ from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Related, Report, Span, kind
 from rbxcompose.manifest.arguments import Argument, read_argument
 from rbxcompose.manifest.fill import fill
+from rbxcompose.manifest.history import ROBOT_LAYER, History
 from rbxcompose.manifest.include import Instance
 from rbxcompose.manifest.layers import Composed, only
 from rbxcompose.manifest.names import Names, Typed, with_arguments
@@ -46,7 +47,8 @@ def fill_scopes(composed: Composed, names: Names, report: Report) -> tuple[Mappi
     """
     root = composed.root
     arguments = fill(only(root, "args"), names, report)
-    values = {name: _own_value(name, one, report) for name, one in _declared(arguments, report).items()}
+    declared = _declared(arguments, report)
+    values = {name: _own_value(name, one, composed.history, report) for name, one in declared.items()}
     names = with_arguments(names, values)
     include = fill(composed.include, names, report)
     for instance in reversed(composed.instances):  # what includes stands behind what it includes
@@ -64,15 +66,16 @@ def _declared(section: Mapping, report: Report) -> dict[str, tuple[Argument | No
     }
 
 
-def _own_value(name: str, declared: tuple[Argument | None, Span], report: Report) -> Typed:
+def _own_value(name: str, declared: tuple[Argument | None, Span], history: History, report: Report) -> Typed:
     argument, span = declared
     if argument is None:
-        return UNKNOWN, BROKEN
+        return Typed(UNKNOWN, BROKEN)
     if argument.default is None:
         message = f"the argument '{name}' has no value"
         report.add(NO_VALUE.at(span, message, help=f"give it a 'default:', or --set args.{name}=VALUE"))
-        return argument.type, BROKEN
-    return argument.type, argument.read(argument.default, report)
+        return Typed(argument.type, BROKEN)
+    is_given = history.layer(("args", name, "default")) != ROBOT_LAYER
+    return Typed(argument.type, argument.read(argument.default, report), argument.default.span if is_given else None)
 
 
 def _given_values(instance: Instance, names: Names, report: Report) -> dict[str, Typed]:
@@ -90,13 +93,13 @@ def _given_values(instance: Instance, names: Names, report: Report) -> dict[str,
     for name, (argument, span) in declared.items():
         node = given.get(name) or (argument.default if argument else None)
         if argument is None:
-            values[name] = (UNKNOWN, BROKEN)
+            values[name] = Typed(UNKNOWN, BROKEN)
         elif node is None:
             message = f"part '{instance.name}' needs a value for its argument '{name}'"
             related = [Related(span, "declared here")]
             help_text = f"give it one: 'with: {{{name}: ...}}'"
             report.add(NO_VALUE.at(instance.span, message, help=help_text, related=related))
-            values[name] = (argument.type, BROKEN)
+            values[name] = Typed(argument.type, BROKEN)
         else:
-            values[name] = (argument.type, argument.read(node, report))
+            values[name] = Typed(argument.type, argument.read(node, report), node.span if name in given else None)
     return values

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from rbxcompose.config import Config, Name, Place, Secret
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.components import read_component
+from rbxcompose.manifest.data import is_moderate
 from rbxcompose.manifest.files import resolve
 from rbxcompose.manifest.fill import SHOWN_SECRET
 from rbxcompose.manifest.models import (
@@ -27,7 +28,7 @@ from rbxcompose.manifest.models import (
     ValueModel,
 )
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, at, children
-from rbxcompose.manifest.validate import WRONG_TYPE, label_of, validate
+from rbxcompose.manifest.validate import WRONG_TYPE, is_valid, label_of, validate
 
 C = TypeVar("C", bound=Config)
 
@@ -66,25 +67,26 @@ def _text(root: Mapping, key: str) -> str:
 def _one(model: type[C], root: Mapping, key: str, report: Report) -> C:
     """Return a section that is one map; its defaults if it is missing or wrong."""
     node = root.get(key)
-    read = validate(model, node, (key,), report) if node is not None and not _is_empty(node) else None
+    read = validate(model, node, (key,), report) if node is not None and not is_empty(node) else None
     return read if read is not None else model()
 
 
-def _is_empty(node: Node) -> bool:
+def is_empty(node: Node) -> bool:
+    """Tell whether there is nothing behind the name of a section."""
     return isinstance(node, Scalar) and node.plain and not node.text
 
 
 def named_entries(root: Mapping, path: tuple[str, ...], report: Report) -> Iterator[tuple[str, Entry]]:
     """Yield the entries of a section by name, after a finding for each bad name."""
     node = at(root, path)
-    if node is None or _is_empty(node):
+    if node is None or is_empty(node):
         return
     if not isinstance(node, Mapping):
         message = f"'{path[-1]}' must be a map from names to what they are"
         report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
         return
     for name, entry in node.entries.items():
-        if validate(Name, replace(entry.key, plain=False), (*path, name), report) is not None:
+        if is_valid(Name, name) or validate(Name, replace(entry.key, plain=False), (*path, name), report) is not None:
             yield name, entry
 
 
@@ -122,6 +124,8 @@ def _missions(root: Mapping, file: Path, files: AnyMapping[str, Path], report: R
         if read is None or not isinstance(entry.value, Mapping):
             continue
         _refuse_secrets(entry.value, report)
+        if not is_moderate(entry.value.get("with"), "input", report):
+            continue
         span = entry.value.entries["file"].value.span
         path = resolve(read.file, files.get(span.file, file), span)
         if isinstance(path, Finding):
@@ -151,7 +155,7 @@ def _components(root: Mapping, places: dict[str, Place], report: Report) -> dict
 def _start(root: Mapping, missions: Collection[str], report: Report) -> str | None:
     """Return the name of the mission to start; None also if that mission has mistakes, which were said."""
     start, written = root.get("start"), root.get("missions")
-    if start is None or _is_empty(start):
+    if start is None or is_empty(start):
         return None
     name = validate(str, start, ("start",), report)
     is_broken = isinstance(written, Mapping) and name in written and name not in missions

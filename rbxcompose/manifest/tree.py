@@ -91,6 +91,16 @@ def size(node: Node) -> int:
     return total
 
 
+def is_larger(node: Node, most: int) -> bool:
+    """Tell whether a tree has more than `most` nodes below its root; it is not looked at any further."""
+    count, waiting = 0, [node]
+    while waiting and count <= most:
+        below = [child for _, child in children(waiting.pop())]
+        count += len(below)
+        waiting += below
+    return count > most
+
+
 def at(node: Node, path: Path) -> Node | None:
     """Return the node at `path`, or None if there is none."""
     found: Node | None = node

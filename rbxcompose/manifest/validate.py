@@ -165,6 +165,15 @@ def _adapter(model: Any) -> TypeAdapter[Any]:
     return TypeAdapter(model)
 
 
+def is_valid(model: Any, data: object) -> bool:
+    """Tell whether plain data are what `model` takes, without words on why not."""
+    try:
+        _adapter(model).validate_python(data, strict=True)
+    except ValidationError:
+        return False
+    return True
+
+
 def validate(
     model: type[T],
     node: Node,
@@ -331,7 +340,7 @@ def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails)
 
 def not_a_choice(span: Span, name: str, value: Node | None, choices: list[str]) -> Finding:
     """Return the finding for a value that is none of the few words that its key takes."""
-    written = value.text if isinstance(value, Scalar) else ""
+    written = str(value.text if value.filled is None else value.filled) if isinstance(value, Scalar) else ""
     if len(choices) == 1:
         label = "" if written else label_of(value)
         fix = correction(written, choices, span)

@@ -159,7 +159,10 @@ class Walk:
     def __init__(self, text: str, file: str) -> None:
         self.text = text
         self.file = file
-        self.lines = text.split("\n") if "#" in text else []
+        lines = enumerate(text.split("\n"), 1) if "#" in text else ()
+        self.commented = {number: line for number, line in lines if " #" in line}
+        self.may_repeat = "&" in text  # without an anchor there is no alias, and nothing to keep in mind
+        self.may_tag = "!" in text
         self.findings: list[Finding] = []
         self._done: dict[int, tuple[Node, int, int]] = {}  # by id: the node, how many nodes it has, how deep it is
         self._open: set[int] = set()  # ids of the nodes that are being walked, from the root to here
@@ -175,6 +178,8 @@ class Walk:
         return self._visit(node)[0]
 
     def _visit(self, node: yaml.Node) -> tuple[Node, int, int]:
+        if not self.may_repeat:
+            return self._read(node)
         if id(node) in self._open:
             self._refuse_alias(node, "this alias leads back to what it lies in")
             return Mapping({}, span_of(node, self.file)), 1, 1
@@ -221,7 +226,7 @@ class Walk:
         return anchor, anchor
 
     def _read(self, node: yaml.Node) -> tuple[Node, int, int]:
-        tag = self._tag(node)
+        tag = self._tag(node) if self.may_tag else ""
         if tag == REMOVE:
             return Mapping({}, span_of(node, self.file), REMOVE), 1, 1
         match node:
@@ -249,10 +254,11 @@ class Walk:
 
     def _scalar(self, node: yaml.ScalarNode) -> Scalar:
         scalar = Scalar(node.value, span_of(node, self.file), not node.style)
-        if len(scalar.text) > TEXT:
-            message = f"this text has {len(scalar.text):,} characters, {TEXT:,} are the limit"
+        text = scalar.text
+        if len(text) > TEXT:
+            message = f"this text has {len(text):,} characters, {TEXT:,} are the limit"
             self.add(TOO_LARGE.at(scalar.span, message))
-        if not scalar.text.isprintable() and (found := FORBIDDEN.search(scalar.text)):
+        if not text.isprintable() and (found := FORBIDDEN.search(text)):
             message = f"this text holds the character {code_point(found.group())}, which cannot be seen"
             self.add(CHARACTER.at(scalar.span, message))
         if trouble := number_trouble(scalar):
@@ -260,13 +266,13 @@ class Walk:
         return scalar
 
     def _check_comment(self, value: Node) -> None:
-        if isinstance(value, Scalar) and value.plain and value.span.end_line <= len(self.lines):
-            span = value.span
-            if found := _SWALLOWED.match(self.lines[span.end_line - 1], span.end_column - 1):
-                start, end = found.span(1)
-                place = Span(self.file, span.end_line, start + 1, span.end_line, end + 1)
-                help_text = "put quotes round the whole text, or a space behind the '#'"
-                self.add(HASH.at(place, "this is a comment, not part of the value", help=help_text))
+        span = value.span
+        line = self.commented.get(span.end_line) if isinstance(value, Scalar) and value.plain else None
+        if line is not None and (found := _SWALLOWED.match(line, span.end_column - 1)):
+            start, end = found.span(1)
+            place = Span(self.file, span.end_line, start + 1, span.end_line, end + 1)
+            help_text = "put quotes round the whole text, or a space behind the '#'"
+            self.add(HASH.at(place, "this is a comment, not part of the value", help=help_text))
 
     def _check_cut(self, items: list[yaml.Node]) -> None:
         """Find text with brackets that a comma inside `{}` or `[]` has cut in two."""
@@ -320,17 +326,18 @@ class Walk:
         return isinstance(value, Scalar) and value.plain and not value.text
 
     def _key(self, node: yaml.Node) -> Scalar | None:
-        span = span_of(node, self.file)
-        self._tag(node)
+        if self.may_tag:
+            self._tag(node)
         if not isinstance(node, yaml.ScalarNode):
-            self.add(NOT_A_KEY.at(span, "a key is one word", help="put quotes round it if it is text"))
+            help_text = "put quotes round it if it is text"
+            self.add(NOT_A_KEY.at(span_of(node, self.file), "a key is one word", help=help_text))
             return None
         key = self._scalar(node)
         if len(key.text) > KEY:
             message = f"this key has {len(key.text):,} characters, {KEY} are the limit"
-            self.add(TOO_LARGE.at(span, message))
+            self.add(TOO_LARGE.at(key.span, message))
         if not key.text:
-            self.add(NOT_A_KEY.at(span, "a key is missing before the colon"))
+            self.add(NOT_A_KEY.at(key.span, "a key is missing before the colon"))
         return key
 
     def _enter(self, entries: dict[str, Entry], entry: Entry) -> None:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import yaml
 
-from rbxcompose.findings import Finding, Fix, Related, Span, kind, replacement
+from rbxcompose.findings import Edit, Finding, Fix, Related, Span, kind, replacement
 from rbxcompose.plain import plain
 
 QUOTES_NEEDED = kind(
@@ -49,6 +48,8 @@ match: [battery, charger]
 QUOTE_HELP = "put quotes round this"
 
 _NO_SIGIL = "@`%>|"  # at the beginning of a text; `&`, `*` and `!` may have been meant as such
+_ITEM = re.compile(r" *(- +)*")
+_TIGHT_DASH = re.compile(r"( *)-([a-z][a-z0-9_]*)(?=: |:? *$)")
 _CLOSES = {"sequence": ("list", "[", "]"), "mapping": ("map", "{", "}")}
 
 
@@ -114,10 +115,45 @@ def explain(error: yaml.YAMLError, text: str, file: str) -> Finding:
     if not isinstance(error, yaml.MarkedYAMLError):
         return NOT_YAML.at(Span(file, 1, 1, 1, 2), "this file cannot be read as YAML")
     trouble = _Trouble(error, text, file)
+    if tight := _tight_dashes(trouble):
+        return tight
     for words, answer in _ANSWERS:
         if words in trouble.problem or words in trouble.context:
             return answer(trouble)
     return NOT_YAML.at(trouble.here, "this is not valid YAML", label=plain(trouble.problem))
+
+
+def _tight_dashes(trouble: _Trouble) -> Finding | None:
+    """Return the finding for dashes without a space, in the column in which the parser met with trouble."""
+    near = {line for line in (trouble.line, trouble.opening.line - 1) if line < len(trouble.lines)}
+    indents = {len(found[1]) for line in near if (found := _TIGHT_DASH.match(trouble.lines[line]))}
+    if not indents or "block scalar" in trouble.context:
+        return None
+    tight = [
+        (line, found) for line in _siblings(trouble, indents.pop()) if (found := _TIGHT_DASH.match(trouble.lines[line]))
+    ]
+    edits = []
+    for line, found in tight:
+        place = Span(trouble.file, line + 1, len(found[1]) + 1, line + 1, found.end() + 1)
+        edits.append(Edit(place, f"-{found[2]}", f"- {found[2]}"))
+    first = edits[0]
+    fix = Fix(tuple(edits), True, f"'{first.old}' -> '{first.text}'")
+    message = "a space is missing behind this dash"
+    return NOT_YAML.at(first.span, message, help=f"write '{first.text}'", fix=fix)
+
+
+def _siblings(trouble: _Trouble, indent: int) -> list[int]:
+    """Return the lines around the trouble that begin in a column, as far as no line begins before it."""
+    first = last = min(trouble.line, len(trouble.lines) - 1)
+    while first > 0 and not _leaves(trouble.lines[first - 1], indent):
+        first -= 1
+    while last + 1 < len(trouble.lines) and not _leaves(trouble.lines[last + 1], indent):
+        last += 1
+    return [line for line in range(first, last + 1) if _indent(trouble.lines[line]) == indent]
+
+
+def _leaves(line: str, indent: int) -> bool:
+    return bool(line.strip()) and _indent(line) < indent
 
 
 def _colon(trouble: _Trouble) -> Finding:
@@ -127,6 +163,10 @@ def _colon(trouble: _Trouble) -> Finding:
         span = trouble.to_line_end(key.end())
         message = "text with a colon and a space needs quotes"
         return QUOTES_NEEDED.at(span, message, label=QUOTE_HELP, fix=trouble.quoting(span))
+    above = trouble.lines[trouble.line - 1] if trouble.line else ""
+    item = _ITEM.match(above)
+    if item and (tight := _tight_colon(trouble, trouble.line - 1, item.end())):
+        return tight
     if found := _step_above(trouble):
         step, value = found
         word = trouble.lines[step.line - 1][step.column - 1 : step.end_column - 1]
@@ -209,18 +249,28 @@ def _after_value(trouble: _Trouble) -> Finding:
 
 def _missing_dash(trouble: _Trouble) -> Finding:
     begun = (Related(trouble.opening, "the list begins here"),)
-    return NOT_YAML.at(trouble.here, "this stands in a list and has no dash", help="put a dash here", related=begun)
+    key = re.match(r" *([a-z][a-z0-9_]*):", trouble.line_text)
+    help_text = "put a dash here"
+    if key:
+        help_text = f"move it right if it belongs to the item above; put a dash here if '{key[1]}' is one of its own"
+    return NOT_YAML.at(trouble.here, "this stands in a list and has no dash", help=help_text, related=begun)
 
 
 def _missing_colon(trouble: _Trouble) -> Finding:
     trouble.line = trouble.opening.line - 1
     span = trouble.to_line_end(trouble.opening.column - 1)
-    tight = re.match(r"[a-z][a-z0-9_]*:(?!//)(?=\S)", trouble.line_text[span.column - 1 :])
-    if tight:
-        colon = replace(span, end_column=span.column + tight.end())
-        fix = replacement(colon, tight[0], f"{tight[0]} ")
-        return NOT_YAML.at(colon, "a space is missing behind this colon", help="write 'key: value'", fix=fix)
-    return NOT_YAML.at(span, "a colon is missing after this key", help="write 'key: value'")
+    tight = _tight_colon(trouble, trouble.line, span.column - 1)
+    return tight or NOT_YAML.at(span, "a colon is missing after this key", help="write 'key: value'")
+
+
+def _tight_colon(trouble: _Trouble, line: int, column: int) -> Finding | None:
+    """Return the finding for a key with a colon and no space behind it, if one begins there."""
+    tight = re.match(r"[a-z][a-z0-9_]*:(?!//)(?=\S)", trouble.lines[line][column:])
+    if tight is None:
+        return None
+    colon = Span(trouble.file, line + 1, column + 1, line + 1, column + tight.end() + 1)
+    fix = replacement(colon, tight[0], f"{tight[0]} ")
+    return NOT_YAML.at(colon, "a space is missing behind this colon", help="write 'key: value'", fix=fix)
 
 
 def _list_on_key_line(trouble: _Trouble) -> Finding:

@@ -10,7 +10,7 @@ from rbxcompose.findings import Related, Span
 from rbxcompose.manifest.tree import at
 from rbxcompose.missions.bounds import Bounds, truth
 from rbxcompose.missions.program import Asked
-from rbxcompose.missions.views import NodeScope, base_names, views
+from rbxcompose.missions.views import NodeScope, base_scope, views
 from rbxcompose.missions.watching import POSE
 from rbxcompose.model.charging import batteries, constants
 from rbxcompose.model.robot import Robot, RobotMission
@@ -38,7 +38,7 @@ def _conditions(robot: Robot, mission: RobotMission) -> Iterator[tuple[Asked, No
     program, names = mission.program, robot.names
     for view in views(program, names):
         yield from ((asked, view.scope) for asked in view.node.asked if asked.wanted == FLAG)
-    base = NodeScope(base_names(program, names), names.places)
+    base = base_scope(program, names)
     yield from ((interrupt.when, base) for interrupt in program.interrupts)
 
 

@@ -8,15 +8,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rbxcompose.config import Config
+from rbxcompose.diagnostics.levels import LOG_LEVELS
 from rbxcompose.findings import Report
-from rbxcompose.manifest.models import ComponentEntry, ComponentOptions, RobotManifest
-from rbxcompose.missions.goals import skill_of
-from rbxcompose.missions.sources import SkillSource, ValueSource
+from rbxcompose.manifest.models import DESCRIPTION, ComponentEntry, ComponentOptions, RobotManifest
+from rbxcompose.missions.messages import sent_by
+from rbxcompose.missions.sources import ValueSource
 from rbxcompose.model.missions import read_missions
-from rbxcompose.model.robot import Part, Robot, RobotMission
+from rbxcompose.model.robot import Part, Robot
+from rbxcompose.model.skills import names_of_skills, services_of, skills_of, topics_of
 from rbxcompose.model.values import value_of
 from rbxcompose.model.wiring import End, ends_of, readers, resolve
-from rbxcompose.sdk.ports import Out, ServesAction
+from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type
 
 MUX = "mux"
@@ -31,11 +33,13 @@ def build_robot(
     """Return the whole robot; what is wrong with its mission files goes into `report`."""
     written = written_parts(manifest)
     parts = {**written, **own_parts(manifest, written)}
-    values, skills = values_of(manifest, parts), skills_of(parts)
-    missions = read_missions(manifest, environment, report, sources)
+    values, topics, services = values_of(manifest, parts), topics_of(manifest, parts), services_of(manifest, parts)
+    missions = read_missions(manifest, environment, report, sources, names_of_skills(parts))
+    skills = skills_of(parts, [one.program for one in missions.read.values()])
+    robot = Robot(manifest, parts, values, skills, missions.read, missions.unread, topics, services)
     if manifest.missions:
-        parts[MISSION] = mission_part(manifest, missions, values, skills)
-    return Robot(manifest, parts, values, skills, missions)
+        parts[MISSION] = mission_part(robot)
+    return robot
 
 
 def written_parts(manifest: RobotManifest) -> dict[str, Part]:
@@ -52,29 +56,39 @@ def written_parts(manifest: RobotManifest) -> dict[str, Part]:
 
 
 def own_parts(manifest: RobotManifest, written: Mapping[str, Part]) -> dict[str, Part]:
-    """Return the parts that every robot runs beside those that its user wrote, but for the one that runs missions."""
-    names = [*written, *ALWAYS, *([MISSION] if manifest.missions else [])]
+    """Return the parts that robots run beside those that their user wrote, but for the one that runs missions."""
+    description = _description(manifest)
+    names = [*written, *ALWAYS, *description, *([MISSION] if manifest.missions else [])]
     analyzers = {name: one.model_dump(exclude_none=True) for name, one in manifest.diagnostics.analyzers.items()}
     return {
         "transforms": _own(manifest, "transforms", {}),
         "diagnostics": _own(manifest, "diagnostics", {"analyzers": analyzers, "expected": names}),
+        **description,
     }
 
 
-def mission_part(
-    manifest: RobotManifest,
-    missions: Mapping[str, RobotMission],
-    values: Mapping[str, ValueSource],
-    skills: Mapping[str, SkillSource],
-) -> Part:
+def _description(manifest: RobotManifest) -> dict[str, Part]:
+    """Return the part that publishes what the body is, if there is one."""
+    if manifest.body is None:
+        return {}
+    config = component_type(DESCRIPTION).config_type()(**{"urdf": manifest.body.text})
+    return {DESCRIPTION: _part(manifest, DESCRIPTION, DESCRIPTION, config, {}, ("body", "urdf"))}
+
+
+def mission_part(robot: Robot) -> Part:
     """Return the part that runs the missions."""
+    manifest, missions = robot.manifest, robot.missions
+    programs = {name: mission.program for name, mission in missions.items()}
+    published, called = sent_by(programs.values())
     config = {
-        "programs": {name: mission.program for name, mission in missions.items()},
+        "programs": programs,
         "start": manifest.start if manifest.start in missions else None,
         "inputs": {name: dict(mission.inputs) for name, mission in missions.items()},
-        "values": values,
+        "values": robot.values,
         "places": manifest.places,
-        "skills": skills,
+        "skills": robot.skills,
+        "topics": {name: topic for name, topic in robot.topics.items() if name in published},
+        "services": {name: service for name, service in robot.services.items() if name in called},
     }
     return _own(manifest, MISSION, config)
 
@@ -96,7 +110,8 @@ def _part(
     cls = component_type(type_name)
     ends = ends_of(name, cls, config, manifest.bus.namespace or "", connect)
     process = options.process or cls.process
-    return Part(name, type_name, cls, config, process, options.starts_after, ends, path, options.restart)
+    log = LOG_LEVELS[options.log]
+    return Part(name, type_name, cls, config, process, options.starts_after, ends, path, options.restart, log)
 
 
 def _mux_sources(manifest: RobotManifest) -> dict[str, dict[str, str]]:
@@ -128,7 +143,7 @@ def _mux(manifest: RobotManifest, name: str, parts: Mapping[str, Part]) -> Part:
     config: dict[str, object] = {
         "output": name,
         "message": _message(name, ends, manifest.bus.namespace or ""),
-        "inputs": {key: {"priority": one.priority, "timeout": one.timeout} for key, one in entry.inputs.items()},
+        "inputs": {key: one.model_dump(exclude={"source"}, exclude_unset=True) for key, one in entry.inputs.items()},
         "locks": {key: {"priority": one.priority, "timeout": one.timeout} for key, one in entry.locks.items()},
     }
     return _part(manifest, name, MUX, component_type(MUX).config_type()(**config), {}, ("muxes", name))
@@ -142,21 +157,9 @@ def _message(mux: str, ends: list[End], namespace: str) -> str:
     return next((end.type_name for end in [*heard, *sources]), "geometry_msgs/msg/Twist")
 
 
-def skills_of(parts: Mapping[str, Part]) -> dict[str, SkillSource]:
-    """Return the skills that the parts offer: each action is one, named like its topic."""
-    found: dict[str, SkillSource] = {}
-    for part in parts.values():
-        for end in part.ends:
-            if isinstance(end.port, ServesAction) and end.port.interface is not None:
-                name = end.topic.rsplit("/", 1)[-1]
-                skill = skill_of(end.port.interface, name, end.port.claims, end.port.restartable)
-                found.setdefault(name, SkillSource(skill, end.type_name, end.topic))
-    return found
-
-
 def values_of(manifest: RobotManifest, parts: Mapping[str, Part]) -> dict[str, ValueSource]:
     """Return the values whose source is there."""
     ends = [end for part in parts.values() for end in part.ends]
-    namespace = manifest.bus.namespace or ""
-    found = {name: value_of(entry, parts, ends, namespace) for name, entry in manifest.values.items()}
+    namespace, groups = manifest.bus.namespace or "", tuple(manifest.diagnostics.analyzers)
+    found = {name: value_of(entry, parts, ends, namespace, groups) for name, entry in manifest.values.items()}
     return {name: value for name, value in found.items() if value is not None}

@@ -75,7 +75,7 @@ def ways_of(robot: Robot, mission: RobotMission) -> Ways | None:
     if len(found) > 1:
         return None
     skill, driver = found[0]
-    parts = [driver, *(base for one, base in Flow.of(robot).drives() if one is driver)]
+    parts = [driver, *(base for one, base in Flow(robot).drives() if one is driver)]
     speed = min(limit for part in parts for name in ("speed", "max_speed") if (limit := setting(part, name)))
     driving = Driving(skill, robot.skills[skill].skill.main, speed, setting(driver, "tolerance") or 0.0)
     return Ways(mission.program, driving, robot.manifest.places)

@@ -3,39 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import at
 from rbxcompose.model.robot import Part, Robot
 from rbxcompose.model.wiring import End
-from rbxcompose.sdk.ports import In, Out
+from rbxcompose.sdk.ports import In
 
 MUX = "mux"
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Flow:
-    """The ends of all topics of a robot, by topic."""
+    """Which messages of a robot reach whom."""
 
     robot: Robot
-    writers: dict[str, list[End]] = field(default_factory=dict)
-    readers: dict[str, list[End]] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, robot: Robot) -> Flow:
-        """Sort the ends of a robot by their topic."""
-        made = cls(robot)
-        for end in robot.ends:
-            if isinstance(end.port, Out):
-                made.writers.setdefault(end.topic, []).append(end)
-            elif isinstance(end.port, In):
-                made.readers.setdefault(end.topic, []).append(end)
-        return made
 
     def sources(self, end: End) -> Iterator[End]:
         """Yield the outputs whose messages reach an input; of a mux, those that it may let through."""
-        for writer in self.writers.get(end.topic, ()):
+        for writer in self.robot.writers.get(end.topic, ()):
             part = self.robot.parts[writer.instance]
             if part.type_name != MUX:
                 yield from [writer] if writer.type_name == end.type_name else []

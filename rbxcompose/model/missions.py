@@ -1,21 +1,38 @@
-"""Missions on this robot: their programs and their inputs."""
+"""Missions on this robot: their programs and their inputs; all are read before any is checked."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 
 from rbxcompose.findings import Report
 from rbxcompose.manifest.models import RobotManifest
 from rbxcompose.manifest.robot_file import read_mission
 from rbxcompose.missions.inputs import bind_inputs
 from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.using import Using
 from rbxcompose.model.robot import RobotMission
 
 
+@dataclass(frozen=True, slots=True)
+class Missions:
+    """The missions that could be read, and the names of those that others cannot `use`: unread, or in a circle."""
+
+    read: Mapping[str, RobotMission] = field(default_factory=dict)
+    unread: frozenset[str] = frozenset()
+
+
 def read_missions(
-    manifest: RobotManifest, environment: Mapping[str, str], report: Report, sources: dict[str, str]
-) -> dict[str, RobotMission]:
-    """Read the robot's mission files; one with mistakes is kept as far as it could be read."""
+    manifest: RobotManifest,
+    environment: Mapping[str, str],
+    report: Report,
+    sources: dict[str, str],
+    skills: Collection[str],
+) -> Missions:
+    """Read the robot's mission files; one with mistakes is kept as far as it could be read.
+
+    `skills` are the names of all skills that there are.
+    """
     found: dict[str, RobotMission] = {}
     for name, entry in manifest.missions.items():
         root = read_mission(
@@ -26,9 +43,12 @@ def read_missions(
             sim=manifest.is_simulated,
             environment=environment,
         )
-        program = read_program(root, report) if root else None
+        program = read_program(root, report, skills) if root else None
         if program is not None:
-            inputs, findings = bind_inputs(program, entry.with_.entries, manifest.places, entry.span)
+            gone = manifest.history.removed("places")
+            inputs, findings = bind_inputs(program, entry.with_.entries, manifest.places, entry.span, gone)
             report.extend(findings)
             found[name] = RobotMission(name, program, inputs)
-    return found
+    using = Using({name: one.program for name, one in found.items()})
+    report.extend(using.findings)
+    return Missions(found, frozenset((manifest.missions.keys() - found.keys()) | using.broken))

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from rbxcompose.config import Config
+from rbxcompose.diagnostics.levels import Level
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span
 from rbxcompose.manifest.models import RobotManifest
 from rbxcompose.manifest.tree import Mapping, Path, at, key_span, value_span
 from rbxcompose.missions.program import Program, RobotNames
-from rbxcompose.missions.sources import SkillSource, ValueSource
+from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource
 from rbxcompose.model.wiring import End
 from rbxcompose.restarts import DEFAULT, Restart
 from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.ports import In, Out
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +35,7 @@ class Part:
     ends: tuple[End, ...]
     path: Path = ()
     restart: Restart = DEFAULT
+    log: Level = Level.OK  # the least of what goes to the log
 
     def end(self, port: str) -> End | None:
         """Return the end of a port, or None."""
@@ -47,7 +51,7 @@ class RobotMission:
     inputs: AnyMapping[str, object] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class Robot:
     """What the checks look at; parts stand in the order of the manifest."""
 
@@ -56,22 +60,40 @@ class Robot:
     values: AnyMapping[str, ValueSource]
     skills: AnyMapping[str, SkillSource]
     missions: AnyMapping[str, RobotMission]
+    unread: frozenset[str] = frozenset()  # missions that no other can use: not read, or in a circle
+    topics: AnyMapping[str, TopicSource] = field(default_factory=dict)  # on which missions may publish
+    services: AnyMapping[str, str] = field(default_factory=dict)  # that missions may call, with their ROS types
 
-    @property
+    @cached_property
     def names(self) -> RobotNames:
         """Return what the robot gives to its missions."""
         return RobotNames(
             values={name: self.values[name].type if name in self.values else UNKNOWN for name in self.manifest.values},
             places=self.manifest.places,
+            removed=self.manifest.history.removed("places"),
             skills={name: source.skill for name, source in self.skills.items()},
+            missions={name: one.program for name, one in self.missions.items() if name not in self.unread},
+            topics={name: topic.message for name, topic in self.topics.items()},
+            services=self.services,
+            unread=self.unread,
             is_complete=self.written <= self.parts.keys(),
         )
 
-    @property
+    @cached_property
     def written(self) -> frozenset[str]:
         """Return the names of all components and muxes that the manifest has, also of those with mistakes."""
         sections = (self.manifest.root.get(section) for section in ("components", "muxes"))
         return frozenset(name for one in sections if isinstance(one, Mapping) for name in one.entries)
+
+    @cached_property
+    def writers(self) -> AnyMapping[str, list[End]]:
+        """Return who publishes, by topic."""
+        return _by_topic(end for end in self.ends if isinstance(end.port, Out))
+
+    @cached_property
+    def readers(self) -> AnyMapping[str, list[End]]:
+        """Return who subscribes, by topic."""
+        return _by_topic(end for end in self.ends if isinstance(end.port, In))
 
     @property
     def ends(self) -> Iterator[End]:
@@ -95,3 +117,10 @@ class Robot:
     def part_span(self, name: str) -> Span:
         """Return the place of the name of a part."""
         return key_span(self.manifest.root, self.parts[name].path)
+
+
+def _by_topic(ends: Iterable[End]) -> AnyMapping[str, list[End]]:
+    found: dict[str, list[End]] = {}
+    for end in ends:
+        found.setdefault(end.topic, []).append(end)
+    return found

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
-from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, quantity_of
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, choice_of, quantity_of
 from rbxcompose.manifest.models import Value as ValueEntry
 from rbxcompose.missions.sources import ValueSource
 from rbxcompose.model.robot import Part
@@ -16,13 +17,23 @@ from rbxcompose.units import UNITS
 # The message that carries data from outside, where nobody in the robot says which it is.
 STANDARD = {"text": "std_msgs/msg/String", "flag": "std_msgs/msg/Bool", "count": "std_msgs/msg/Int32"}
 NUMBER = "std_msgs/msg/Float32"
+DIAGNOSTICS = "diagnostics"  # the component whose groups have levels
+LEVELS_TOPIC, LEVELS_TYPE = "/diagnostics_agg", "diagnostic_msgs/msg/DiagnosticArray"
+LEVEL_WORDS = tuple(level.name.lower() for level in Level)
 DATA = "data"  # the field of the standard messages
 
 
-def value_of(entry: ValueEntry, parts: Mapping[str, Part], ends: Iterable[End], namespace: str) -> ValueSource | None:
-    """Return what a value is, or None if its source is not there (a check says so)."""
+def value_of(
+    entry: ValueEntry, parts: Mapping[str, Part], ends: Iterable[End], namespace: str, groups: Collection[str] = ()
+) -> ValueSource | None:
+    """Return what a value is, or None if its source is not there (a check says so).
+
+    `groups` are those of the diagnostics, whose levels are values as well.
+    """
     if entry.port is not None:
         component, _, port = entry.port.partition(".")
+        if component == DIAGNOSTICS and port in groups:
+            return ValueSource(LEVELS_TOPIC, LEVELS_TYPE, "level", type=choice_of(*LEVEL_WORDS), group=port)
         end = parts[component].end(port) if component in parts else None
         return _of_port(end, entry.unit) if end else None
     if entry.topic is None:
@@ -45,9 +56,9 @@ def _of_port(end: End, unit: str | None) -> ValueSource | None:
 
 def _value(topic: str, message: str, field: str, unit: str, declared: Type | None) -> ValueSource:
     known = UNITS.get(unit)
-    scale = known.to_si(1.0) if known else 1.0
+    times, per = (known.times, known.per) if known else (1.0, 1.0)
     measured = quantity_of(known.dimension) if known else _plain_type(message, field)
-    return ValueSource(topic, message, field, scale, declared or measured)
+    return ValueSource(topic, message, field, times, per, declared or measured)
 
 
 def _plain_type(message: str, field: str) -> Type:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Iterator
 
 from rbxcompose.edits import safe_fixes
 from rbxcompose.findings import Finding, Related, Report, Severity, Sources, Span
 from rbxcompose.formats import output_format
-from rbxcompose.plain import plain
+from rbxcompose.plain import columns, plain
 
 MOST_SHOWN = 20
 _LINE_CELLS = 160  # of a source line; of a longer one only what surrounds the caret is shown
@@ -98,8 +97,8 @@ def _caret(span: Span, source: str, label: str, severity: Severity, paint: _Pain
     before, after = "..." if first else "", "..." if len(source) > last else ""
     cells = [_cell(character) for character in source[first:last]]
     text = before + "".join(cells) + after
-    indent = _width(before) + sum(map(_width, cells[: start - first]))
-    carets = "^" * max(1, sum(map(_width, cells[start - first : max(end, start + 1) - first])))
+    indent = columns(before) + sum(map(columns, cells[: start - first]))
+    carets = "^" * max(1, sum(map(columns, cells[start - first : max(end, start + 1) - first])))
     number = str(span.line)
     yield f"{paint('gutter', number + ' |')} {text}".rstrip()
     pointer = paint(severity, f"{carets} {label}".rstrip())
@@ -109,14 +108,3 @@ def _caret(span: Span, source: str, label: str, severity: Severity, paint: _Pain
 def _cell(character: str) -> str:
     """Return what is shown for one character of a source line."""
     return "    " if character == "\t" else plain(character)
-
-
-def _width(text: str) -> int:
-    """Return how many columns of a terminal a text takes."""
-    return sum(_columns(character) for character in text)
-
-
-def _columns(character: str) -> int:
-    if unicodedata.combining(character) or unicodedata.category(character) in ("Mn", "Me", "Cf"):
-        return 0
-    return 2 if unicodedata.east_asian_width(character) in ("W", "F") else 1

@@ -12,9 +12,10 @@ from pydantic import ValidationError
 from rbxcompose.config import Config, Place
 from rbxcompose.expressions.functions import FUNCTIONS
 from rbxcompose.findings import suggest
-from rbxcompose.missions.modifiers import MODIFIERS
+from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.registry import kinds
 from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.plugins import BrokenPluginError
 from rbxcompose.scaffold.answers import ANSWER, AnswerError, read_place
 from rbxcompose.scaffold.texts import render
 from rbxcompose.sdk.component import Component
@@ -85,7 +86,7 @@ def read_places(texts: Sequence[str]) -> tuple[Place, ...]:
 
 def read_next_place(text: str, before: Sequence[Place]) -> Place:
     """Return one more place than those before it, as `read_places` does."""
-    taken = {DOCK.name, *_USED, *_WORDS, *MODIFIERS, *kinds(), *FUNCTIONS, *(place.name for place in before)}
+    taken = {DOCK.name, *_USED, *_WORDS, *modifier_keys(), *kinds(), *FUNCTIONS, *(place.name for place in before)}
     place = read_place(text, taken)
     for other in (DOCK, *before):
         if math.hypot(place.x - other.x, place.y - other.y) < 0.1:  # [m], twice the tolerance of `go_to`
@@ -104,7 +105,10 @@ def read_base(name: str) -> str:
     if name not in component_names():
         help_text = suggest(name, component_names(), "component types")
         raise AnswerError(ANSWER.at(None, f"there is no component type '{name}'", help=help_text))
-    base = component_type(name)
+    try:
+        base = component_type(name)
+    except BrokenPluginError as error:
+        raise AnswerError(ANSWER.at(None, str(error), help=f"take '{BASE}'")) from error
     try:
         config = base.config_type().model_validate({})
     except ValidationError:

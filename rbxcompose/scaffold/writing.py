@@ -48,7 +48,8 @@ def write_new(folder: Path, files: Mapping[str, str]) -> Finding | None:
         message = f"'{plain(str(error.filename or folder))}' cannot be written: {error.strerror}"
         return NOT_WRITTEN.at(None, message, help="nothing was written")
     for temporary, _ in waiting:
-        temporary.unlink()
+        with suppress(OSError):  # all is written; one more name of it does no harm
+            temporary.unlink()
     return None
 
 

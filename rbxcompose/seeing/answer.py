@@ -33,11 +33,12 @@ class Layer:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """An argument that a value was filled in from."""
+    """An argument that a value was filled in from; `below` are the layers whose values it took the place of."""
 
     name: str
     value: str
     origin: Origin | None
+    below: tuple[Layer, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +84,9 @@ class Answer:
             place = f"  {source.origin.comment}" if source.origin else ""
             is_or_has = "=" if source.origin else "has"
             yield "" if index else "from", f"{source.name} {is_or_has} {plain(source.value)}{place}"
+            for layer in reversed(source.below):
+                origin = Origin(layer.span, layer.name)
+                yield "", f"  in the place of {plain(layer.value or 'nothing')}  {origin.comment}"
         yield from self.hints
 
     def _layer_rows(self) -> Iterator[str]:
@@ -101,13 +105,22 @@ class Answer:
             "si": self.si,
             "unit": si_unit(self.dimension) if self.dimension else "",
             "is_default": self.is_default,
-            "layers": [{"layer": one.name, "value": one.value, **_placed(one.span)} for one in self.layers],
+            "layers": _as_data(self.layers),
             "filled_in_from": [
-                {"name": one.name, "value": one.value, **(_placed(one.origin.span) if one.origin else {})}
+                {
+                    "name": one.name,
+                    "value": one.value,
+                    **(_placed(one.origin.span) if one.origin else {}),
+                    "below": _as_data(one.below),
+                }
                 for one in self.sources
             ],
             "more": dict(self.hints),
         }
+
+
+def _as_data(layers: tuple[Layer, ...]) -> list[dict[str, Any]]:
+    return [{"layer": one.name, "value": one.value, **_placed(one.span)} for one in layers]
 
 
 def _where(layer: Layer) -> str:

@@ -6,6 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from rbxcompose.bus.names import resolve
+from rbxcompose.missions.messages import sent_by
+from rbxcompose.missions.sources import Way
 from rbxcompose.missions.watching import POSE
 from rbxcompose.model.robot import Part, Robot, RobotMission
 from rbxcompose.model.wiring import End
@@ -32,6 +35,9 @@ class Line(StrEnum):
     SERVICE = "service"
     ACTION = "action"
     LOOK_UP = "look-up"
+
+
+_LINES = {Way.ACTION: Line.ACTION, Way.SERVICE: Line.SERVICE}  # by which a mission reaches its skills
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,10 +198,21 @@ def _note(robot: Robot, part: Part, end: End) -> str:
 
 
 def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tuple[Line, str], _Open]) -> None:
-    """Add what a mission uses: its skills are actions, its values are topics."""
+    """Add what a mission uses: actions, services and topics. A skill in Python runs in the mission itself."""
+
+    def lead(kind: Line, topic: str, type_name: str) -> None:
+        found.setdefault((kind, topic), _Open(kind, type_name)).sources.append(Tip(key))
+
     for skill in sorted({node.skill for node in mission.program.nodes} & robot.skills.keys()):
         source = robot.skills[skill]
-        found.setdefault((Line.ACTION, source.topic), _Open(Line.ACTION, source.action)).sources.append(Tip(key))
+        if source.way in _LINES:
+            lead(_LINES[source.way], source.topic, source.action)
+    published, called = sent_by([mission.program])
+    space = robot.manifest.bus.namespace or ""
+    for name in sorted(published & robot.topics.keys()):
+        lead(Line.TOPIC, resolve(name, space), robot.topics[name].message)
+    for name in sorted(called & robot.services.keys()):
+        lead(Line.SERVICE, resolve(name, space), robot.services[name])
     for name in sorted(mission.program.reads() & robot.values.keys()):
         value = robot.values[name]
         wire = found.setdefault((Line.TOPIC, value.topic), _Open(Line.TOPIC, value.message))

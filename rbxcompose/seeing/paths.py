@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.models import RobotFile, RobotManifest
-from rbxcompose.manifest.overlay import INCLUDE
+from rbxcompose.manifest.overlay import INCLUDE, in_section
 from rbxcompose.manifest.tree import Mapping, Node, Path, Sequence, at
 from rbxcompose.model.robot import Robot
 from rbxcompose.plain import plain
@@ -68,7 +68,10 @@ def no_such_path(robot: Robot, path: Path, guide: Guide) -> Finding:
         valid |= {end.name for end in robot.parts[str(above[1])].ends}
     if isinstance(node, Sequence):
         valid = {str(index) for index in range(len(node.items))}
-    return NO_SUCH_PATH.misspelt(None, f"{place} has no '{plain(name, 60)}'", name, sorted(valid), "what it has")
+    message = f"{place} has no '{plain(name, 60)}'"
+    if above == ("components",) and (meant := in_section([str(key) for key in path[1:]], robot.manifest.root)):
+        return NO_SUCH_PATH.at(None, message, help=meant)
+    return NO_SUCH_PATH.misspelt(None, message, name, sorted(valid), "what it has")
 
 
 def is_known(manifest: RobotManifest, guide: Guide, path: Path) -> bool:

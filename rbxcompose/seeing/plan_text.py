@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from rbxcompose.plan.model import Instance, Plan, Wire
+from rbxcompose.diagnostics.levels import Level, log_word
+from rbxcompose.plan.model import Instance, Plan, Wire, extent
 from rbxcompose.restarts import Restart
 from rbxcompose.sdk.ports import Looks, Port
 from rbxcompose.sdk.registry import component_type
@@ -21,7 +22,7 @@ def plan_text(plan: Plan) -> str:
 
 def _lines(plan: Plan) -> Iterator[str]:
     how = "simulated" if plan.is_simulated else "real devices"
-    yield f"{plan.robot}: {len(plan.instances)} components in {len(plan.groups)} processes, {how}"
+    yield f"{plan.robot}: {extent(len(plan.instances), len(plan.groups))}, {how}"
     yield from (f"  {label:<8}{text}" for label, text in _facts(plan))
     order = {instance.name: number for number, instance in enumerate(plan.instances, 1)}
     for group in plan.groups:
@@ -38,6 +39,8 @@ def _facts(plan: Plan) -> Iterator[tuple[str, str]]:
     namespace = f"namespace {bus.namespace}" if bus.namespace else "no namespace"
     yield "bus", f"domain {bus.domain}, {namespace}, wire format {bus.wire}"
     yield "router", router
+    if plan.follows_clock:
+        yield "time", "follows /clock, which is told from outside"
     yield "mission", f"{plan.start}, as soon as all is active" if plan.start else "none starts by itself"
 
 
@@ -45,6 +48,8 @@ def _options(instance: Instance) -> Iterator[str]:
     yield instance.type
     if instance.starts_after:
         yield f"after {', '.join(instance.starts_after)}"
+    if instance.log is not Level.OK:
+        yield f"logs from {log_word(instance.log)} on"
     if instance.restart != Restart():
         yield f"restarts: {instance.restart.when}, at most {instance.restart.max} within {instance.restart.within:g} s"
 

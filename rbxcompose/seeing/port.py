@@ -28,7 +28,9 @@ def why_port(robot: Robot, path: Path) -> Answer | None:
         return None
     if not rest:
         about = (part.cls.__doc__ or "").strip().partition("\n")[0]
-        return Answer(name, f"type {part.type_name}", about, hints=(("where", "every robot runs it"),))
+        is_written = at(robot.manifest.root, part.path) is not None
+        place = str(robot.part_span(name)) if is_written else "every robot runs it"
+        return Answer(name, f"type {part.type_name}", about, hints=(("where", place),))
     end = part.end(rest[0])
     return _port(robot, part, end) if end else None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.history import Step
@@ -32,6 +33,8 @@ def why(robot: Robot, text: str) -> Answer | Finding:
     path = path_of(robot, text)
     node = found_at(robot.manifest, path)
     guide = _guide(robot.manifest, path)
+    if isinstance(node, Mapping) and path[0] == "args" and len(path) == 2:
+        return _argument_in_effect(robot, guide, path, node)
     if node is not None:
         return _written(robot, guide, path, node)
     if removed := _removed(robot.manifest, path):
@@ -63,6 +66,20 @@ def _written(robot: Robot, guide: Guide, path: Path, node: Node) -> Answer:
         sources=tuple(_sources(robot.manifest, path)),
         node=node,
     )
+
+
+def _argument_in_effect(robot: Robot, guide: Guide, path: Path, declared: Mapping) -> Answer:
+    """Return the value that an argument has: its default, or what a layer above has put in the place of that."""
+    written = {name: shown(entry.value) for name, entry in declared.entries.items()}
+    limits = [f"{words} {written[key]}" for key, words in (("min", "at least"), ("max", "at most")) if key in written]
+    limits += [f"one of {written['choices']}"] if "choices" in written else []
+    hints = (("type", ", ".join([written.get("type", "nothing"), *limits])), ("to set it", _to_set(path)))
+    value = declared.get("default")
+    if value is None:
+        place = key_span(robot.manifest.root, path)
+        return Answer(short(path), "nothing", written.get("about", ""), place=str(place), hints=hints)
+    answer = _written(robot, guide, (*path, "default"), value)
+    return replace(answer, path=short(path), about=written.get("about", ""), hints=hints)
 
 
 def _kind(path: Path, node: Mapping) -> str:
@@ -127,7 +144,8 @@ def _argument(manifest: RobotManifest, name: str, scope: str) -> Iterator[Source
     label = f"args.{name}" + (f" of part '{scope}'" if scope else "")
     node = found_at(manifest, path)
     if node is not None:
-        yield Source(label, shown(node), origin_of(manifest, path, node))
+        below = tuple(map(_layer, manifest.history.of(path)[:-1]))
+        yield Source(label, shown(node), origin_of(manifest, path, node), below)
         yield from _sources(manifest, path)
     elif scope in manifest.parts:
         given = "given by the part that includes it, else " if "." in scope else ""

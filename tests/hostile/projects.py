@@ -36,6 +36,10 @@ def named(path: str) -> dict[str, str | bytes]:
     return {**robot(f"missions:\n  bad: {path}\n"), "missions/good.yaml": MISSION + "do: [{wait: 1 s}]\n"}
 
 
+def body(text: str | bytes) -> dict[str, str | bytes]:
+    return {**robot("body: {urdf: bad.urdf}\n"), "robots/bad/bad.urdf": text}
+
+
 def linked(target: str, name: str = "missions/bad.yaml") -> Callable[[Path], object]:
     def prepare(folder: Path) -> None:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -147,6 +151,35 @@ PROJECTS: dict[str, Project] = {
     ),
     "a variable that names itself": Project("RBX1102", robot("about: [${env.A}]\n"), environment={"A": "${env.A}"}),
     "a variable with an escape": Project("RBX1001", robot("${env.A}: 1\n"), environment={"A": "\x1b[2J"}),
+    # XML
+    "a URDF of 5 MB": Project("RBX1103", body("<robot>" + " " * 5_000_000 + "</robot>")),
+    "200,000 elements of a URDF": Project("RBX1103", body("<robot>" + "<a/>" * 200_001 + "</robot>")),
+    "100,000 elements inside each other": Project("RBX1103", body("<robot>" + "<a>" * 100_000)),
+    "entities that double in a URDF": Project(
+        "RBX2001",
+        body(
+            '<!DOCTYPE robot [<!ENTITY a0 "x">'
+            + "".join(f'<!ENTITY a{n} "{f"&a{n - 1};" * 10}">' for n in range(1, 12))
+            + "]><robot>&a11;</robot>"
+        ),
+    ),
+    "a file of the system as an entity": Project(
+        "RBX2001", body('<!DOCTYPE robot [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot>&a;</robot>')
+    ),
+    "a DOCTYPE from elsewhere": Project("RBX2001", body('<!DOCTYPE robot SYSTEM "http://127.0.0.1/a.dtd"><robot/>')),
+    "a name of 3 MB in a URDF": Project("RBX2002", body(f"<{'a' * 3_000_000}/>")),
+    "an element of 3 MB that never ends": Project("RBX2001", body(f"<robot><{'a' * 3_000_000}></robot>")),
+    "many attributes in a URDF": Project(
+        "RBX2001", body("<robot " + " ".join(f'a{n}="1"' for n in range(300_000)) + "></b>")
+    ),
+    "an escape in a URDF": Project("RBX2001", body("<robot>\x1b[2J</robot>")),
+    "a direction override in a URDF": Project("RBX2001", body("<robot>\u202e\u0085</b>")),
+    "a URDF in utf-16": Project("RBX1111", body("<robot/>".encode("utf-16"))),
+    "a URDF of another encoding": Project("RBX2001", body('<?xml version="1.0" encoding="utf-7"?><robot/>')),
+    "a URDF out of the project": Project("RBX1306", robot("body: {urdf: /etc/passwd}\n")),
+    "a device as a URDF": Project(
+        "RBX1306", robot("body: {urdf: bad.urdf}\n"), linked("/dev/zero", "robots/bad/bad.urdf")
+    ),
     # Expressions
     "an expression of 1,001 characters": Project("RBX4111", mission("do: [{check: " + "1 + " * 249 + "1 < 20000}]\n")),
     "51 brackets": Project("RBX4111", mission("do: [{check: '" + "(" * 51 + "1" + ")" * 51 + " < 2'}]\n")),
@@ -168,6 +201,15 @@ PROJECTS: dict[str, Project] = {
         ),
     ),
     "a loop over 100,000 items": Project("RBX4102", mission("do: [{for: x, in: [" + "1," * 100_000 + "], do: fly}]\n")),
+    "50,000 items inside each other": Project(
+        "RBX1103", mission("data:\n  a: [" + "[1, 2, 3, 4]," * 10_000 + "]\ndo: [{log: $a}]\n")
+    ),
+    "an input of 20,000 values": Project(
+        "RBX1103",
+        robot(
+            "missions: {work: {file: ../../missions/work.yaml, with: {a: [" + "1," * 20_000 + "]}}}\n",
+        ),
+    ),
     # Names
     "1,000 names that are nearly right": Project("RBX3005", robot(strangers(1000))),
     "5,000 unknown keys": Project("RBX1001", robot("".join(f"componentz{n}: 1\n" for n in range(5000)))),

@@ -8,6 +8,7 @@ import pytest
 
 from rbxcompose.lsp.completion import complete
 from rbxcompose.lsp.document import Document
+from rbxcompose.missions.modifiers.registry import modifier_keys
 from tests.lsp.places import BATTERY, PATROL, ROBOT, TWINS, Editor
 
 PLACES = ["dock", "corner_1", "corner_2", "corner_3", "corner_4"]
@@ -63,7 +64,7 @@ def test_keys_that_are_there_are_not_proposed_again(editor: Editor) -> None:
 
 def test_beside_a_skill_no_second_step_is_proposed(editor: Editor) -> None:
     found = editor.labels(PATROL, "      timeout: 10 s", "      ")
-    assert set(found) == {"name", "only_if", "timeout", "attempts"}
+    assert set(found) == {"name", "timeout", *modifier_keys()} - {"optional"}
 
 
 def test_a_kind_proposes_its_own_settings(editor: Editor) -> None:

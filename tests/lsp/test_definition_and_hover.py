@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.lsp.definition import define
+from rbxcompose.lsp.document import Document
 from tests.conftest import ROOT
 from tests.lsp.places import BATTERY, PATROL, ROBOT, TWINS, Editor, line_of
 
@@ -41,6 +43,13 @@ def test_a_name_leads_to_where_it_is_written(
 ) -> None:
     found = editor.define(path, words, offset)
     assert found.startswith(f"{target.relative_to(ROOT)}:{line_of(target, there)}:")
+
+
+def test_the_file_of_a_body_is_led_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cart.urdf").write_text("<robot/>", encoding="utf-8")
+    document = Document(tmp_path / "robot.yaml", "rbx: 1\nkind: Robot\nname: cart\nbody:\n  urdf: cart.urdf\n")
+    assert str(define(document, 4, 10)) == "cart.urdf:1:1"
 
 
 def test_what_names_nothing_leads_nowhere(editor: Editor) -> None:

@@ -54,7 +54,7 @@ def test_a_mission_is_checked_with_the_robots_of_the_project_that_have_it(folder
     assert codes(project, path, text.replace("go_to: dock", "go_to: dok")) == {"patrol.yaml": ["RBX4103"]}
     robot = project.robot_of(path)
     assert robot is not None
-    assert robot.manifest.name == "turtlebot"
+    assert "patrol" in robot.missions
 
 
 def test_a_mission_that_no_robot_has_is_still_read(folder: Path) -> None:

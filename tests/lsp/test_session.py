@@ -109,3 +109,27 @@ def test_yaml_that_is_none_of_ours_is_left_alone(project: Path) -> None:
         found = client.ask("textDocument/completion", textDocument=document, position={"line": 1, "character": 2})
         assert found["items"] == []
         assert client.told == type(client.told)()
+
+
+def test_while_one_types_each_question_is_answered_and_at_rest_the_findings_are_of_the_newest_text(
+    project: Path,
+) -> None:
+    path = project / "robots/turtlebot/robot.yaml"
+    batteries = "".join(f"  b{n}: {{type: battery_sim, runtime: 45 s}}\n" for n in range(300))
+    text = path.read_text("utf-8").replace("components:\n", f"components:\n{batteries}", 1)
+    with Client(project) as client:
+        document = opened(client, path, text)
+        client.diagnostics(path.as_uri())
+        for strokes in range(1, 21):
+            typed = "# x\n" * strokes + text.replace("runtime: 45 s                     #", "runtme: 45 s #", 1)
+            changed = {"textDocument": {**document, "version": strokes + 1}, "contentChanges": [{"text": typed}]}
+            client.tell("textDocument/didChange", **changed)
+            shown = client.ask("textDocument/hover", textDocument=document, position=place(typed, "max_speed: 0.5", 2))
+            assert "Largest speed" in shown["contents"]["value"]
+        wanted = place(typed, "runtme")
+        while not any(one["range"]["start"] == wanted for one in client.diagnostics(path.as_uri())):
+            pass  # a slow machine may have come to compile an older one
+        assert client.ask("textDocument/hover", textDocument=document, position=place(typed, "name: turtle", 2))
+        assert [one for one in client.told if one["method"] == "textDocument/publishDiagnostics"] == []
+    assert client.process.returncode == 0
+    assert client.errors == b""

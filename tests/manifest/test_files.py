@@ -64,8 +64,14 @@ def test_a_missing_file_names_the_nearest_neighbour(project: Path) -> None:
     assert (finding.code, finding.span, finding.help) == ("RBX1301", HERE, "did you mean 'patrol.yaml'?")
 
 
+@pytest.mark.parametrize("written", ["missions/patrol.yaml", "patrol.yaml", "../missions/patrol.yaml"])
+def test_a_path_that_is_relative_to_the_wrong_folder_names_the_right_path(project: Path, written: str) -> None:
+    (project / "robots/one/spare.yaml").write_text("rbx: 1\n")
+    assert refused(written, project).help == "did you mean '../../missions/patrol.yaml'?"
+
+
 def test_a_missing_folder_names_the_folder_where_the_path_ends(project: Path) -> None:
-    assert "the path ends at the folder" in refused("../../mission/x/patrol.yaml", project).help
+    assert "the path ends at the folder" in refused("../../mission/x/tour.yaml", project).help
 
 
 @pytest.mark.parametrize("written", ["a" * 5000, "loop/robot.yaml", "x\x00y", ""])

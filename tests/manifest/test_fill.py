@@ -7,7 +7,7 @@ import pytest
 from rbxcompose.expressions.types import PLACE, TEXT, TYPES, UNKNOWN
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.fill import fill
-from rbxcompose.manifest.names import Names, names_of, with_arguments
+from rbxcompose.manifest.names import Names, Typed, names_of, with_arguments
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping, Scalar
 from rbxcompose.manifest.validate import BROKEN, to_plain
@@ -27,12 +27,12 @@ def names() -> Names:
     return with_arguments(
         known,
         {
-            "speed": (TYPES["speed"], Quantity(0.3, SPEED)),
-            "rounds": (TYPES["count"], 2),
-            "home": (PLACE, "dock"),
-            "title": (TEXT, "Ada"),
-            "corners": (TYPES["list"], corners),
-            "wrong": (UNKNOWN, BROKEN),
+            "speed": Typed(TYPES["speed"], Quantity(0.3, SPEED)),
+            "rounds": Typed(TYPES["count"], 2),
+            "home": Typed(PLACE, "dock"),
+            "title": Typed(TEXT, "Ada"),
+            "corners": Typed(TYPES["list"], corners),
+            "wrong": Typed(UNKNOWN, BROKEN),
         },
     )
 

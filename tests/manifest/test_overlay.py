@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.findings import Report, Span
 from rbxcompose.manifest.history import History, Step
-from rbxcompose.manifest.overlay import compose, read_sets
+from rbxcompose.manifest.overlay import compose, read_sets, settled
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, at, children, value_span
 from rbxcompose.manifest.validate import BROKEN, to_plain
@@ -25,7 +26,9 @@ def read(text: str, file: str = "robot.yaml") -> Mapping:
 
 def composed(base: str, *overlays: str) -> tuple[object, Report]:
     report = Report()
-    tree = compose(read(base), [(read(text, "profile.yaml"), "profile 'x'") for text in overlays], report)
+    tree = compose(
+        settled(read(base), report), [(read(text, "profile.yaml"), "profile 'x'") for text in overlays], report
+    )
     return to_plain(tree), report
 
 
@@ -167,7 +170,7 @@ ROBOT = "components:\n  battery: {type: b, runtime: 45 s}\nargs:\n  speed: {type
 
 def with_sets(*sets: str) -> tuple[Mapping, Report, dict[str, str]]:
     report, sources = Report(), dict[str, str]()
-    root = compose(read(ROBOT), [], report)
+    root = settled(read(ROBOT), report)
     return compose(root, read_sets(sets, root, report, sources), report), report, sources
 
 
@@ -180,6 +183,18 @@ def test_a_set_begins_with_a_component_or_a_section() -> None:
         "args": {"speed": {"type": "speed", "default": "1 m/s"}},
         "missions": {"patrol": {"file": "p.yaml", "with": {"rounds": 3}}},
     }
+
+
+@pytest.mark.parametrize("path", ["battery", "components.battery"])
+def test_a_set_removes_a_component(path: str) -> None:
+    tree, report, _ = with_sets(f"{path}=!remove")
+    assert not report.findings
+    assert to_plain(tree.entries["components"].value) == {}
+
+
+def test_a_set_cannot_remove_what_is_not_there() -> None:
+    _, report, _ = with_sets("batery=!remove")
+    assert [(finding.code, finding.help) for finding in report] == [("RBX1302", "did you mean 'battery'?")]
 
 
 def test_the_value_of_a_set_is_yaml_and_keeps_its_place_in_the_argument() -> None:
@@ -198,6 +213,14 @@ def test_a_set_that_leads_to_nothing_is_a_finding_with_the_nearest_name() -> Non
         ("RBX1303", "write --set battery.KEY=VALUE"),
         ("RBX1303", "write --set battery.runtime='30 s'"),
         ("RBX1303", "write --set battery.runtime='30 s'"),
+    ]
+
+
+def test_a_set_that_names_an_argument_or_a_mission_alone_is_told_the_whole_path() -> None:
+    _, report, _ = with_sets("speed=1 m/s", "patrol.with.rounds=3")
+    assert [(finding.code, finding.help) for finding in report] == [
+        ("RBX1302", "did you mean 'args.speed'?"),
+        ("RBX1302", "did you mean 'missions.patrol.with.rounds'?"),
     ]
 
 

@@ -13,10 +13,6 @@ from tests.misconfig.page import page
 
 WRONG = [case for case in cases() if case.kind]
 RIGHT = [case for case in cases() if not case.kind]
-ELSEWHERE = {
-    "wrong_kind_of_node/retry": "any word may be a skill, so that it is taken for a second step",
-}
-"""Cases whose mistake is told, but not with the code or not at the line that a user would want."""
 
 
 @pytest.mark.parametrize("case", WRONG, ids=lambda case: case.name)
@@ -24,8 +20,6 @@ def test_a_mistake_is_told_at_its_line_and_nothing_else_is(case: Case, tmp_path:
     outcome = run(case, tmp_path)
     if case.misses:
         assert outcome.found == frozenset(), "this is told now: say what is expected instead of '# misses:'"
-    elif case.name in ELSEWHERE:
-        assert outcome.is_elsewhere
     else:
         assert outcome.case.expected <= outcome.found
         assert {code for _, _, code in outcome.noise} == case.known_noise

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.plan.diff import Difference, difference
 from rbxcompose.plan.dump import dump, load
 from rbxcompose.plan.model import Plan
-from rbxcompose.seeing.diff import Difference, difference
 from rbxcompose.seeing.plan_text import plan_text
 from rbxcompose.testing import Golden, check_file, check_text
 from tests.conftest import ROOT
@@ -44,6 +44,17 @@ def test_a_plan_is_no_other_than_itself_also_when_it_was_saved(name: str) -> Non
 def test_a_profile_that_changes_one_value_concerns_one_process() -> None:
     found = between(profiles=("tired",))
     assert found.text() == "~ battery\n    runtime: 45 s -> 30 s\nprocesses that restart: world"
+
+
+def test_locks_that_come_or_go_are_told_by_what_is_in_them(tmp_path: Path) -> None:
+    robot = "rbx: 1\nkind: Robot\nname: one\ncomponents: {base: {type: diff_drive_sim}}\nmuxes:\n  cmd_vel:\n"
+    without = robot + "    inputs: {teleop: {priority: 1, timeout: 1 s}}\n"
+    locked = without + "    locks: {door: {priority: 2, timeout: 1 s}}\n"
+    plans = [check_text(text, tmp_path).plan for text in (locked, without)]
+    gone = [line.strip() for line in difference(*plans).text().splitlines() if "locks" in line]
+    assert gone == ["locks.door.priority: 2 (gone)", "locks.door.timeout: 1 s (gone)"]
+    new = [line.strip() for line in difference(*reversed(plans)).text().splitlines() if "locks" in line]
+    assert new == ["locks.door.priority: 2 (new)", "locks.door.timeout: 1 s (new)"]
 
 
 def test_a_component_that_moves_concerns_both_processes() -> None:

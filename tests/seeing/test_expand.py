@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.model.robot import Robot
-from rbxcompose.seeing.diff import difference
+from rbxcompose.plan.diff import difference
 from rbxcompose.seeing.expand import expand, expand_data, leaves
 from rbxcompose.testing import Checked, Golden, check_file, check_text
 from tests.conftest import ROOT

@@ -12,6 +12,9 @@ from xml.etree import ElementTree
 import pytest
 
 from rbxcompose.compiler import compile_robot
+from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.msgs.std_srvs import SetBool
+from rbxcompose.sdk import Component, Config, Serves, ServesAction, component
 from rbxcompose.seeing.diagram import Diagram, Line, Shape, diagram_of
 from rbxcompose.seeing.graph_dot import dot
 from rbxcompose.seeing.graph_html import html
@@ -53,6 +56,51 @@ def test_a_mission_leads_to_its_skills_and_those_to_who_serves_them() -> None:
     assert "mission:patrol" in [tip.box for tip in wires[Line.TOPIC, "/battery_level"].targets]
     assert diagram("turtlebot").runs == (("mission", "mission:patrol"),)
     assert diagram("turtlebot").start == "mission:patrol"
+
+
+WORKING = """
+rbx: 1
+kind: Mission
+name: work
+do:
+  - say: begins
+  - light: true
+  - drive_to: dock
+  - call: set_battery_level
+    request: {value: 100}
+  - publish: cmd_vel
+    message: {linear: {x: 0.1}}
+"""
+WORKER = """
+rbx: 1
+kind: Robot
+name: worker
+bus: {namespace: shop}
+places: {dock: {x: 0 m, y: 0 m}}
+components:
+  battery: {type: battery_sim, runtime: 1 h}
+  base: {type: diff_drive_sim}
+  lamp: {type: toy_lamp}
+missions: {work: work.yaml}
+"""
+
+
+@component("toy_lamp")
+class Lamp(Component[Config]):
+    """A lamp that drives, for graphs."""
+
+    light = Serves(SetBool, "light")
+    drive_to = ServesAction(NavigateToPose, "drive_to")
+
+
+def test_a_mission_leads_to_services_and_topics_and_to_nobody_for_skills_in_python(
+    tmp_path: Path, golden: Golden
+) -> None:
+    (tmp_path / "work.yaml").write_text(WORKING)
+    found = check_text(WORKER, tmp_path).compilation
+    assert found.robot
+    assert not found.report.has_errors, list(found.report)
+    golden.check("skills.mmd", mermaid(diagram_of(found.robot)))
 
 
 def test_a_mux_shows_the_priorities_of_its_inputs() -> None:

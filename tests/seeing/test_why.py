@@ -25,6 +25,7 @@ ASKED = {
         "base",
         "bus.domain",
         "bus",
+        "args.speed",
         "args.speed.default",
         "diagnostics.analyzers.power.match",
         "diagnostics.analyzers.power.match.1",
@@ -103,6 +104,8 @@ def test_a_default_says_so_and_where_it_can_be_set() -> None:
     [
         ("batery.runtime", "robot 'turtlebot' has no 'batery'", "did you mean 'battery'?"),
         ("battery.runtme", "'battery' has no 'runtme'", "did you mean 'runtime'?"),
+        ("speed", "robot 'turtlebot' has no 'speed'", "did you mean 'args.speed'?"),
+        ("dock.x", "robot 'turtlebot' has no 'dock'", "did you mean 'places.dock.x'?"),
         ("go_to.cmd_ve", "'go_to' has no 'cmd_ve'", "did you mean 'cmd_vel'?"),
         ("muxes.cmd_vel.inputs.telop.priority", "'muxes.cmd_vel.inputs' has no 'telop'", "did you mean 'teleop'?"),
         ("battery.runtime.x", "'battery.runtime' has no 'x'", ""),
@@ -134,6 +137,15 @@ def test_a_namespace_is_named_as_the_reason_of_a_topic(tmp_path: Path) -> None:
     assert "in the namespace 'left'" in answer.text()
 
 
+def test_what_a_section_runs_stands_where_the_section_does(tmp_path: Path) -> None:
+    text = "rbx: 1\nkind: Robot\nname: one\nbody:\n  urdf: one.urdf\n"
+    made = check_text(text, tmp_path, others={"one.urdf": "<robot/>"}).compilation.robot
+    assert made is not None
+    told = why(made, "robot_description")
+    assert isinstance(told, Answer)
+    assert told.hints == (("where", f"{tmp_path}/robot.yaml:5:3"),)
+
+
 def test_a_robot_with_mistakes_can_be_asked_too(tmp_path: Path) -> None:
     text = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  base:\n    type: diff_drive_sim\n    max_speed: fast\n"
     found = check_text(text, tmp_path).compilation.robot
@@ -141,3 +153,59 @@ def test_a_robot_with_mistakes_can_be_asked_too(tmp_path: Path) -> None:
     answer = why(found, "base.max_speed")
     assert isinstance(answer, Answer)
     assert (answer.value, answer.si) == ("fast", None)
+
+
+ARGUMENTS = """\
+rbx: 1
+kind: Robot
+name: one
+args:
+  speed: {type: speed, default: 0.3 m/s, min: 5 cm/s, max: 0.5 m/s, about: Between places.}
+  room: {type: choice, choices: [kitchen, hall]}
+profiles:
+  slow: {args: {speed: 0.1 m/s}}
+"""
+OVERLAY = "rbx: 1\nkind: Overlay\nname: over\nargs: {speed: 0.2 m/s}\n"
+
+
+def test_an_argument_is_its_value_in_effect_with_the_layers_below(tmp_path: Path) -> None:
+    (tmp_path / "over.yaml").write_text(OVERLAY, encoding="utf-8")
+    sets = ["args.speed=0.4 m/s"]
+    checked = check_text(ARGUMENTS, tmp_path, profiles=["slow"], overlays=[str(tmp_path / "over.yaml")], sets=sets)
+    found = checked.compilation.robot
+    assert found
+    answer = why(found, "args.speed")
+    assert isinstance(answer, Answer)
+    assert (answer.path, answer.value, answer.about, answer.si) == ("args.speed", "0.4 m/s", "Between places.", 0.4)
+    assert [layer.value for layer in answer.layers] == ["0.3 m/s", "0.1 m/s", "0.2 m/s", "0.4 m/s"]
+    assert [layer.name for layer in answer.layers][0::3] == ["the robot", "--set"]
+    assert dict(answer.hints)["type"] == "speed, at least 5 cm/s, at most 0.5 m/s"
+
+
+def test_an_argument_without_a_value_says_how_to_give_one(tmp_path: Path) -> None:
+    found = check_text(ARGUMENTS, tmp_path).compilation.robot
+    assert found
+    answer = why(found, "args.room")
+    assert isinstance(answer, Answer)
+    assert answer.value == "nothing"
+    assert dict(answer.hints) == {"type": "choice, one of [kitchen, hall]", "to set it": "--set args.room=VALUE"}
+
+
+def test_an_argument_that_a_value_is_filled_in_from_shows_what_it_took_the_place_of(tmp_path: Path) -> None:
+    text = ARGUMENTS + "components:\n  go_to: {type: go_to, speed: '${args.speed}'}\n  base: {type: diff_drive_sim}\n"
+    (tmp_path / "over.yaml").write_text(OVERLAY, encoding="utf-8")
+    over = [str(tmp_path / "over.yaml")]
+    found = check_text(text, tmp_path, profiles=["slow"], overlays=over, sets=["args.speed=0.4 m/s"]).compilation.robot
+    assert found
+    answer = why(found, "go_to.speed")
+    assert isinstance(answer, Answer)
+    [source] = answer.sources
+    assert (source.value, [layer.value for layer in source.below]) == ("0.4 m/s", ["0.3 m/s", "0.1 m/s", "0.2 m/s"])
+    shown = [line.strip() for line in answer.text().replace(str(tmp_path), "").splitlines()[-4:]]
+    assert shown == [
+        "from           args.speed = 0.4 m/s  --set",
+        "in the place of 0.2 m/s  /over.yaml:4, overlay",
+        "in the place of 0.1 m/s  /robot.yaml:8, profile 'slow'",
+        "in the place of 0.3 m/s  /robot.yaml:5",
+    ]
+    assert answer.data()["filled_in_from"][0]["below"][0]["line"] == 5

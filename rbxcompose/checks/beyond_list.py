@@ -1,0 +1,67 @@
+"""An item of a list that is not there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.expressions.tree import Call, Expression, ExpressionError, Index, Number, Variable, walk
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.program import Program
+from rbxcompose.missions.spans import expression_of, inner_span
+from rbxcompose.model.charging import constants
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX4132", Severity.WARNING)
+def beyond_list(robot: Robot) -> Iterator[Finding]:
+    """An item of a list that is not there
+
+    The items of a list are counted from 0, so that the last of two is `$rooms[1]`. Where nothing sets the list, an item
+    behind its end can never be had: what needs it fails, and a condition with it never holds.
+
+    Bad:
+    ```yaml
+    data:
+      rooms: [kitchen, window]
+    do:
+      go_to: $rooms[2]
+    ```
+    Good:
+    ```yaml
+    data:
+      rooms: [kitchen, window]
+    do:
+      go_to: $rooms[1]
+    ```
+    """
+    for mission in robot.missions.values():
+        known = constants(mission)
+        for scalar, expression in _expressions(mission.program):
+            if any(isinstance(tree, Call) and tree.function == "count" for tree, _ in walk(expression.tree)):
+                continue  # it asks how long the list is before it takes the item
+            for tree, _ in walk(expression.tree):
+                match tree:
+                    case Index(of=Variable(name=name), index=Number(value=index)):
+                        items, datum = known.get(name), mission.program.data.get(name)
+                        if datum and isinstance(items, list | tuple) and index >= len(items):
+                            yield beyond_list.at(
+                                inner_span(scalar, tree.start, tree.end),
+                                f"'${name}' has no item {index:.0f}: "
+                                + (f"its last is {len(items) - 1}" if items else "it is empty"),
+                                help="items are counted from 0",
+                                related=[Related(datum.span, "the list")],
+                            )
+
+
+def _expressions(program: Program) -> Iterator[tuple[Scalar, Expression]]:
+    """Yield all expressions of a mission, the arguments of its skills included."""
+    yield from ((asked.scalar, asked.expression) for _, asked in program.asked())
+    for node in program.nodes:
+        for argument in node.arguments:
+            if isinstance(argument.value, Scalar):
+                try:
+                    yield argument.value, expression_of(argument.value)
+                except ExpressionError:
+                    continue  # it is told where missions are read

@@ -1,0 +1,55 @@
+"""An input of a mux that stays live long after its source fell silent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Severity
+from rbxcompose.model.robot import Robot
+from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import In
+from rbxcompose.units import TIME, format_quantity
+
+LONGEST = 60.0  # [s]: commands come many times a second
+
+
+@check("RBX3108", Severity.WARNING)
+def long_timeout(robot: Robot) -> Iterator[Finding]:
+    """An input of a mux stays live long after its source fell silent
+
+    An input is live until its `timeout` has passed since its last message, and as long holds off those of a lower
+    priority. Commands come many times a second; who has been silent for a minute will not go on. A bare number counts
+    in seconds: `500` is more than eight minutes.
+
+    Bad:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 500
+    ```
+    Good:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 500 ms
+    ```
+    """
+    for mux, entry in robot.manifest.muxes.items():
+        for name, one in entry.inputs.items():
+            end = robot.parts[mux].end(name)
+            if end and isinstance(end.port, In) and end.port.qos is Qos.COMMAND and one.timeout > LONGEST:
+                yield long_timeout.at(
+                    robot.value("muxes", mux, "inputs", name, "timeout"),
+                    f"input '{name}' of mux '{mux}' stays live for {format_quantity(one.timeout, TIME)} after its last "
+                    "command",
+                    help="a few times the time between two commands is enough, such as '0.5 s'",
+                )

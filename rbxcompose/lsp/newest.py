@@ -1,0 +1,80 @@
+"""Compiles the newest texts in a thread of its own, while the editor is answered from what was compiled last."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from rbxcompose.lsp.project import Found, OutdatedError, Project
+from rbxcompose.schema.documents import MAKERS, installed_schema
+
+PAUSE = 0.1  # [s] without a key stroke before robots are compiled anew
+
+
+class Newest:
+    """The project as it was compiled last, and the texts that have changed since.
+
+    A thread works on a copy of the project, which takes the project's place when it is done. A text that comes
+    meanwhile makes that outdated: it ends at the next robot, and the work begins anew with all texts. So what is
+    `told` is always of the newest texts. All methods belong to the thread of the event loop.
+    """
+
+    def __init__(self, project: Project, told: Callable[[Found], None]) -> None:
+        self.project = project
+        self._told = told
+        self._waiting: dict[Path, str | None] = {}
+        self._number = 0  # of changes so far
+        self._due = 0.0  # time of the loop
+        self._task: asyncio.Task[None] | None = None
+        self._thread = ThreadPoolExecutor(1, "compile")
+
+    def prepare(self) -> None:
+        """Read in the thread what the first answer needs."""
+        for kind in MAKERS:
+            self._thread.submit(installed_schema, kind)
+
+    def has(self, path: Path) -> bool:
+        """Tell whether the editor's text of a file counts in place of the saved one."""
+        return self._waiting.get(path) is not None or (path in self.project.unsaved and path not in self._waiting)
+
+    def is_compiled(self, path: Path, text: str) -> bool:
+        """Tell whether the project was compiled with this text of a file."""
+        return not self._waiting and self.project.text(path) == text
+
+    def change(self, path: Path, text: str | None, pause: float = 0.0) -> None:
+        """Take a new text (None: the saved one counts again), to be compiled after a pause [s]."""
+        self._waiting[path] = text
+        self._number += 1
+        loop = asyncio.get_running_loop()
+        self._due = loop.time() + pause
+        if self._task is None or self._task.done():
+            self._task = loop.create_task(self._work())
+
+    def close(self) -> None:
+        """End the thread; what it is at becomes outdated."""
+        self._number += 1
+        self._waiting.clear()
+        self._thread.shutdown(wait=False, cancel_futures=True)
+
+    async def _work(self) -> None:
+        loop = asyncio.get_running_loop()
+        while self._waiting:
+            if (pause := self._due - loop.time()) > 0:
+                await asyncio.sleep(pause)
+                continue
+            number, texts = self._number, dict(self._waiting)
+            project = self._copy(number)
+            try:
+                found = await loop.run_in_executor(self._thread, project.change_all, texts)
+            except OutdatedError:
+                continue
+            if number == self._number:
+                self.project = project
+                self._waiting.clear()
+                self._told(found)
+
+    def _copy(self, number: int) -> Project:
+        """Return a copy of the project that is outdated by the next change after `number` of them."""
+        return self.project.copy(lambda: number != self._number)

@@ -1,0 +1,46 @@
+"""Values that an argument was given: a mistake in one is told where it was given, not where the argument is used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+from rbxcompose.findings import Finding, Related, Span
+
+
+class GivenSpan(Span):
+    """The place of a value that was given to an argument; `uses` are where that stands, the outermost first.
+
+    It is equal to the plain place of the value.
+    """
+
+    uses: tuple[Span, ...] = ()
+
+
+def given_span(given: Span, use: Span) -> GivenSpan:
+    """Return the place `given` for what is filled in at `use`; the former may be one that was handed on itself."""
+    made = GivenSpan(*given)
+    made.uses = (*(given.uses if isinstance(given, GivenSpan) else ()), use)
+    return made
+
+
+def told_where_given(finding: Finding) -> Finding:
+    """Return a finding with plain places; one about a given value also tells where that is used."""
+    related = [one for other in finding.related for one in _plain(other)]
+    if not isinstance(finding.span, GivenSpan):
+        return finding if related == list(finding.related) else replace(finding, related=_once(related))
+    uses = [Related(use, "handed on here") for use in finding.span.uses[:-1]]
+    uses += [Related(use, "used here") for use in finding.span.uses[-1:]]
+    return replace(finding, span=Span(*finding.span), related=_once([*uses, *related]))
+
+
+def _plain(related: Related) -> Iterator[Related]:
+    if not isinstance(related.span, GivenSpan):
+        yield related
+        return
+    yield Related(Span(*related.span), related.message)
+    yield from (Related(use, "used here") for use in related.span.uses[-1:])
+
+
+def _once(related: Iterable[Related]) -> tuple[Related, ...]:
+    return tuple(dict.fromkeys(related))

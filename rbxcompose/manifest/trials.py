@@ -1,0 +1,122 @@
+"""The file of a test as types: the shape of what stands in it; what the names mean is told by the robot."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field, StringConstraints
+from pydantic_core import PydanticCustomError
+
+from rbxcompose.config import Config, Name, Time
+from rbxcompose.manifest.models import Header, TopicName
+
+TEST = "Test"
+
+
+def _given(value: bool) -> bool:
+    if not value:
+        raise PydanticCustomError("order", "must be true, or left out")
+    return value
+
+
+Order = Annotated[bool, AfterValidator(_given)]
+CallNumber = Annotated[str, StringConstraints(pattern=r"^[1-9][0-9]{0,5}$")]
+
+
+class TrialFile(Header):
+    """A test of a mission: what happens to it, and what it must do."""
+
+    robot: Any = None
+    """The robot's file, relative to this one, or `rbx:robots/NAME`."""
+    mission: Any = None
+    """The mission that is tested, by the name that it has in the robot."""
+    with_: Any = Field(None, alias="with")
+    """Values of its inputs, by name, in the place of those that the robot gives."""
+    mocks: Any = None
+    """Skills and services that the test answers itself, by name; all others run as they are."""
+    events: Any = None
+    """What happens to the robot from outside, and when."""
+    expect: Any = None
+    """What must have happened in the end."""
+
+
+class Mock(Config):
+    """How the test answers in the place of a skill or a service."""
+
+    takes: Time = Field(0.0, ge=0)
+    """How long each call takes."""
+    result: Name = "success"
+    """How calls end: `success`, `failure`, or an outcome that the skill declares."""
+    message: str = ""
+    """The reason that is told with a failure."""
+    sets: dict[Name, Any] = {}
+    """Values that are set when a call has succeeded, by expressions that also see the arguments of the call."""
+    fails_at: tuple[Annotated[int, Field(ge=1)], ...] = ()
+    """Which calls fail, counted from 1; one that was halted is not counted."""
+    fails_for: tuple[Any, ...] = ()
+    """Values of the main argument for which calls fail."""
+    outcome_at: dict[CallNumber, Name] = {}
+    """Outcome by number of the call, where it differs from `result`."""
+
+
+class Sent(Config):
+    """A message."""
+
+    topic: TopicName
+    """Where it is published."""
+    message: Any = None
+    """Its fields; a single value stands for the only one."""
+
+
+class Event(Config):
+    """Something that happens to the robot; several things of one instant happen in the order of the text."""
+
+    at: Time = Field(ge=0)
+    """When, counted from the start of the test."""
+    set_: dict[Name, Any] = Field({}, alias="set")
+    """Values that get this value now, and keep it until the test sets them again."""
+    publish: Sent | None = None
+    """A message that comes from outside."""
+    stop: Order = False
+    """The robot is stopped, and its mission paused."""
+    release: Order = False
+    """The stop is released."""
+    pause: Order = False
+    """The mission is paused."""
+    resume: Order = False
+    """The mission goes on."""
+
+
+class Expect(Config):
+    """What must have happened."""
+
+    outcome: Name | None = None
+    """How the mission ends: `success`, `failure`, an end of its own, or `running`, together with `for`."""
+    for_: Time | None = Field(None, gt=0, alias="for")
+    """How long it is watched."""
+    steps: tuple[Any, ...] = ()
+    """What is done, in this order; other steps may lie between."""
+    never: tuple[Any, ...] = ()
+    """Steps that are not done."""
+    count: dict[Name, int] = {}
+    """How often a step is begun, by its name."""
+    data: dict[Name, Any] = {}
+    """Values of the mission's data at the end."""
+    published: tuple[Sent, ...] = ()
+    """Messages that it publishes, in this order; only the fields that are written count."""
+    reports: tuple[str, ...] = ()
+    """Texts that stand in what it logs or reports."""
+
+
+def _in_full(value: object) -> object:
+    if value is None:
+        return {}
+    return {"result": value} if isinstance(value, str) else value
+
+
+MockModel = Annotated[Mock, BeforeValidator(_in_full, json_schema_input_type=Mock | Name | None)]
+"""A mock, or the word for its result, or nothing: it succeeds at once."""
+
+SECTIONS = {"mocks": dict[Name, MockModel], "events": tuple[Event, ...], "expect": Expect}
+"""What stands in each section."""
+STEP_KEYS = ("ended", "at")  # beside the name of a step

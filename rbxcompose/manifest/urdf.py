@@ -1,0 +1,174 @@
+"""The text of a URDF file, read strictly: whether it is XML, and a robot's. What its elements mean is not looked at."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+from xml.parsers import expat
+
+from rbxcompose.findings import Finding, Related, Span, kind
+from rbxcompose.manifest.composing import TOO_LARGE
+from rbxcompose.manifest.limits import DEPTH, NODES
+from rbxcompose.plain import plain
+
+NOT_XML = kind(
+    "RBX2001",
+    """A URDF file is not XML that can be read
+
+The file of `body: {urdf: FILE}` must be well-formed XML in UTF-8: each element is closed, each value stands in quotes.
+A DOCTYPE is refused, since it can make a small file grow without bounds.
+
+Bad:
+```xml
+<robot name="cart">
+  <link name="base">
+</robot>
+```
+Good:
+```xml
+<robot name="cart">
+  <link name="base"/>
+</robot>
+```
+""",
+)
+NOT_URDF = kind(
+    "RBX2002",
+    """A file is no URDF
+
+The root of a URDF file is the element `robot`. Files of other kinds, such as SDF, and files that xacro has yet to
+expand are not taken.
+
+Bad:
+```xml
+<robot name="cart" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:include filename="wheel.xacro"/>
+</robot>
+```
+Good:
+```xml
+<robot name="cart">
+  <link name="wheel"/>
+</robot>
+```
+""",
+)
+
+ROOT = "robot"
+XACRO = "xacro:"
+_ENCODINGS = {"utf-8", "us-ascii", "ascii"}  # what text in UTF-8 may call itself
+_WORDS = {
+    expat.errors.XML_ERROR_NO_ELEMENTS: "there is no element in this file",
+    expat.errors.XML_ERROR_UNCLOSED_TOKEN: "the file ends before this does",
+    expat.errors.XML_ERROR_INVALID_TOKEN: "this cannot stand here",
+    expat.errors.XML_ERROR_DUPLICATE_ATTRIBUTE: "this attribute stands here twice",
+    expat.errors.XML_ERROR_UNDEFINED_ENTITY: "nothing says what this stands for",
+    expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT: "the root element has ended, and nothing may follow it",
+    expat.errors.XML_ERROR_MISPLACED_XML_PI: "'<?xml' must be the very first thing in the file",
+}
+_SHOWN = 60  # characters of a name in a message
+
+
+def mistake_in_urdf(text: str, file: str) -> Finding | None:
+    """Return what keeps a text from being the URDF of a robot, the first thing if there are several, else None.
+
+    `file` is the name by which findings show it.
+    """
+    try:
+        _Reader(file).read(text)
+    except _RefusedError as refused:
+        return refused.finding
+    return None
+
+
+class _RefusedError(Exception):
+    """Ends the parser, from within its callbacks too."""
+
+    def __init__(self, finding: Finding) -> None:
+        super().__init__(finding.message)
+        self.finding = finding
+
+
+class _Element(NamedTuple):
+    """An element that is not closed yet, and where its tag begins: both count from 1."""
+
+    name: str
+    line: int
+    column: int
+
+
+class _Reader:
+    """Follows a parser, which makes no tree: only the elements that are open are kept."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.open: list[_Element] = []
+        self.elements = 0
+        self.parser = expat.ParserCreate("utf-8")
+        self.parser.XmlDeclHandler = self._declared
+        self.parser.StartDoctypeDeclHandler = self._doctype
+        self.parser.StartElementHandler = self._begun
+        self.parser.EndElementHandler = self._ended
+
+    def read(self, text: str) -> None:
+        """Read a whole text.
+
+        Raises:
+            _RefusedError: with the first mistake.
+        """
+        try:
+            self.parser.Parse(text, True)
+        except expat.ExpatError as error:
+            raise _RefusedError(self._malformed(error)) from None
+
+    def _declared(self, version: str, encoding: str | None, standalone: int) -> None:
+        if encoding is not None and encoding.lower() not in _ENCODINGS:
+            message = f"this file says that it is in '{plain(encoding, _SHOWN)}', and it must be in UTF-8"
+            raise _RefusedError(NOT_XML.at(self._here("<?xml"), message, help='write encoding="utf-8"'))
+
+    def _doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
+        raise _RefusedError(NOT_XML.at(self._here(" "), "a URDF file may not have a DOCTYPE", help="remove it"))
+
+    def _begun(self, name: str, attributes: dict[str, str]) -> None:
+        self.elements += 1
+        if not self.open and name != ROOT:
+            message = f"the root of a URDF file is '<{ROOT}>', and here it is '<{plain(name, _SHOWN)}>'"
+            raise _RefusedError(NOT_URDF.at(self._tag(name), message))
+        if name.startswith(XACRO):
+            help_text = "expand it first: 'xacro FILE.xacro -o FILE.urdf'"
+            raise _RefusedError(NOT_URDF.at(self._tag(name), "this file is to be expanded by xacro", help=help_text))
+        if len(self.open) >= DEPTH:
+            message = f"more than {DEPTH} elements lie inside each other"
+            raise _RefusedError(TOO_LARGE.at(self._tag(name), message))
+        if self.elements > NODES:
+            raise _RefusedError(TOO_LARGE.at(self._tag(name), f"more than {NODES:,} elements in one file"))
+        self.open.append(_Element(name, self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1))
+
+    def _ended(self, name: str) -> None:
+        self.open.pop()
+
+    def _malformed(self, error: expat.ExpatError) -> Finding:
+        span = Span(self.file, error.lineno, error.offset + 1, error.lineno, error.offset + 2)
+        if not self.open:
+            return NOT_XML.at(span, _words(error))
+        name, line, column = self.open[-1]
+        shown = plain(name, _SHOWN)
+        begun = Related(Span(self.file, line, column, line, column + 1 + len(name)), f"'<{shown}>' begins here")
+        told = expat.ErrorString(error.code)
+        if told == expat.errors.XML_ERROR_TAG_MISMATCH:
+            return NOT_XML.at(span, f"another element ends here before '<{shown}>' does", related=[begun])
+        if told == expat.errors.XML_ERROR_NO_ELEMENTS:
+            return NOT_XML.at(span, f"the file ends before '<{shown}>' does", related=[begun])
+        return NOT_XML.at(span, _words(error))
+
+    def _tag(self, name: str) -> Span:
+        return self._here(f"<{name}")
+
+    def _here(self, text: str) -> Span:
+        """Return the place of a text at which the parser is."""
+        line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
+        return Span(self.file, line, column, line, column + len(text))
+
+
+def _words(error: expat.ExpatError) -> str:
+    told = expat.ErrorString(error.code)
+    return f"this is not XML: {_WORDS.get(told, told)}"

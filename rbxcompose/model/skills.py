@@ -1,0 +1,109 @@
+"""What missions may ask of the robot: skills, topics to publish on, services to call."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from rbxcompose.manifest.models import RobotManifest
+from rbxcompose.missions.goals import service_skill, skill_of
+from rbxcompose.missions.program import Program, Skill
+from rbxcompose.missions.sources import SkillSource, TopicSource, Way
+from rbxcompose.model.robot import Part
+from rbxcompose.model.wiring import End
+from rbxcompose.plugins import BrokenPluginError
+from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import In, Out, Serves, ServesAction
+from rbxcompose.sdk.skills import SkillType, skill_names, skill_type
+
+
+def skills_of(parts: Mapping[str, Part], programs: Iterable[Program]) -> dict[str, SkillSource]:
+    """Return the skills of the robot: its actions, then its services, then those in Python that a mission names."""
+    asked = {node.skill for program in programs for node in program.nodes if node.skill}
+    found: dict[str, SkillSource] = {}
+    for source in [*_actions(parts), *_services(parts), *python_skills(asked)]:
+        found.setdefault(source.skill.name, source)
+    return found
+
+
+def names_of_skills(parts: Mapping[str, Part]) -> frozenset[str]:
+    """Return the names of all skills that a mission of the robot may use."""
+    served = (source.skill.name for source in (*_actions(parts), *_services(parts)))
+    return frozenset((*served, *skill_names()))
+
+
+def _actions(parts: Mapping[str, Part]) -> Iterable[SkillSource]:
+    for end in _ends(parts):
+        port = end.port
+        if isinstance(port, ServesAction) and port.interface is not None:
+            name = end.topic.rsplit("/", 1)[-1]
+            skill = skill_of(
+                port.interface,
+                name,
+                port.claims,
+                port.restartable,
+                pausable=port.pausable,
+                outcomes=port.outcomes,
+            )
+            yield SkillSource(skill, end.type_name, end.topic)
+
+
+def _services(parts: Mapping[str, Part]) -> Iterable[SkillSource]:
+    for end in _ends(parts):
+        if isinstance(end.port, Serves) and end.port.interface is not None:
+            skill = service_skill(end.port.interface, end.topic.rsplit("/", 1)[-1])
+            if skill is not None:
+                yield SkillSource(skill, end.type_name, end.topic, Way.SERVICE)
+
+
+def python_skills(names: Iterable[str]) -> list[SkillSource]:
+    """Return the skills in Python of these names, as far as they exist and can be used."""
+    found = []
+    for name in sorted(set(names) & set(skill_names())):
+        try:
+            found.append(SkillSource(as_skill(skill_type(name)), "", "", Way.PYTHON))
+        except BrokenPluginError:  # a mission that uses it is told that nobody provides it
+            continue
+    return found
+
+
+def as_skill(declared: SkillType) -> Skill:
+    """Return a skill in Python as missions see it."""
+    return Skill(
+        declared.name,
+        declared.arguments,
+        declared.main,
+        declared.required,
+        declared.claims,
+        declared.restartable,
+        declared.pausable,
+        declared.outcomes,
+    )
+
+
+def topics_of(manifest: RobotManifest, parts: Mapping[str, Part]) -> dict[str, TopicSource]:
+    """Return the topics whose type is known, with and without the robot's namespace."""
+    found: dict[str, TopicSource] = {}
+    for end in _ends(parts):
+        if isinstance(end.port, In | Out) and end.type_name:
+            qos = end.port.qos if isinstance(end.port, In) else Qos.EVENT
+            for name in _written(end.topic, manifest):
+                if isinstance(end.port, In) or name not in found:
+                    found[name] = TopicSource(end.type_name, str(qos.value))
+    return found
+
+
+def services_of(manifest: RobotManifest, parts: Mapping[str, Part]) -> dict[str, str]:
+    """Return the services with their types, with and without the robot's namespace."""
+    ends = [end for end in _ends(parts) if isinstance(end.port, Serves) and end.type_name]
+    return {name: end.type_name for end in ends for name in _written(end.topic, manifest)}
+
+
+def _ends(parts: Mapping[str, Part]) -> Iterable[End]:
+    return (end for part in parts.values() for end in part.ends)
+
+
+def _written(topic: str, manifest: RobotManifest) -> tuple[str, ...]:
+    """Return how missions may write a topic: absolute, or relative to the robot's namespace."""
+    namespace = (manifest.bus.namespace or "").strip("/")
+    before = f"/{namespace}/" if namespace else "/"
+    return (topic, topic.removeprefix(before)) if topic.startswith(before) else (topic,)

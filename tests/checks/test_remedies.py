@@ -1,0 +1,70 @@
+"""What a check says where its usual words would lead astray."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.findings import Finding
+from rbxcompose.testing.manifests import check_text
+
+HEAD = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  base: {type: diff_drive_sim}\n  go_to: {type: go_to}\n"
+TELEOP = "muxes:\n  cmd_vel:\n    inputs:\n      teleop: {priority: 100, timeout: 0.5 s}\n"
+
+
+def only(text: str, folder: Path) -> Finding:
+    [finding] = check_text(text, folder).compilation.report
+    return finding
+
+
+def test_a_writer_beside_a_mux_is_told_to_become_an_input_of_it(tmp_path: Path) -> None:
+    finding = only(HEAD + TELEOP, tmp_path)
+    assert finding.code == "RBX3001"
+    assert finding.help == "the mux 'cmd_vel' has to decide: give it an input 'from: go_to'"
+
+
+def test_two_writers_beside_a_mux_are_both_told_to_become_inputs_of_it(tmp_path: Path) -> None:
+    follow = "  follow: {type: go_to, connect: {go_to: follow}}\n"
+    helps = [finding.help for finding in check_text(HEAD + follow + TELEOP, tmp_path).compilation.report]
+    assert helps == [
+        "the mux 'cmd_vel' has to decide: give it an input 'from: go_to' and 'from: follow'",
+        "the mux 'cmd_vel' has to decide: give it an input 'from: go_to'",
+    ]
+
+
+def test_a_lock_named_like_an_input_is_told_at_both_places(tmp_path: Path) -> None:
+    go = "      go: {from: go_to, priority: 10, timeout: 0.5 s}\n"
+    finding = only(HEAD + TELEOP + go + "    locks:\n      teleop: {priority: 200, timeout: 1 s}\n", tmp_path)
+    assert finding.code == "RBX3002"
+    assert finding.message.startswith("mux 'cmd_vel' uses the name 'teleop' twice, for an input and for a lock")
+    assert finding.span
+    assert (finding.span.line, [related.span.line for related in finding.related]) == (13, [10])
+
+
+OVERLAY = "rbx: 1\nkind: Overlay\nname: over\n"
+PLACES = "places:\n  corner_3: {x: 1 m, y: 1 m}\n  corner_4: {x: 2 m, y: 1 m}\n"
+MISSION = (
+    "rbx: 1\nkind: Mission\nname: tour\ninputs: {last: {type: place, default: corner_3}}\ndo:\n  go_to: corner_3\n"
+)
+
+
+@pytest.mark.parametrize("removal", ["places:\n  corner_3: !remove\n", "places:\n  !remove\n"])
+def test_a_place_that_an_overlay_removes_points_to_the_overlay(removal: str, tmp_path: Path) -> None:
+    over = tmp_path / "over.yaml"
+    over.write_text(OVERLAY + removal, encoding="utf-8")
+    text = HEAD + PLACES + "missions:\n  tour: tour.yaml\n"
+    others = {"tour.yaml": MISSION}
+    assert not check_text(text, tmp_path, others=others).compilation.report.has_errors
+    found = list(check_text(text, tmp_path, others=others, overlays=[str(over)]).compilation.report)
+    assert [finding.code for finding in found] == ["RBX4103", "RBX4103"]
+    for finding in found:
+        assert (finding.message, finding.help) == ("there is no place 'corner_3' any more", "")
+        assert [(related.span.file, related.message) for related in finding.related] == [(str(over), "removed here")]
+
+
+def test_a_place_that_nobody_removed_is_misspelt_as_ever(tmp_path: Path) -> None:
+    text = HEAD + PLACES + "missions:\n  tour: tour.yaml\n"
+    others = {"tour.yaml": MISSION.replace("go_to: corner_3", "go_to: corner_33")}
+    [finding] = check_text(text, tmp_path, others=others).compilation.report
+    assert finding.help == "did you mean 'corner_3'?"

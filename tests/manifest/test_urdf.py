@@ -1,0 +1,163 @@
+"""The section `body`: where its file is, what is refused in it, and what of it the robot runs."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.findings import KINDS
+from rbxcompose.manifest.dump import dump_robot
+from rbxcompose.manifest.limits import DEPTH, NODES, URDF_BYTES
+from rbxcompose.manifest.urdf import mistake_in_urdf
+from rbxcompose.plan.diff import difference
+from rbxcompose.plan.dump import dump, load
+from rbxcompose.testing.golden import Golden
+from rbxcompose.testing.manifests import Checked, check_text
+
+HEAD = "rbx: 1\nkind: Robot\nname: cart\n"
+ROBOT = f"{HEAD}body:\n  urdf: cart.urdf\n"
+CART = '<?xml version="1.0"?>\n<robot name="cart">\n  <link name="base"/>\n</robot>\n'
+PART = "rbx: 1\nkind: Part\nname: shell\nbody:\n  urdf: cart.urdf\n"
+MISTAKES = {
+    "not closed": '<robot name="cart">\n  <link name="base">\n</robot>\n',
+    "cut short": '<robot name="cart">\n  <link name="base"/>\n',
+    "empty": "\n",
+    "no quotes": "<robot name=cart/>\n",
+    "doctype": '<?xml version="1.0"?>\n<!DOCTYPE robot [<!ENTITY a "aaaa">]>\n<robot name="&a;"/>\n',
+    "another encoding": '<?xml version="1.0" encoding="iso-8859-1"?>\n<robot/>\n',
+    "another root": '<sdf version="1.11">\n  <model name="cart"/>\n</sdf>\n',
+    "xacro": '<robot name="cart" xmlns:xacro="x">\n  <xacro:include filename="wheel.xacro"/>\n</robot>\n',
+    "text behind": '<robot name="cart"/>\nand more\n',
+    "twice": '<robot name="cart" name="car"/>\n',
+    "an entity": '<robot name="&wheel;"/>\n',
+    "a tag without an end": '<robot name="cart"\n',
+    "a line before all": '\n<?xml version="1.0"?>\n<robot/>\n',
+    "behind letters of two bytes": '<robot name="wägelchen"><link name="größe"></robot>\n',
+}
+WRONG_SECTIONS = {
+    "a path out of the project": "body: {urdf: ../../../../../../etc/passwd}\n",
+    "a misspelt path": "body: {urdf: cart.udrf}\n",
+    "no path": "body: {}\n",
+    "a word": "body: cart.urdf\n",
+    "xacro, which is not there yet": "body: {xacro: cart.urdf}\n",
+    "a component of its name": "body: {urdf: cart.urdf}\ncomponents:\n  robot_description: {type: transforms}\n",
+}
+EXAMPLES = re.compile(r"^(Bad|Good):\n```xml\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def check(folder: Path, robot: str = ROBOT, **files: str) -> Checked:
+    others = {name.replace("_", "."): text for name, text in ({"cart_urdf": CART} | files).items()}
+    return check_text(robot, folder, others=others)
+
+
+def urdf_of(checked: Checked) -> object:
+    [one] = [one for one in checked.plan.instances if one.name == "robot_description"]
+    return getattr(one.config, "urdf")  # noqa: B009 - the type of the configuration is that of a plug-in
+
+
+def test_the_robot_runs_a_component_that_has_the_text(tmp_path: Path) -> None:
+    checked = check(tmp_path)
+    assert checked.codes == []
+    assert urdf_of(checked) == CART
+
+
+def test_a_robot_without_a_body_runs_none(tmp_path: Path) -> None:
+    for section in ("", "body:\n"):
+        checked = check(tmp_path, HEAD + section)
+        assert "robot_description" not in {one.name for one in checked.plan.instances}
+
+
+def test_each_mistake_in_a_file_is_told_at_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, golden: Golden
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    told = {name: check(tmp_path, cart_urdf=text).text for name, text in MISTAKES.items()}
+    golden.check("urdf.txt", "\n".join(f"--- {name}\n{text}" for name, text in told.items()))
+
+
+def test_each_mistake_in_the_section_is_told_at_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, golden: Golden
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    told = {name: check(tmp_path, HEAD + text).text for name, text in WRONG_SECTIONS.items()}
+    golden.check("body.txt", "\n".join(f"--- {name}\n{text}" for name, text in told.items()))
+
+
+@pytest.mark.parametrize("code", ["RBX2001", "RBX2002"])
+def test_the_page_of_a_kind_shows_the_mistake_and_its_cure(code: str) -> None:
+    shown = dict(EXAMPLES.findall(KINDS[code].doc))
+    bad = mistake_in_urdf(shown["Bad"], "bad.urdf")
+    assert bad
+    assert bad.code == code
+    assert mistake_in_urdf(shown["Good"], "good.urdf") is None
+
+
+def nested(depth: int) -> str:
+    return "<robot>" + "<a>" * (depth - 1) + "</a>" * (depth - 1) + "</robot>"
+
+
+def test_the_limits_are_those_that_are_told() -> None:
+    assert mistake_in_urdf(nested(DEPTH), "cart.urdf") is None
+    assert mistake_in_urdf(f"<robot>{'<a/>' * (NODES - 1)}</robot>", "cart.urdf") is None
+    for text, column in ((nested(DEPTH + 1), 8 + 3 * (DEPTH - 1)), (f"<robot>{'<a/>' * NODES}</robot>", 4 + 4 * NODES)):
+        mistake = mistake_in_urdf(text, "cart.urdf")
+        assert mistake
+        assert (mistake.code, mistake.span and mistake.span[:3]) == ("RBX1103", ("cart.urdf", 1, column))
+
+
+def test_a_file_may_be_as_large_as_its_limit_and_no_larger(tmp_path: Path) -> None:
+    padding = " " * (URDF_BYTES - len(CART))
+    assert check(tmp_path, cart_urdf=CART + padding).codes == []
+    larger = check(tmp_path, cart_urdf=CART + padding + " ")
+    assert larger.codes == ["RBX1103"]
+    assert "robot.yaml:5:9" in larger.text
+
+
+def test_the_text_may_be_that_of_windows_with_a_mark_at_its_beginning(tmp_path: Path) -> None:
+    checked = check(tmp_path, cart_urdf="\ufeff" + CART.replace("\n", "\r\n"))
+    assert urdf_of(checked) == CART
+
+
+def test_the_file_of_a_part_lies_beside_the_part(tmp_path: Path) -> None:
+    home = tmp_path / "robots/cart"
+    others = {"../../parts/shell.yaml": PART, "../../parts/cart.urdf": CART}
+    checked = check_text(f"{HEAD}include:\n  shell: ../../parts/shell.yaml\n", home, others=others)
+    assert urdf_of(checked) == CART
+    composed = checked.compilation.robot
+    assert composed
+    whole = dump_robot(composed.manifest)
+    assert "urdf: ../../parts/cart.urdf\n" in whole
+    assert urdf_of(check_text(whole, home)) == CART
+    robot = f"{HEAD}include:\n  shell: ../../parts/shell.yaml\nbody:\n  urdf: own.urdf\n"
+    own = check_text(robot, home, others={"own.urdf": "<robot/>"})
+    assert urdf_of(own) == "<robot/>"
+
+
+def test_two_parts_do_not_both_bring_a_body(tmp_path: Path) -> None:
+    others = {"shell.yaml": PART, "cart.urdf": CART}
+    checked = check_text(f"{HEAD}include:\n  a: shell.yaml\n  b: shell.yaml\n", tmp_path, others=others)
+    assert checked.codes == ["RBX1307"]
+    assert "a robot has one 'body': leave one out" in checked.text
+
+
+def test_a_value_of_the_command_line_is_relative_to_the_robot(tmp_path: Path) -> None:
+    files = {"cart.urdf": CART, "other.urdf": "<robot/>"}
+    checked = check_text(ROBOT, tmp_path, others=files, sets=["body.urdf=other.urdf"])
+    assert urdf_of(checked) == "<robot/>"
+
+
+def test_a_plan_holds_the_text_as_it_was_checked(tmp_path: Path) -> None:
+    plan = check(tmp_path).plan
+    (tmp_path / "cart.urdf").write_text("gone")
+    assert load(dump(plan)) == plan
+
+
+def test_another_text_is_a_change_of_the_plan_that_can_be_read(tmp_path: Path) -> None:
+    before = check(tmp_path, cart_urdf=CART + "<!--" + "a" * 2000 + "-->").plan
+    after = check(tmp_path, cart_urdf=CART + "<!--" + "b" * 2000 + "-->").plan
+    [(name, [change])] = difference(before, after).changed.items()
+    assert (name, change.key) == ("robot_description", "urdf")
+    assert change.before != change.after
+    assert len(str(change)) < 120
