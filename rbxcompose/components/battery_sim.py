@@ -13,6 +13,7 @@ from rbxcompose.sdk import Component, Config, Live, Out, Ratio, Refused, Serves,
 from rbxcompose.sim.battery import BatteryCore, BatterySettings
 
 PERCENT = 100.0  # a `battery_level` message counts from 0 to 100
+DIGITS = 6  # of a percentage; further ones are rounding, by which 80 % would lie below 80 %
 
 
 class BatterySimConfig(Config):
@@ -71,7 +72,7 @@ class BatterySim(Component[BatterySimConfig]):
 
     def publish(self) -> None:
         """Send level and status; a new status is an event of the story."""
-        percent = self.core.level * PERCENT
+        percent = round(self.core.level * PERCENT, DIGITS)
         level, message = self.core.status
         self.battery_level(Float32(data=percent))
         self.status(level, message, level=f"{percent:.1f} %")

@@ -51,6 +51,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
         """Build the core."""
         self.core = Aggregator(self.analyzers(), started=self.now)
         self.told: dict[str, Level] = {}
+        self.is_going_down = False
         self.reported = self.now - PERIOD
 
     def analyzers(self) -> dict[str, Analyzer]:
@@ -77,6 +78,10 @@ class Diagnostics(Component[DiagnosticsConfig]):
         self.core.lost(self.now, names, cause)
         self.step(0.0)
 
+    def brake(self) -> None:
+        """Tell nothing that gets better from now on: what falls silent because it ends has not been mended."""
+        self.is_going_down = True
+
     def step(self, dt: float) -> None:
         """Report once a second, and at once when a group's level has changed."""
         if self.core.changed(self.now) or self.now - self.reported >= PERIOD:
@@ -89,7 +94,10 @@ class Diagnostics(Component[DiagnosticsConfig]):
         header = Header(stamp=to_time(self.stamp))
         self.diagnostics_agg(DiagnosticArray(header=header, status=tuple(map(message_of, tree))))
         for group in (one for one in tree if one.name.count("/") == 1):
-            if self.told.get(group.name, Level.OK) is not group.level:
+            told = self.told.get(group.name, Level.OK)
+            if self.is_going_down and group.level < told:
+                continue
+            if group.level is not told:
                 self.context.log(group.level, f"{group.name} is {group.level.name}: {group.message}")
             self.told[group.name] = group.level
 

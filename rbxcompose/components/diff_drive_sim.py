@@ -108,8 +108,9 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
         """Say in the status what was not followed as commanded."""
         dropped, clamped = self.core.dropped, self.core.clamped
         if dropped or clamped:
-            message = f"{dropped} commands dropped as absurd, {clamped} cut to the limits"
-            self.status(Level.WARN, message, dropped=dropped, clamped=clamped)
+            counts = ((dropped, "dropped as absurd"), (clamped, "cut to the limits"))
+            message = ", ".join(f"{count} {what}" for count, what in counts if count)
+            self.status(Level.WARN, f"commands: {message}", dropped=dropped, clamped=clamped)
 
     def stop(self) -> None:
         """Brake and take no command until `release`."""
@@ -118,6 +119,10 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
     def release(self) -> None:
         """Take commands again."""
         self.core.release()
+
+    def go_on(self) -> None:
+        """Brake until the next command: time stood still, or has jumped."""
+        self.core.forget()
 
     def brake(self) -> None:
         """Come to rest for good."""

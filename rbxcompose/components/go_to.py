@@ -107,6 +107,11 @@ class GoTo(Component[GoToConfig]):
         else:
             goal.feedback(NavigateToPose.Feedback(distance_remaining=self.core.distance))
 
+    def hold(self) -> None:
+        """Command rest: no step follows while robot time stands still."""
+        if self.driving is not None:
+            self.drive(AT_REST)
+
     def drive(self, velocity: Velocity2) -> None:
         """Publish a velocity."""
         self.cmd_vel(Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular)))

@@ -1,42 +1,51 @@
-"""The executive: runs the robot's mission with the actions of other components."""
+"""The executive: runs the robot's missions with the actions of other components."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Callable
+from functools import cached_property
 from typing import Annotated, Any, TypeVar
 
 from pydantic import InstanceOf, WithJsonSchema
 
-from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
-from rbxcompose.missions.engine import Engine
+from rbxcompose.executive import broadcast
+from rbxcompose.executive.arrivals import Arrivals
+from rbxcompose.executive.missions import Missions
+from rbxcompose.executive.running import PATIENCE, Running
+from rbxcompose.executive.shell import CALLS, PAUSES, PUBLISHES, SKILL, VALUE, port_name
+from rbxcompose.executive.words import words_of
+from rbxcompose.executive.world import RobotWorld
 from rbxcompose.missions.events import MissionEnded, MissionEvent
-from rbxcompose.missions.goals import goal_of
-from rbxcompose.missions.program import Program, RobotNames, Skill
-from rbxcompose.missions.sources import SkillSource, ValueSource
-from rbxcompose.missions.statuses import IDLE, NAMES, RUNNING
-from rbxcompose.missions.story import Story
+from rbxcompose.missions.logbook import INPUTS, Record
+from rbxcompose.missions.program import Program, RobotNames
+from rbxcompose.missions.results import Result
+from rbxcompose.missions.sources import PAUSE, SkillSource, TopicSource, ValueSource, Way
+from rbxcompose.missions.statuses import IDLE
+from rbxcompose.missions.using import Using
 from rbxcompose.missions.watching import POSE
+from rbxcompose.missions.world import World
 from rbxcompose.msgs import registry
+from rbxcompose.msgs.std_msgs import String
+from rbxcompose.msgs.std_srvs import SetBool
+from rbxcompose.qos import Qos
 from rbxcompose.sdk import (
+    Calls,
     CallsAction,
     Component,
     Config,
-    Ended,
     In,
     Level,
     Looks,
-    Outcome,
+    Out,
     Place,
     Port,
     Refused,
-    SentGoal,
     component,
 )
 
-BACK_WITHIN = 5.0  # [s] in which a server that is gone must be back
-STOP_WITHIN = 0.5  # [s] in which the stop that cancelled a goal is heard of here
-LOOK_AGAIN = 0.1  # [s] between two looks at what nothing announces
-VALUE, SKILL = "value_", "skill_"  # begin the ports of values and of skills
+LOOK_AGAIN = 0.1  # [s] between two looks for a pose that has not come yet
+EVENTS = "mission/events"
 
 
 T = TypeVar("T")
@@ -58,6 +67,10 @@ class MissionConfig(Config):
     """The robot's places."""
     skills: dict[str, Made[SkillSource]] = {}
     """The robot's skills."""
+    topics: dict[str, Made[TopicSource]] = {}
+    """The topics on which missions publish."""
+    services: dict[str, str] = {}
+    """The services that missions call, with their ROS types."""
 
     @property
     def reads(self) -> frozenset[str]:
@@ -65,28 +78,28 @@ class MissionConfig(Config):
         return frozenset[str]().union(*(program.reads() for program in self.programs.values()))
 
     @property
+    def used(self) -> dict[str, SkillSource]:
+        """Return the skills that any mission uses."""
+        names = {node.skill for program in self.programs.values() for node in program.nodes}
+        return {name: self.skills[name] for name in sorted(names & self.skills.keys())}
+
+    @cached_property
     def names(self) -> RobotNames:
         """Return what the robot gives to missions."""
-        types = {name: source.type for name, source in self.values.items()}
-        return RobotNames(types, self.places, {name: source.skill for name, source in self.skills.items()})
-
-
-class Errand:
-    """A goal on its way for a leaf; without `handle`, nobody is at it until `until` [s]."""
-
-    def __init__(self, leaf: int, skill: Skill, goal: Any) -> None:
-        self.leaf = leaf
-        self.skill = skill
-        self.goal = goal
-        self.handle: SentGoal | None = None
-        self.earliest = 0.0  # when to look for a server again [s]
-        self.until = 0.0
-        self.was_cancelled = False
+        broken = Using(self.programs).broken
+        return RobotNames(
+            {name: source.type for name, source in self.values.items()},
+            self.places,
+            {name: source.skill for name, source in self.skills.items()},
+            {name: program for name, program in self.programs.items() if name not in broken},
+            {name: topic.message for name, topic in self.topics.items()},
+            self.services,
+        )
 
 
 @component("mission")
 class Mission(Component[MissionConfig]):
-    """Runs the mission that the robot starts with; each action of the robot is a skill.
+    """Runs missions; each action of the robot is a skill. One mission begins by itself, people begin others beside it.
 
     It is made of the sections `missions`, `start`, `values` and `places`.
 
@@ -98,27 +111,50 @@ class Mission(Component[MissionConfig]):
 
     @classmethod
     def ports(cls, config: MissionConfig) -> dict[str, Port[Any]]:
-        """Return an input per value that is read, an action per skill that is used, and the pose if it is read."""
+        """Return an end for each value, skill, topic and service that is used, and for the pose if it is read."""
         ports: dict[str, Port[Any]] = {}
         for name in sorted(config.reads & config.values.keys()):
             source = config.values[name]
-            ports[VALUE + name] = In(registry.message(source.message), source.topic).named(VALUE + name)
-        used = {node.skill for program in config.programs.values() for node in program.nodes}
-        for name in sorted(used & config.skills.keys()):
-            skill = config.skills[name]
-            ports[SKILL + name] = CallsAction(registry.action(skill.action), skill.topic).named(SKILL + name)
+            ports[VALUE + name] = In(registry.message(source.message), source.topic)
+        for name, skill in config.used.items():
+            if skill.way is Way.SERVICE:
+                ports[SKILL + name] = Calls(registry.service(skill.action), skill.topic)
+            elif skill.way is Way.ACTION:
+                ports[SKILL + name] = CallsAction(registry.action(skill.action), skill.topic)
+                if skill.skill.pausable:
+                    ports[PAUSES + name] = Calls(SetBool, f"{skill.topic}/{PAUSE}")
+        for topic, target in config.topics.items():
+            ports[port_name(PUBLISHES, topic)] = Out(registry.message(target.message), topic, qos=target.qos)
+        for name, service in config.services.items():
+            ports[port_name(CALLS, name)] = Calls(registry.service(service), name)
         if POSE in config.reads:
-            ports[POSE] = Looks(source="base_footprint", target="map").named(POSE)
-        return ports
+            ports[POSE] = Looks(source="base_footprint", target="map")
+        if config.programs:
+            ports[port_name(PUBLISHES, EVENTS)] = Out(String, EVENTS, qos=Qos.EVENT)
+        return {name: port.named(name) for name, port in ports.items()}
+
+    @property
+    def equipment(self) -> MissionConfig:
+        """Return what missions may use."""
+        return self.config
 
     def configure(self) -> None:
         """Nothing has arrived and nothing runs."""
-        self.robot = MissionWorld(self)
-        self.engine: Engine | None = None  # from `start` on
-        self.is_paused = False
-        self.is_over = False
+        self.arrivals = Arrivals(self.config.values)
+        self.missions = Missions(self.config, self.world, self.story, self.publish)
+        self.broadcast = broadcast.Broadcast(self.config.programs, self.context.window)
+        self.is_held = False  # stopped before the start; a release alone lets nothing begin
+        self.kept: dict[str, str] = {}  # what people said to begin missions that still run
         self.shown = ""  # the status that was told last
         self.planned: float | None = None  # the wake that was asked for last [s]
+        self.misfits: set[str] = set()  # values whose messages have another shape
+
+    def world(
+        self, ended: Callable[[int, Result], None], say: Callable[[MissionEvent], None]
+    ) -> tuple[World, RobotWorld]:
+        """Return the world of a mission, and the part of it that is the robot; tests put another one around it."""
+        robot = RobotWorld(self, self.arrivals, ended, say)
+        return robot, robot
 
     def start(self) -> None:
         """Run the start mission, as soon as every value that it reads has arrived."""
@@ -126,104 +162,218 @@ class Mission(Component[MissionConfig]):
         if name is None:
             self.show(Level.OK, "no mission to start")
             return
-        self.story = Story(name, self.config.names.skills)
-        program, inputs = self.config.programs[name], self.config.inputs.get(name, {})
-        self.engine = Engine(program, self.config.names, inputs, self.robot)
-        if missing := self.missing():
+        try:
+            one = self.begin(name)
+            if self.is_held and not one.is_paused:
+                self.hold_back(one)
+        except Refused as refusal:  # it was begun by a person before
+            self.warn(f"mission {name} does not start: {refusal}")
+
+    def begin(self, name: str, inputs: dict[str, str] | None = None, state: str = "") -> Running:
+        """Begin a mission; a robot that is stopped holds it until the resume.
+
+        Raises:
+            Refused: if it cannot run, with the reason.
+        """
+        one = self.missions.run(name, inputs or {}, state)
+        if missing := one.missing():
             self.info(f"mission {name} waits for {', '.join(missing)}")
-        if self.is_paused:
-            self.tell(f"mission {name} is held until it is resumed")
-        self.context.wake_at(self.now)
+        if self.context.is_stopped:
+            self.hold_back(one)
+        self.look_soon()
+        return one
+
+    def hold_back(self, one: Running) -> None:
+        """Let a mission begin at the resume only."""
+        one.is_paused = True
+        self.tell(f"mission {one.name} is held until it is resumed")
 
     def received(self, port: str, message: Any) -> None:
-        """Take a value, and look at the mission if that waits for it."""
+        """Take a value, and look at the missions that wait for it."""
         name = port.removeprefix(VALUE)
-        self.robot.take(name, message)
-        if self.engine and (self.engine.status == IDLE or name in self.engine.reads()):
-            self.context.wake_at(self.now)
+        wrong = self.arrivals.take(name, message, self.now)
+        if wrong and name not in self.misfits:
+            self.misfits.add(name)
+            self.warn(f"value {name}: {wrong}")
+        if any(one.reads(name) for one in self.missions):
+            self.look_soon()
+
+    def look_soon(self) -> None:
+        """Be woken at this instant."""
+        self.context.wake_at(self.now)
 
     def wake(self) -> None:
         """Do what is due."""
         if self.planned is not None and self.planned <= self.now:
             self.planned = None
-        if self.engine is None or self.is_over or self.is_paused:
-            return
-        if self.engine.status == IDLE and (missing := self.missing()):
-            self.show(Level.OK, f"waiting for {', '.join(missing)}")
-            self.plan(self.now + LOOK_AGAIN if POSE in missing else None)
-            return
-        self.show(Level.OK, f"running {self.config.start}")
-        self.robot.look_after_errands()
-        if self.engine.tick(self.now) == RUNNING:
-            due = (self.engine.next_wake(), self.robot.next_look())
-            self.plan(min((time for time in due if time is not None), default=None))
-        elif self.robot.end:
-            self.finish(self.robot.end)
+        wakes: list[float] = []
+        for one in self.missions:
+            if not one.is_paused:
+                wakes += self.turn(one)
+        if wakes:
+            self.plan(min(wakes))
+        self.broadcast.tell(self.missions)
 
-    def plan(self, time: float | None) -> None:
+    def turn(self, one: Running) -> list[float]:
+        """Do what is due of a mission; return when it wants to be woken [s], if it does."""
+        if one.engine.status == IDLE and (missing := one.missing()):
+            return self.wait(one, ", ".join(missing))
+        if one.began is None:
+            self.show(Level.OK, self.running_text())
+        one.tick(self.now)
+        if one.end is not None:
+            self.finish(one.name, one.end)
+        due = one.next_wake()
+        return [due] if due is not None else []
+
+    def wait(self, one: Running, missing: str) -> list[float]:
+        """Tell what a mission waits for before it begins; return when to look again [s]."""
+        self.show(Level.OK, f"waiting for {missing}")
+        if one.loses_patience(self.now):
+            text = f"waits for {missing}, of which nothing has come for {PATIENCE:g} s"
+            self.warn(f"mission {one.name} {text}")
+            self.context.notify("mission_waits", mission=one.name, message=text)
+        return [self.now + LOOK_AGAIN if POSE in missing else one.patient_until or self.now]
+
+    def plan(self, time: float) -> None:
         """Ask for a wake, once for each time."""
-        if time is not None and time != self.planned:
+        if time != self.planned:
             self.context.wake_at(time)
         self.planned = time
 
-    def missing(self) -> list[str]:
-        """Return the names that the mission reads and of which nothing has come yet."""
-        reads = self.engine.program.reads() if self.engine else frozenset[str]()
-        known = reads & {*self.config.values, POSE}
-        return sorted(name for name in known if self.robot.value(name) is NOT_ARRIVED)
+    @property
+    def occupation(self) -> str:
+        """Return which missions run."""
+        names = [one.name for one in self.missions if not one.is_paused]
+        return f"mission {names[0]} runs" if len(names) == 1 else f"missions {', '.join(names)} run" if names else ""
 
-    def finish(self, end: MissionEnded) -> None:
-        """Tell the supervisor that the mission has ended."""
-        self.is_over = True
-        self.show(Level.OK if end.result == "success" else Level.ERROR, f"{self.config.start}: {end.result}")
-        self.context.notify("mission_ended", mission=self.config.start, outcome=end.result, message=end.message)
+    @property
+    def claims(self) -> bool:
+        """Tell whether a mission uses a skill that claims a part of the robot."""
+        return any(one.claims for one in self.missions)
+
+    def take_over(self, old: Mission) -> None:
+        """Stay held if the missions were."""
+        self.is_held = old.is_held  # as the start mission was
+
+    def finish(self, name: str, end: MissionEnded) -> None:
+        """Tell that a mission has ended; with the start mission the robot may go down."""
+        self.show(Level.ERROR if end.result == "failure" else Level.OK, f"{name}: {end.result}")
+        self.keep()
+        if name == self.config.start:
+            self.context.notify("mission_ended", mission=name, outcome=end.result, message=end.words)
 
     def stop(self) -> None:
-        """Pause the mission; what it was at is asked for again at the resume."""
-        if not self.is_over and not self.is_paused:
-            self.pause("stopped")
+        """Pause all missions; what they were at is asked for again at the resume."""
+        self.is_held = not self.missions.runs
+        for one in self.missions:
+            if not one.is_paused:
+                self.pause(one, "stopped")
 
     def brake(self) -> None:
-        """End the mission: the robot is going down."""
-        if self.engine and not self.is_over:
-            self.is_over = True
-            self.engine.abort(self.now)
+        """End all missions: the robot is going down, or another executive takes over."""
+        self.is_held = self.is_held or any(one.is_paused for one in self.missions)
+        for one in self.missions:
+            one.abort(self.now)
+        self.broadcast.tell(self.missions)
+
+    # What people want
 
     def command(self, verb: str) -> str:
-        """Pause or resume the mission.
+        """Run, cancel, pause or resume a mission.
 
         Raises:
-            Refused: if there is nothing to pause or to resume, or the robot is held by a stop.
+            Refused: if it cannot be done, with the reason.
         """
-        if verb not in ("pause", "resume"):
-            return super().command(verb)
-        if self.engine is None or self.is_over:
-            raise Refused("no mission is running")
-        if verb == "pause":
-            if self.is_paused:
-                raise Refused(f"mission {self.config.start} is paused already")
-            return self.pause("paused")
+        words = words_of(verb)
+        match words.verb:
+            case "run":
+                self.begin(words.mission, dict(words.inputs), words.start)
+                self.keep(words.mission, verb)
+                return f"mission {words.mission} begins"
+            case "cancel":
+                return self.cancel(self.missions.running(words.mission))
+            case "pause":
+                one = self.missions.running(words.mission, lambda one: not one.is_paused)
+                if one.is_paused:
+                    raise Refused(f"mission {one.name} is paused already")
+                return self.pause(one, "paused")
+            case "resume":
+                return self.resume(self.missions.running(words.mission, lambda one: one.is_paused, "paused"))
+        return super().command(verb)
+
+    def query(self, words: str) -> str:
+        """Answer in JSON what is asked about missions.
+
+        The questions are `ls`, `picture NAME`, `state NAME SINCE`, `whole NAME` (both of them) and `log NUMBER`.
+
+        Raises:
+            Refused: if there is no such mission, or the question is none.
+        """
+        match words.split():
+            case ["ls"]:
+                return json.dumps(self.missions.listed())
+            case ["picture", name]:
+                return json.dumps(self.missions.picture(name))
+            case ["state", name, since] if since.isdecimal():
+                return json.dumps(self.missions.seen(name, int(since)))
+            case [broadcast.WHOLE, name]:
+                return json.dumps({**self.missions.seen(name), "picture": self.missions.picture(name)})
+            case ["log", number] if number.isdecimal():
+                return json.dumps(self.missions.since(int(number)))
+        raise Refused(f"'{words}' is no question about missions")
+
+    def cancel(self, one: Running) -> str:
+        """End a mission for good and return what is told of it."""
+        one.abort(self.now)
+        if one.end is not None:
+            self.finish(one.name, one.end)
+        self.broadcast.tell(self.missions)
+        return f"mission {one.name} cancelled"
+
+    def pause(self, one: Running, why: str) -> str:
+        """Hold a mission and return what is told of it."""
+        one.pause(self.now)
+        self.broadcast.tell(self.missions)
+        return self.tell(f"mission {one.name} {why}")
+
+    def resume(self, one: Running) -> str:
+        """Go on with a mission and return what is told of it.
+
+        Raises:
+            Refused: if the robot is held by a stop, or the mission is not paused.
+        """
         if self.context.is_stopped:
             raise Refused("the robot is stopped: release it first")
-        if not self.is_paused:
-            raise Refused(f"mission {self.config.start} is not paused")
-        return self.resume()
+        if not one.is_paused:
+            raise Refused(f"mission {one.name} is not paused")
+        one.resume(self.now)
+        self.look_soon()
+        return self.tell(f"mission {one.name} resumed")
 
-    def pause(self, why: str) -> str:
-        """Hold the mission and return what is told of it."""
-        self.is_paused = True
-        if self.engine is None:
-            return ""
-        self.engine.pause(self.now)
-        return self.tell(f"mission {self.config.start} {why}")
+    def keep(self, name: str = "", line: str = "") -> None:
+        """Have the supervisor tell us again, after a crash, which missions people have begun that still run."""
+        kept = {**self.kept, **({name: line} if name else {})}
+        still = {one: words for one, words in kept.items() if one in self.missions.names}
+        if still != self.kept:
+            self.kept = still
+            self.context.notify("commands", instance=self.name, commands="\n".join(still.values()))
 
-    def resume(self) -> str:
-        """Go on and return what is told of it."""
-        self.is_paused = False
-        if self.engine:
-            self.engine.resume(self.now)
-        self.context.wake_at(self.now)
-        return self.tell(f"mission {self.config.start} resumed")
+    # What is told
+
+    def story(self, mission: str, level: Level, text: str) -> None:
+        """Log a line of a mission's story, with its name if several run."""
+        several = len(self.missions.names) > 1
+        self.context.log(level, f"{mission}: {text}" if several and not text.startswith("mission ") else text)
+
+    def publish(self, record: Record) -> None:
+        """Publish a record of the log, unless it only tells what came in."""
+        if record["event"] not in INPUTS:
+            self.bound[port_name(PUBLISHES, EVENTS)](String(data=json.dumps(record)))
+
+    def running_text(self) -> str:
+        """Return in words what runs."""
+        return f"running {', '.join(self.missions.names)}"
 
     def tell(self, text: str) -> str:
         """Log a text and make it the status."""
@@ -238,125 +388,10 @@ class Mission(Component[MissionConfig]):
             self.status(level, text)
 
     def summary(self) -> dict[str, str]:
-        """Return how the mission stands and what it did."""
-        if self.engine is None:
+        """Return how the missions stand and what they did."""
+        runs = list(self.missions.runs.values())
+        if not runs:
             return {}
-        how = self.robot.end.result if self.robot.end else NAMES[self.engine.status]
-        return {"mission": f"{self.config.start}: {how}", "skills": self.story.skills()}
-
-
-class MissionWorld:
-    """What the engine needs of the robot: values from messages, skills as goals, a log."""
-
-    def __init__(self, mission: Mission) -> None:
-        self.mission = mission
-        self.end: MissionEnded | None = None
-        self._values: dict[str, Value] = dict.fromkeys(mission.config.values, NOT_ARRIVED)
-        self._arrived: dict[str, float] = {}
-        self._counts: dict[str, int] = dict.fromkeys(mission.config.values, 0)
-        self._errands: dict[int, Errand] = {}
-
-    def take(self, name: str, message: Any) -> None:
-        """Keep the value in a message."""
-        source = self.mission.config.values[name]
-        value = message
-        for field in source.field.split("."):
-            value = getattr(value, field)
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        self._values[name] = float(value) * source.scale if is_number else value
-        self._arrived[name] = self.mission.now
-        self._counts[name] += 1
-
-    def value(self, name: str, /) -> Value | NotArrived:
-        """Return the newest value in SI."""
-        if name == POSE:
-            pose = self.mission.bound[POSE].now()
-            return NOT_ARRIVED if pose is None else pose
-        return self._values[name]
-
-    def age(self, name: str, /) -> float | NotArrived:
-        """Return the time since the last message [s]."""
-        if self._values[name] is NOT_ARRIVED:
-            return NOT_ARRIVED
-        return self.mission.now - self._arrived[name]
-
-    def count(self, name: str, /) -> int:
-        """Return how many messages have come."""
-        return self._counts[name]
-
-    def say(self, event: MissionEvent, /) -> None:
-        """Log what happens."""
-        level, text = self.mission.story.tell(event)
-        if isinstance(event, MissionEnded):
-            self.end = event
-        self.mission.context.log(level, text)
-
-    def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
-        """Send a goal."""
-        source = self.mission.config.skills[skill]
-        errand = Errand(leaf, source.skill, goal_of(registry.action(source.action), arguments))
-        self._errands[leaf] = errand
-        if not self._send(errand):
-            self._wait(errand, f"nobody serves {skill}", BACK_WITHIN)
-
-    def halt(self, leaf: int, /) -> None:
-        """Cancel a goal, and hear nothing of it any more."""
-        errand = self._errands.pop(leaf, None)
-        if errand is not None and errand.handle is not None:
-            errand.handle.cancel()
-
-    def next_look(self) -> float | None:
-        """Return when to look after the errands that nobody is at [s]."""
-        if any(errand.handle is None for errand in self._errands.values()):
-            return self.mission.now + LOOK_AGAIN
-        return None
-
-    def look_after_errands(self) -> None:
-        """Send the goals again whose server is back; give up those that have waited long enough."""
-        for errand in list(self._errands.values()):
-            if errand.handle is not None:
-                continue
-            if self.mission.now < errand.earliest:
-                continue  # who has just gone may still be in the books
-            if not errand.was_cancelled and self._send(errand):
-                self.mission.info(f"{errand.skill.name}: sent again")
-            elif self.mission.now >= errand.until:
-                reason = "cancelled by someone else" if errand.was_cancelled else "its server is gone"
-                self._end(errand, False, reason)
-
-    def _send(self, errand: Errand) -> bool:
-        """Send the goal, if a server is there."""
-        caller = self.mission.bound[SKILL + errand.skill.name]
-        if not caller.is_available:
-            return False
-        errand.handle = caller(errand.goal, lambda ended: self._ended(errand, ended))
-        return True
-
-    def _ended(self, errand: Errand, ended: Ended[Any]) -> None:
-        if self._errands.get(errand.leaf) is not errand:
-            return  # it was halted meanwhile
-        errand.handle = None
-        match ended.outcome:
-            case Outcome.SUCCEEDED:
-                self._end(errand, True, ended.message)
-            case Outcome.LOST if errand.skill.restartable:
-                self._wait(errand, f"the server of {errand.skill.name} is gone", BACK_WITHIN)
-            case Outcome.LOST:
-                self._end(errand, False, "its server is gone")
-            case Outcome.CANCELED:
-                # A stop cancels goals, too, and may be on its way to this process: then it is no failure.
-                errand.was_cancelled = True
-                errand.until = self.mission.now + STOP_WITHIN
-            case _:
-                self._end(errand, False, ended.message or str(ended.outcome))
-        self.mission.context.wake_at(self.mission.now)
-
-    def _wait(self, errand: Errand, why: str, seconds: float) -> None:
-        errand.earliest = self.mission.now + LOOK_AGAIN
-        errand.until = self.mission.now + seconds
-        self.mission.warn(f"{why}; waiting for up to {seconds:.0f} s")
-
-    def _end(self, errand: Errand, success: bool, message: str) -> None:
-        del self._errands[errand.leaf]
-        if self.mission.engine:
-            self.mission.engine.ended(errand.leaf, success, message)
+        told = "; ".join(f"{one.name}: {one.end.result if one.end else one.state}" for one in runs)
+        skills = "; ".join(text for one in runs if (text := one.story.skills()))
+        return {"mission": told, **({"skills": skills} if skills else {})}

@@ -10,7 +10,7 @@ from rbxcompose.msgs import registry
 from rbxcompose.msgs.std_msgs import Empty
 from rbxcompose.msgs.types import Message
 from rbxcompose.mux.core import MuxCore, Source
-from rbxcompose.sdk import Component, Config, In, Level, Out, Port, Time, component
+from rbxcompose.sdk import Component, Config, Frequency, In, Level, Out, Port, Time, component
 
 LOCK = "lock_"  # begins the port of a lock, which no input may be named like
 
@@ -24,6 +24,13 @@ class MuxSourceConfig(Config):
     """Silent for longer than this, it counts as gone; counted from the last message's arrival."""
 
 
+class MuxInputConfig(MuxSourceConfig):
+    """An input."""
+
+    max_rate: Frequency | None = Field(None, gt=0)
+    """More is not taken from one publisher elsewhere: it is dropped, and told in diagnostics. 1000 Hz if left out."""
+
+
 class MuxConfig(Config):
     """What goes through, from where, in which order."""
 
@@ -31,7 +38,7 @@ class MuxConfig(Config):
     """Topic that the winner's messages go to."""
     message: str = "geometry_msgs/msg/Twist"
     """ROS name of the message type."""
-    inputs: dict[str, MuxSourceConfig]
+    inputs: dict[str, MuxInputConfig]
     """Sources by name; each has the topic `<output>/<name>`."""
     locks: dict[str, MuxSourceConfig] = {}
     """Heartbeat topics `<output>/<name>`: a silent one locks all inputs of a lower priority."""
@@ -52,8 +59,9 @@ class Mux(Component[MuxConfig]):
         """Return the output, an input per source and one per lock."""
         message = registry.message(config.message)
         ports: dict[str, Port[Any]] = {"output": Out(message, config.output, qos="command").named("output")}
-        for name in config.inputs:
-            ports[name] = In(message, f"{config.output}/{name}", qos="command", is_open=True).named(name)
+        for name, one in config.inputs.items():
+            topic = f"{config.output}/{name}"
+            ports[name] = In(message, topic, qos="command", is_open=True, max_rate=one.max_rate).named(name)
         for name in config.locks:
             ports[LOCK + name] = In(Empty, f"{config.output}/{name}", qos="command", is_open=True).named(LOCK + name)
         return ports
@@ -68,7 +76,17 @@ class Mux(Component[MuxConfig]):
             locks={name: Source(one.priority, one.timeout) for name, one in self.config.locks.items()},
             stopped=self.context.is_stopped,
         )
-        self.told: str | None = None
+        self.told: object = None
+        self.refused: list[str] = []
+
+    def activate(self) -> None:
+        """Look whether all locks are heard, once each had the time for it."""
+        if self.config.locks:
+            self.context.wake_at(self.now + max(lock.timeout for lock in self.config.locks.values()))
+
+    def take_over(self, old: Mux) -> None:
+        """Know who was talking: otherwise all would have to come to rest once after a stop."""
+        self.core.take_over(old.core)
 
     def received(self, port: str, message: Any) -> None:
         """Forward a message of the winner, or take a heartbeat."""
@@ -94,6 +112,16 @@ class Mux(Component[MuxConfig]):
         self.core.release(self.now)
         self.settle()
 
+    def hold(self) -> None:
+        """Send a zero and let nothing through while robot time stands still."""
+        self.send(self.core.hold(self.now))
+        self.settle()
+
+    def go_on(self) -> None:
+        """Let through what comes from now on."""
+        self.core.resume(self.now)
+        self.settle()
+
     def brake(self) -> None:
         """Send a last zero and let nothing through any more."""
         self.send(self.core.close(self.now))
@@ -104,10 +132,15 @@ class Mux(Component[MuxConfig]):
         self.bound["output"](message)
 
     def settle(self) -> None:
-        """Ask for the next deadline and say who is let through, if that has changed."""
+        """Ask for the next deadline and say who is let through and who is locked out, if that has changed."""
         if (deadline := self.core.next_deadline()) is not None:
             self.context.wake_at(deadline)
         active = "stop" if self.core.stopped else self.core.active
-        if active != self.told:
-            self.told = active
-            self.status(Level.OK, self.core.why(self.now), active=active or "none")
+        locked, refused = self.core.locked_out(self.now), self.core.refused(self.now)
+        if (active, locked) != self.told:
+            self.told = active, locked
+            level = Level.WARN if locked else Level.OK
+            self.status(level, self.core.why(self.now), active=active or "none", locked_out=", ".join(locked) or "none")
+        if refused and not self.refused:
+            self.warn(f"commands are not let through: {self.core.why(self.now)}")
+        self.refused = refused

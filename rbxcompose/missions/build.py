@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rbxcompose.missions.modifiers import MODIFIERS, Modifier
+from rbxcompose.missions.leaf import Leaf
+from rbxcompose.missions.modifiers.registry import modifiers
+from rbxcompose.missions.observing import Named, Observed, Since
 from rbxcompose.missions.program import Node, Program, RobotNames
-from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.registry import all_kinds
+from rbxcompose.missions.run import Run
 from rbxcompose.missions.scopes import ItemScope, MissionScope, SinceScope, new_names
 from rbxcompose.missions.skill import SkillTask
 from rbxcompose.missions.task import Site, Task
@@ -15,49 +18,64 @@ if TYPE_CHECKING:
     from rbxcompose.missions.engine import Engine
 
 
-class Since(Modifier):
-    """Counts messages from the start of its node, outermost around one that asks `new($x)`."""
-
-    __slots__ = ("view",)
-
-    def __init__(self, site: Site, options: SinceScope, inner: Task) -> None:
-        super().__init__(site, options, inner)
-        self.view = options
-
-    def begin(self) -> int:
-        """Count from now on."""
-        self.view.mark()
-        return self.advance(self.inner)
-
-
 class Builder:
-    """Makes the tasks of one engine; `leaves` are those of skills, by node number."""
+    """Makes the runs and tasks of one engine; `leaves` are those that wait for results, by node number."""
 
-    def __init__(self, engine: Engine, program: Program, robot: RobotNames) -> None:
+    def __init__(self, engine: Engine, robot: RobotNames) -> None:
         self.engine = engine
-        self.program = program
         self.robot = robot
-        self.leaves: dict[int, SkillTask] = {}
+        self.nodes = engine.program.nodes
+        self.leaves: dict[int, Leaf] = {}
+        self.tasks: list[Task] = []
+        self.runs: list[Run] = []
 
-    def build(self, number: int, scope: MissionScope) -> Task:
+    def run(self, program: Program) -> Run:
+        """Return the run of a mission with all its tasks; those below a `use` are part of it."""
+        run = Run(self.engine, program, self.robot)
+        self.runs.append(run)
+        run.mission.root = self.build(program.main, run, run.scope)
+        for interrupt, reaction in zip(program.interrupts, run.reactions, strict=True):
+            if interrupt.root is not None:
+                reaction.root = self.build(interrupt.root, run, run.scope)
+        return run
+
+    def build(self, number: int, run: Run, scope: MissionScope) -> Task:
         """Return the outermost task of a node, with all below it.
 
         Raises:
             KeyError: if the robot has no such skill; `check_program` finds that before.
         """
-        node = self.program.nodes[number]
+        node = self.nodes[number]
         names = frozenset[str]().union(*(new_names(asked.expression) for asked in node.asked))
         since = SinceScope(scope, names) if names else None
         own: MissionScope = since or scope
         item = ItemScope(own, node.item) if node.item else None
-        children = tuple(self.build(child, item or own) for child in node.children)
-        site = Site(self.engine, node, own, children, item)
-        task = kinds()[node.kind].task(site, node.options) if node.kind else self._skill(site, node)
-        for name in reversed(MODIFIERS):
+        inner = self.run(node.inner) if node.inner else None
+        children = () if node.inner else tuple(self.build(child, run, item or own) for child in node.children)
+        site = Site(self.engine, run, node, own, children, item, inner)
+        task = self._kept(self._inside(site, node))
+        for name in reversed(tuple(modifiers())):
             if name in node.modifiers:
-                task = MODIFIERS[name](site, node.modifiers[name], task)
-        return Since(site, since, task) if since else task
+                task = self._kept(modifiers()[name](site, node.modifiers[name], task))
+        return self._around(site, node, since, task)
 
-    def _skill(self, site: Site, node: Node) -> Task:
-        task = self.leaves[node.number] = SkillTask(site, self.robot.skills[node.skill], node.arguments)
+    def _inside(self, site: Site, node: Node) -> Task:
+        kind = all_kinds().get(node.kind)
+        task = kind.task(site, node.options) if kind else SkillTask(site, self.robot.skills[node.skill], node.arguments)
+        if isinstance(task, Leaf):
+            self.leaves[node.number] = task
+        return task
+
+    def _around(self, site: Site, node: Node, since: SinceScope | None, task: Task) -> Task:
+        """Return the task with those around it that belong to no modifier."""
+        if since:
+            task = self._kept(Since(site, since, task))
+        if node.name:
+            task = self._kept(Named(site, node.name, task))
+        if self.engine.settings.observer:
+            task = self._kept(Observed(site, self.engine.settings.observer, task))
+        return task
+
+    def _kept(self, task: Task) -> Task:
+        self.tasks.append(task)
         return task

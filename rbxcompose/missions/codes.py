@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rbxcompose.findings import Severity, kind
+from rbxcompose.findings import Finding, Related, Severity, Span, kind
 
 UNKNOWN_KEY = kind(
     "RBX4101",
@@ -389,3 +389,8 @@ do:
 """,
     Severity.WARNING,
 )
+
+
+def removed_place(span: Span, name: str, remover: Span) -> Finding:
+    """Return the finding for a place that the robot had until a layer over it took it away."""
+    return UNKNOWN_PLACE.at(span, f"there is no place '{name}' any more", related=[Related(remover, "removed here")])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rbxcompose.expressions.evaluate import holds
-from rbxcompose.missions.program import Interrupt
+from rbxcompose.missions.program import Interrupt, Target
 from rbxcompose.missions.scopes import MissionScope, SinceScope, new_names
 from rbxcompose.missions.statuses import RUNNING, SUCCESS
 from rbxcompose.missions.task import Task
@@ -20,12 +20,12 @@ class Course:
         self.order = order
         self.root: Task | None = None
         self.current: Task | None = None  # the root while it runs
-        self._lost = 0.0  # [s] for which the time stood still
-        self._left: float | None = None  # when it was suspended [s]
+        self.lost = 0.0  # [s] for which the time stood still
+        self.left: float | None = None  # when it was suspended [s]
 
     def time(self, now: float) -> float:
         """Return the time of this course [s]."""
-        return now - self._lost
+        return now - self.lost
 
     def tick(self) -> int:
         """Start the root or go on with it; a reaction without a root is done at once."""
@@ -38,20 +38,34 @@ class Course:
 
     def suspend(self, now: float, anew: bool) -> None:
         """Stop what runs, keep the place and stop the clock."""
-        self._left = now
+        self.left = now
+        self.cut(anew)
+
+    def cut(self, anew: bool) -> None:
+        """Stop what runs and keep the place; who calls this stops the clock, if it is to be stopped."""
         if self.current is not None and self.current.suspend(anew):
             self.current = None
 
     def resume(self, now: float) -> None:
         """Let the clock go on."""
-        if self._left is not None:
-            self._lost += now - self._left
-            self._left = None
+        if self.left is not None:
+            self.lost += now - self.left
+            self.left = None
+
+    def begin_anew(self, target: Target) -> bool:
+        """Let what is named begin again, if it runs here; tell whether it does."""
+        current = self.current
+        if current is None:
+            return False
+        if current.number == target.number and not target.is_round:
+            self.halt()
+            return True
+        return current.restart(target)
 
     def restart(self) -> None:
         """Forget an earlier run."""
         self.current = None
-        self._lost, self._left = 0.0, None
+        self.lost, self.left = 0.0, None
 
     def halt(self) -> None:
         """Stop what runs, for good."""
@@ -61,11 +75,13 @@ class Course:
 
 
 class Reaction(Course):
-    """An interrupt: its condition and its course."""
+    """An interrupt: its condition, its course, and what comes afterwards."""
 
     def __init__(self, order: int, definition: Interrupt, scope: MissionScope) -> None:
         super().__init__(order)
         self.name = definition.name
+        self.afterwards = definition.afterwards
+        self.targets = definition.targets
         self.watched = Watched.of(definition.when.expression)
         self.scope = SinceScope(scope, new_names(definition.when.expression))
         self.is_armed = True  # it may act: its condition was false since it last did

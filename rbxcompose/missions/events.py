@@ -29,6 +29,44 @@ class SkillEnded:
 
 
 @dataclass(frozen=True, slots=True)
+class NodeStarted:
+    """A node with a name, or a state of a machine, was started."""
+
+    node: int
+    name: str
+    is_state: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class NodeEnded:
+    """A node with a name, or a state, ended: `success`, `failure`, `skipped`, `halted`, or an outcome of its own."""
+
+    node: int
+    name: str
+    result: str
+    is_state: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """A machine goes from a state to another one, or to one of its ends, because of an outcome."""
+
+    machine: int
+    state: str
+    outcome: str
+    to: str
+
+
+@dataclass(frozen=True, slots=True)
+class Published:
+    """A node published a message on a topic."""
+
+    node: int
+    topic: str
+    fields: Mapping[str, Value]
+
+
+@dataclass(frozen=True, slots=True)
 class InterruptStarted:
     """A condition of `interrupts:` holds; `shown` are the values that it read, as text."""
 
@@ -39,9 +77,10 @@ class InterruptStarted:
 
 @dataclass(frozen=True, slots=True)
 class InterruptEnded:
-    """The reaction is done; the leaves that it halted start again."""
+    """The reaction is done; `afterwards` tells how it goes on, `back_to` are the leaves that it halted."""
 
     name: str
+    afterwards: str
     back_to: tuple[int, ...]
 
 
@@ -63,10 +102,30 @@ class Reported:
 
 @dataclass(frozen=True, slots=True)
 class MissionEnded:
-    """The mission ended in `success` or `failure`, or was `halted` from outside."""
+    """The mission ended in `success` or `failure`, or was `halted` from outside; `outcome` may be an end's own name."""
 
     result: str
     message: str = ""
+    outcome: str = ""
+
+    @property
+    def words(self) -> str:
+        """Return its end's own name, if it has one, and why it ended; empty if there is nothing to say."""
+        is_told = self.outcome in ("", self.result) or self.message.endswith(self.outcome)
+        own = "" if is_told else f"ended in {self.outcome}"
+        return ": ".join(text for text in (own, self.message) if text)
 
 
-MissionEvent = SkillStarted | SkillEnded | InterruptStarted | InterruptEnded | Logged | Reported | MissionEnded
+MissionEvent = (
+    SkillStarted
+    | SkillEnded
+    | NodeStarted
+    | NodeEnded
+    | Transition
+    | Published
+    | InterruptStarted
+    | InterruptEnded
+    | Logged
+    | Reported
+    | MissionEnded
+)

@@ -21,7 +21,6 @@ from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions.kinds.for_ import ForOptions
-from rbxcompose.missions.kinds.repeat import RepeatOptions
 from rbxcompose.missions.program import Assignment, Node, Program
 from rbxcompose.missions.spans import expression_of
 
@@ -93,17 +92,6 @@ def items_of(node: Node, constants: Constants, places: Mapping[str, Place]) -> l
 def starts_always(node: Node) -> bool:
     """Tell whether nothing can keep a node from starting."""
     return "only_if" not in node.modifiers
-
-
-def never_succeeds(program: Program, node: Node) -> bool:
-    """Tell whether a node can only run for ever or fail."""
-    if not starts_always(node) or node.modifiers.get("optional"):
-        return False
-    if isinstance(node.options, RepeatOptions):
-        return node.options.rounds is None and node.options.until is None
-    if node.kind == "sequence":
-        return any(never_succeeds(program, program.nodes[child]) for child in node.children)
-    return False
 
 
 def never_fails(node: Node) -> bool:

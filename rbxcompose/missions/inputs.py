@@ -3,24 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
 
 from rbxcompose.config import Place
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Finding, Span
-from rbxcompose.manifest.tree import Entry
+from rbxcompose.manifest.tree import NOWHERE, Entry, Scalar
 from rbxcompose.missions import codes
 from rbxcompose.missions.header import range_trouble
 from rbxcompose.missions.literals import WrongValue, typed
 from rbxcompose.missions.program import Datum, Input, Program
 
 
+def bind_texts(
+    program: Program, given: Mapping[str, str], known: Mapping[str, Value], places: Mapping[str, Place]
+) -> tuple[dict[str, Value], list[Finding]]:
+    """Return the values of all inputs when some are given as text, laid over `known` ones; and what is wrong."""
+    entries = {name: Entry(Scalar(name, NOWHERE), Scalar(text, NOWHERE)) for name, text in given.items()}
+    asked = {name: one for name, one in program.inputs.items() if name in given or name not in known}
+    values, findings = bind_inputs(replace(program, inputs=asked), entries, places, NOWHERE)
+    return {**known, **values}, findings
+
+
 def bind_inputs(
-    program: Program, given: Mapping[str, Entry], places: Mapping[str, Place], span: Span
+    program: Program,
+    given: Mapping[str, Entry],
+    places: Mapping[str, Place],
+    span: Span,
+    removed: Mapping[str, Span] = MappingProxyType({}),
 ) -> tuple[dict[str, Value], list[Finding]]:
     """Return the values of all inputs by name, and what is wrong with those that were given.
 
     `given` are the entries below `with:`, `span` is the place of the robot's entry for the mission.
+    `removed` are places that are gone, with what took them away.
     """
     findings: list[Finding] = []
     for name, entry in given.items():
@@ -36,7 +53,7 @@ def bind_inputs(
             message = f"the input '{name}' of the mission '{program.name}' needs a value"
             findings.append(codes.WRONG_INPUT.at(span, message, help=f"write it under 'with': '{name}: ...'"))
         elif datum is not None:
-            values[name] = _placed(datum, places, findings)
+            values[name] = _placed(datum, places, removed, findings)
     return values, findings
 
 
@@ -53,11 +70,14 @@ def _given(declared: Input, entry: Entry, findings: list[Finding]) -> Datum | No
     return datum
 
 
-def _placed(datum: Datum, places: Mapping[str, Place], findings: list[Finding]) -> Value:
+def _placed(datum: Datum, places: Mapping[str, Place], removed: Mapping[str, Span], findings: list[Finding]) -> Value:
     """Return the value, with the place itself for the name of one."""
     if datum.type.kind not in (TypeKind.PLACE, TypeKind.POSE):
         return datum.value
     name = str(datum.value)
+    if name in removed:
+        findings.append(codes.removed_place(datum.span, name, removed[name]))
+        return name
     if name not in places:
         message = f"there is no place '{name}'"
         findings.append(codes.UNKNOWN_PLACE.misspelt(datum.span, message, name, places, "places of this robot"))

@@ -2,86 +2,115 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import replace
+import re
+from collections.abc import Collection, Iterable
+from functools import cache
 
-from rbxcompose.findings import Edit, Fix, nearest
+from rbxcompose.findings import Edit, Fix, nearest, replacement
 from rbxcompose.manifest.tree import Mapping, Scalar
 from rbxcompose.missions import codes
-from rbxcompose.missions.modifiers import MODIFIERS
+from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.node_reader import Nodes
+from rbxcompose.missions.other_words import SETTINGS
 from rbxcompose.missions.registry import Kind, kinds
+from rbxcompose.missions.strays import is_setting, tight_dashes, unknown_setting
 
-ANYWHERE = ("name", *MODIFIERS)
 DASH = "- "
+TIGHT_COLON = re.compile(r"[a-z][a-z0-9_]*:[^\s:/].*")
 
 
-def find_key(mapping: Mapping, nodes: Nodes) -> tuple[str, Kind | None]:
-    """Return the key of a node and its kind; None for a skill, an empty key if there is neither."""
-    own = [key for key in mapping.entries if key not in ANYWHERE]
-    known = [key for key in own if key in kinds()]
+@cache
+def anywhere() -> tuple[str, ...]:
+    """Return the keys that any node may have."""
+    return ("name", *modifier_keys())
+
+
+def find_key(mapping: Mapping, nodes: Nodes, skills: Collection[str] = ()) -> tuple[str, Kind | None]:
+    """Return the key of a node and its kind; None for a skill, an empty key if there is neither.
+
+    `skills` are those of the robot, as far as they are known.
+    """
+    if tight := tight_dashes(mapping):
+        for finding in tight:
+            nodes.add(finding)
+        return "", None
+    own = [key for key in mapping.entries if key not in anywhere()]
+    known = [key for key in own if key in kinds() and not _is_condition(mapping, key, own)]
     if known:
-        return _of_kind(mapping, known[0], kinds()[known[0]], nodes)
+        return _of_kind(mapping, known[0], kinds()[known[0]], nodes, skills)
     options = {option for kind in kinds().values() for option in kind.options}
     others = [key for key in own if key not in options]
     if len(others) < len(own) and (misspelt := next((key for key in others if _near(key, kinds())), None)):
         kind = kinds()[_near(misspelt, kinds())]
         span = mapping.entries[misspelt].key.span
         nodes.add(codes.UNKNOWN_KEY.misspelt(span, f"unknown kind '{misspelt}'", misspelt, kinds()))
-        return _of_kind(mapping, misspelt, kind, nodes)
-    return _of_skill(mapping, own, others, nodes)
+        return _of_kind(mapping, misspelt, kind, nodes, skills)
+    return _of_skill(mapping, own, others, nodes, skills)
 
 
-def _of_kind(mapping: Mapping, key: str, kind: Kind, nodes: Nodes) -> tuple[str, Kind]:
+def _is_condition(mapping: Mapping, key: str, own: list[str]) -> bool:
+    """Tell whether `if` stands below another step, as a condition of it."""
+    return key == "if" and "then" not in mapping and own[0] != key
+
+
+def _of_kind(mapping: Mapping, key: str, kind: Kind, nodes: Nodes, skills: Collection[str]) -> tuple[str, Kind]:
     steps = []
     for other, entry in mapping.entries.items():
-        if other in ANYWHERE or other in kind.options:
+        if other in anywhere() or other in kind.options:
             continue
-        if other in kinds():
-            steps.append(other)
-        elif _near(other, (*kind.options, *ANYWHERE)) or _is_option(other):
-            message = f"unknown key '{other}' beside '{kind.name}'"
-            settings, taken = (*kind.options, *ANYWHERE), mapping.entries
+        settings = (*kind.options, *anywhere())
+        if other != key and _is_stray(mapping, other, settings, skills):
+            nodes.add(unknown_setting(mapping, other, f"'{kind.name}'", settings))
+        elif other not in kinds() and _is_option(other):
+            message, taken = f"unknown key '{other}' beside '{kind.name}'", mapping.entries
             nodes.add(codes.UNKNOWN_KEY.misspelt(entry.key.span, message, other, settings, "its settings", taken=taken))
         else:
             steps.append(other)
-    _check_steps(mapping, steps, nodes)
+    _check_steps(mapping, steps, nodes, skills)
     return key, kind
 
 
-def _of_skill(mapping: Mapping, own: list[str], others: list[str], nodes: Nodes) -> tuple[str, None]:
-    misspelt = [key for key in others if _near(key, ANYWHERE)] if len(others) > 1 else []
-    skills = [key for key in others if key not in misspelt]
-    for key in misspelt:
-        span = mapping.entries[key].key.span
-        message, taken = f"unknown key '{key}' beside a skill", mapping.entries
-        nodes.add(codes.UNKNOWN_KEY.misspelt(span, message, key, ANYWHERE, taken=taken))
+def _is_stray(mapping: Mapping, key: str, settings: Collection[str], skills: Collection[str]) -> bool:
+    """Tell whether a key beside a step is a setting that there is not, rather than a second step."""
+    if key in skills or (key in kinds() and key not in SETTINGS):
+        return False
+    return key in SETTINGS or bool(_near(key, settings)) or is_setting(mapping.entries[key].value)
+
+
+def _of_skill(
+    mapping: Mapping, own: list[str], others: list[str], nodes: Nodes, skills: Collection[str]
+) -> tuple[str, None]:
+    strays = [key for key in others if _is_stray(mapping, key, anywhere(), skills)] if len(others) > 1 else []
+    steps = [key for key in others if key not in strays] or strays[:1]
+    for key in strays:
+        if key not in steps:
+            nodes.add(unknown_setting(mapping, key, "a skill", anywhere()))
     for key in own:
         if key not in others:
             help_text = f"it belongs to {_owners(key)}"
             message = f"unknown key '{key}' beside a skill"
             nodes.add(codes.UNKNOWN_KEY.at(mapping.entries[key].key.span, message, help=help_text))
-    if not skills:
-        if not misspelt and len(own) == len(others):
+    if not steps:
+        if len(own) == len(others):
             nodes.add(codes.WRONG_SHAPE.at(mapping.span, "a node needs a kind or a skill", help=_KINDS_HELP))
         return "", None
-    _check_steps(mapping, skills, nodes)
-    return (skills[0], None) if _is_word(mapping.entries[skills[0]].key, nodes) else ("", None)
+    _check_steps(mapping, steps, nodes, skills)
+    return (steps[0], None) if _is_word(mapping.entries[steps[0]].key, nodes) else ("", None)
 
 
-def _check_steps(mapping: Mapping, steps: list[str], nodes: Nodes) -> None:
+def _check_steps(mapping: Mapping, steps: list[str], nodes: Nodes, skills: Collection[str]) -> None:
     """Only the first one belongs here; each of the others should have a dash of its own."""
     for second in steps[1:]:
-        _two_steps(mapping, steps[0], second, nodes)
+        _two_steps(mapping, steps[0], second, nodes, is_known=second in kinds() or second in skills)
 
 
-def _two_steps(mapping: Mapping, first: str, second: str, nodes: Nodes) -> None:
+def _two_steps(mapping: Mapping, first: str, second: str, nodes: Nodes, *, is_known: bool) -> None:
     span = mapping.entries[second].key.span
     message, help_text = (
         f"'{second}' is a second step in the mapping of '{first}'",
         f"write '- {second}: ...' as its own step",
     )
-    fix = _dash_before(mapping, second)
+    fix = _dash_before(mapping, second) if is_known else None
     nodes.add(codes.TWO_STEPS.at(span, message, label="put a dash here", help=help_text, fix=fix))
 
 
@@ -93,18 +122,27 @@ def _dash_before(mapping: Mapping, key: str) -> Fix | None:
     if first.column != second.column or second.line == first.line or any(_belongs(name) for name in behind):
         return None
     guard, dash = (
-        replace(span, column=span.column - 2, end_line=span.line, end_column=span.column) for span in (first, second)
+        span._replace(column=span.column - 2, end_line=span.line, end_column=span.column) for span in (first, second)
     )
     return Fix((Edit(guard, DASH, DASH), Edit(dash, " " * len(DASH), DASH)), True, f"'{key}' -> '- {key}'")
 
 
 def _belongs(key: str) -> bool:
-    return key in ANYWHERE or _is_option(key)
+    return key in anywhere() or _is_option(key)
 
 
 def _is_word(key: Scalar, nodes: Nodes) -> bool:
     """Tell whether a key may be the name of a skill; if not, say how it may have come about."""
     words = key.text.split()
+    if TIGHT_COLON.fullmatch(key.text):
+        name, _, value = key.text.partition(":")
+        fix = replacement(key.span, key.text, f"{name}: {value}")
+        nodes.add(
+            codes.WRONG_SHAPE.at(
+                key.span, "a space is missing behind the colon", help=f"write '{name}: {value}'", fix=fix
+            )
+        )
+        return False
     if len(words) == 1:
         return True
     if not words:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Protocol
 
 from rbxcompose.expressions.text import Slot, Template, parse_template
@@ -10,8 +12,11 @@ from rbxcompose.expressions.tree import Expression, ExpressionError, Number
 from rbxcompose.expressions.types import COUNT, FLAG, UNKNOWN, Type, quantity_of
 from rbxcompose.findings import Finding, Span, replacement
 from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
+from rbxcompose.missions.messages import Message, Shape, Written
+from rbxcompose.missions.moments import DEEDS, LEVELS, OPTIONS, Deeds, Moments
+from rbxcompose.missions.other_words import ENDLESS, FLAGS, not_our_word
 from rbxcompose.missions.program import Argument, Asked, Assignment
 from rbxcompose.missions.spans import expression_of, inner_span
 from rbxcompose.units import NUMBER, TIME
@@ -29,6 +34,18 @@ class Nodes(Protocol):
 
     def child(self, node: Node, step: str, parent: int) -> int:
         """Read a node below `parent` and return its number; `step` is the next part of its path."""
+        ...
+
+    def state(self, name: str, entry: Entry, parent: int) -> int:
+        """Read a state of the machine `parent` and return its number."""
+        ...
+
+    def loop(self, item: str, expression: Expression) -> None:
+        """Note what the item of a loop is that goes through the value of an expression."""
+        ...
+
+    def held(self, expression: Expression, parent: int) -> list[int]:
+        """Read the nodes in the data that an expression may give, below `parent`, and return their numbers."""
         ...
 
     def add(self, finding: Finding) -> None:
@@ -100,17 +117,41 @@ class NodeReader:
 
     def count_or_forever(self, key: str) -> Expression | None:
         """Read a whole number; None stands for `forever`."""
+        read = self.count_or(key, (FOREVER,))
+        return None if isinstance(read, str) else read
+
+    def count_or(self, key: str, words: tuple[str, ...]) -> Expression | str:
+        """Read a whole number, or one of some words."""
         value = self.mapping.get(key)
-        if isinstance(value, Scalar) and value.text == FOREVER:
-            return None
-        return self.expression(key, COUNT, f"a number or '{FOREVER}'")
+        if isinstance(value, Scalar) and value.text in words:
+            return value.text
+        if isinstance(value, Scalar) and ENDLESS.get(value.text) in words:
+            self.add(not_our_word(value, f"'{key}' cannot be '{value.text}'", ENDLESS))
+            return FOREVER
+        return self.expression(key, COUNT, f"a number or {' or '.join(repr(word) for word in words)}")
+
+    def map_of(self, key: str, what: str) -> Mapping | None:
+        """Return an option that must be a map with entries; None, and a finding, if it is not."""
+        value = self.mapping.get(key)
+        if isinstance(value, Mapping) and value.entries:
+            return value
+        self.add(codes.WRONG_SHAPE.at(self.key_span(key), f"'{key}' needs {what}"))
+        return None
+
+    def branch(self, key: str, branches: tuple[str, ...]) -> str:
+        """Read the name of one of the branches."""
+        scalar = self.scalar(key, "the name of a branch")
+        if scalar and scalar.text not in branches:
+            message = f"there is no branch '{scalar.text}'"
+            self.add(codes.NOT_A_CHOICE.misspelt(scalar.span, message, scalar.text, branches, "its branches"))
+        return scalar.text if scalar else ""
 
     def flag(self, key: str) -> bool:
         """Read `true` or `false`."""
         scalar = self.scalar(key, "'true' or 'false'")
         value = scalar and (plain_value(scalar) if scalar.filled is None else scalar.filled)
         if scalar and not isinstance(value, bool):
-            self.nodes.add(codes.NOT_A_CHOICE.at(scalar.span, f"'{key}' must be true or false"))
+            self.add(not_our_word(scalar, f"'{key}' must be true or false", FLAGS))
         return value is True
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
@@ -138,6 +179,124 @@ class NodeReader:
         slots = (part for part in template.parts if isinstance(part, Slot))
         self.asked.extend(Asked(slot.value, UNKNOWN, _part_of(scalar, slot)) for slot in slots)
         return template
+
+    def add(self, finding: Finding) -> None:
+        """Keep a finding."""
+        self.nodes.add(finding)
+
+    def inside(self, mapping: Mapping, keys: Iterable[str], what: str) -> NodeReader:
+        """Return a reader of a map below this node; keys that do not belong to it are findings."""
+        for key, entry in mapping.entries.items():
+            if key not in keys:
+                message, of = f"unknown key '{key}' in {what}", f"keys of {what}"
+                taken = mapping.entries
+                self.add(codes.UNKNOWN_KEY.misspelt(entry.key.span, message, key, keys, of, taken=taken))
+        return NodeReader(mapping, self.key, self.number, self.nodes)
+
+    def name(self, key: str, what: str) -> Scalar:
+        """Read a name; one without text, and a finding, if there is none."""
+        scalar = self.scalar(key, what)
+        return scalar if scalar and self.check_name(scalar) else Scalar("", self.key_span(key))
+
+    def check_name(self, scalar: Scalar) -> bool:
+        """Tell whether a word may be a name; a finding says it if not."""
+        if not NAME.fullmatch(scalar.text):
+            self.add(codes.WRONG_SHAPE.at(scalar.span, f"'{scalar.text}' is no name", help=NAME_HELP))
+            return False
+        return True
+
+    def child_node(self, node: Node, step: str) -> None:
+        """Read a node that belongs to this one."""
+        self.children.append(self.nodes.child(node, step, self.number))
+
+    def state(self, name: str, entry: Entry) -> None:
+        """Read a state of a machine."""
+        self.children.append(self.nodes.state(name, entry, self.number))
+
+    def held(self, expression: Expression) -> None:
+        """Read the nodes in the data that an expression may give."""
+        self.children.extend(self.nodes.held(expression, self.number))
+
+    def branches(self) -> tuple[str, ...]:
+        """Read the branches of a parallel: a list, or a map, of which the names are returned."""
+        value = self.mapping.get(self.key)
+        if not isinstance(value, Mapping):
+            self.steps()
+            return ()
+        if not value.entries:
+            self.add(codes.MISSING.at(value.span, f"'{self.key}' needs at least one branch"))
+        for name, entry in value.entries.items():
+            self.check_name(entry.key)
+            self.child_node(entry.value, name)
+        return tuple(value.entries)
+
+    def cases(self, key: str) -> tuple[Asked, ...]:
+        """Read a map from values to nodes, and return the values in the order of the children."""
+        value = self.map_of(key, "a map from values to what is done")
+        if value is None:
+            return ()
+        read = []
+        for name, entry in value.entries.items():
+            expression = read_expression(entry.key, self.nodes)
+            if expression is not None:
+                read.append(Asked(expression, UNKNOWN, entry.key))
+                self.child_node(entry.value, name)
+        self.asked.extend(asked for asked in read if asked.expression.names)  # a bare word need be no place
+        return tuple(read)
+
+    def asked_later(self, mapping: Mapping, key: str) -> Asked | None:
+        """Read a condition whose names only its kind knows, so that the kind has to check it."""
+        reader = NodeReader(mapping, key, self.number, self.nodes)
+        reader.condition(key)
+        return reader.asked[0] if reader.asked else None
+
+    def message(self, target: str, body: str) -> Message:
+        """Read where a message goes, and what is in it."""
+        scalar = self.scalar(target, "the name of a topic or a service")
+        value = self.mapping.get(body)
+        shape = None if value is None else self._shape(value)
+        keys = {} if value is None else dict(_keys_of(value))
+        return Message(scalar or Scalar("", self.key_span(target)), shape, keys)
+
+    def moments(self, keys: Iterable[str]) -> Moments:
+        """Read hooks: what is set, logged or published at some moments."""
+        return Moments({key: self._deeds(key) for key in keys if self.has(key)})
+
+    def _deeds(self, key: str) -> Deeds:
+        value = self.map_of(key, "something small to do: 'set', 'log' or 'publish' below it")
+        if value is None:
+            return Deeds()
+        inner = self.inside(value, (*DEEDS, *OPTIONS), f"'{key}'")
+        for option, deed in OPTIONS.items():
+            if inner.has(option) and not inner.has(deed):
+                self.add(codes.UNKNOWN_KEY.at(inner.key_span(option), f"'{option}' belongs to '{deed}'"))
+        deeds = Deeds(
+            inner.assignments("set") if inner.has("set") else (),
+            inner.template("log") if inner.has("log") else None,
+            inner.choice("level", LEVELS),
+            inner.message("publish", "message") if inner.has("publish") else None,
+        )
+        self.asked.extend(inner.asked)
+        return deeds
+
+    def _shape(self, node: Node) -> Shape:
+        match node:
+            case Mapping(entries=entries):
+                return {name: self._shape(entry.value) for name, entry in entries.items()}
+            case Sequence(items=items):
+                return tuple(self._shape(item) for item in items)
+            case Scalar():
+                try:
+                    expression = expression_of(node)
+                except ExpressionError:
+                    expression = None
+                return Written(node, self._quiet_template(node), expression)
+
+    def _quiet_template(self, scalar: Scalar) -> Template:
+        try:
+            return parse_template(scalar.text)
+        except ExpressionError:
+            return Template(scalar.text, (scalar.text,))
 
     def child(self, key: str) -> None:
         """Read the node under a key, which must be there."""
@@ -175,7 +334,9 @@ class NodeReader:
         """Read a list that is written out, or an expression that gives one (of a map: its keys)."""
         value = self.mapping.get(key)
         if not isinstance(value, Sequence):
-            return self.expression(key, UNKNOWN, "a list")
+            expression = self.expression(key, UNKNOWN, "a list")
+            self.nodes.loop(self.item, expression)
+            return expression
         items = []
         for item in value.items:
             if isinstance(item, Scalar):
@@ -184,19 +345,19 @@ class NodeReader:
                 self.nodes.add(codes.WRONG_SHAPE.at(item.span, "an item must be a word, a number or '$name'"))
         return tuple(items)
 
-    def assignments(self) -> tuple[Assignment, ...]:
+    def assignments(self, key: str) -> tuple[Assignment, ...]:
         """Read a map from names of data to expressions."""
-        value = self.mapping.get(self.key)
+        value = self.mapping.get(key)
         if not isinstance(value, Mapping) or not value.entries:
-            message = f"'{self.key}' needs a map of names and values"
-            self.nodes.add(codes.WRONG_SHAPE.at(self.span, message, help="write the names below it, indented"))
+            message = f"'{key}' needs a map of names and values"
+            self.nodes.add(codes.WRONG_SHAPE.at(self.key_span(key), message, help="write the names below it, indented"))
             return ()
-        inner = NodeReader(value, self.key, self.number, self.nodes)
+        inner = NodeReader(value, key, self.number, self.nodes)
         read: list[Assignment] = []
         for name, entry in value.entries.items():
             inner.expression(name, UNKNOWN, "a value")
             read.extend(Assignment(name, entry.key.span, asked) for asked in inner.asked[len(read) :])
-        self.asked.extend(inner.asked)
+        self.asked.extend(replace(asked, is_assigned=True) for asked in inner.asked)
         return tuple(read)
 
     def arguments(self) -> tuple[Argument, ...]:
@@ -219,6 +380,13 @@ class NodeReader:
 
 NAME_HELP = "names begin with a small letter; small letters, digits and underscores follow"
 _FLOW_HELP = "inside '{}', commas and colons divide: put quotes round the condition, or write it in block style"
+
+
+def _keys_of(node: Node, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Span]]:
+    """Yield the places of all keys of maps in maps, by their paths."""
+    for name, entry in node.entries.items() if isinstance(node, Mapping) else ():
+        yield (*path, name), entry.key.span
+        yield from _keys_of(entry.value, (*path, name))
 
 
 def _part_of(scalar: Scalar, slot: Slot) -> Scalar:

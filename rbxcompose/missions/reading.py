@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from dataclasses import replace
+
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Finding, Related, Report, Span
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
-from rbxcompose.missions import codes, program
+from rbxcompose.missions import codes, machine_codes, program
 from rbxcompose.missions.header import read_data, read_inputs, read_rate
+from rbxcompose.missions.held import ITEM, Pattern, matching, pattern_of, with_held
 from rbxcompose.missions.keys import find_key
-from rbxcompose.missions.modifiers import MODIFIERS
+from rbxcompose.missions.machines import STATE
+from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
 from rbxcompose.missions.node_reader import NAME, NAME_HELP, NodeReader
-from rbxcompose.missions.program import Interrupt, Program
-from rbxcompose.missions.registry import Kind, kinds
+from rbxcompose.missions.program import AFTERWARDS, RESTART, Asked, Interrupt, Program, Target
+from rbxcompose.missions.registry import Kind, all_kinds, kinds
+from rbxcompose.missions.state_reading import STATE_KEYS, as_state
 
-KEYS = ("rbx", "kind", "name", "about", "inputs", "data", "interrupts", "rate", "do")
+BODIES = ("do", "machine")
+KEYS = ("rbx", "kind", "name", "about", "inputs", "data", "outputs", "interrupts", "rate", *BODIES)
 INTERRUPT_KEYS = ("when", "do", "afterwards")
-AFTERWARDS = ("continue",)
 LEVELS = 40  # of nodes within nodes
 LIST = "sequence"  # what a list is
 
 
-def read_program(root: Mapping, report: Report) -> Program | None:
-    """Return the program of a mission file, None if it has nothing to do.
+def read_program(root: Mapping, report: Report, skills: Collection[str] = ()) -> Program | None:
+    """Return the program of a mission file, None if it has nothing to do; `skills` are the robot's, if known.
 
     What could not be read is left out of the program, so that the rest can be checked; it may run only if the report
     has no errors.
@@ -31,16 +39,15 @@ def read_program(root: Mapping, report: Report) -> Program | None:
             report.add(
                 codes.UNKNOWN_KEY.misspelt(entry.key.span, message, name, KEYS, "keys of a mission", taken=root.entries)
             )
-    reader = _Reader(report)
+    reader = _Reader(report, root, skills)
     inputs, data = read_inputs(root.get("inputs"), report), read_data(root.get("data"), report)
-    task = root.get("do")
-    if task is None:
-        report.add(codes.MISSING.at(root.span, "a mission needs 'do': what is to be done"))
-    else:
-        reader.child(task, "do", None)
-    interrupts = reader.interrupts(root.get("interrupts"))
-    if task is None:
+    body = _body(root, report)
+    if body is None:
+        reader.interrupts(root.get("interrupts"))
         return None
+    reader.child(body, "do" if "do" in root else "", None)
+    interrupts = reader.interrupts(root.get("interrupts"))
+    data = {name: replace(one, value=with_held(one.value, reader.found, (name,))) for name, one in data.items()}
     return Program(
         _text(root, "name"),
         _text(root, "about"),
@@ -50,8 +57,24 @@ def read_program(root: Mapping, report: Report) -> Program | None:
         data,
         interrupts,
         read_rate(root.get("rate"), report),
-        root,
+        reader.outputs(root.get("outputs")),
+        root=root,
     )
+
+
+def _body(root: Mapping, report: Report) -> Node | None:
+    """Return what a mission does: the node under `do`, or a machine."""
+    bodies = [key for key in BODIES if root.get(key) is not None]
+    if not bodies:
+        report.add(codes.MISSING.at(root.span, "a mission needs 'do' (or 'machine'): what is to be done"))
+        return None
+    if len(bodies) == len(BODIES):
+        span = root.entries["machine"].key.span
+        report.add(codes.WRONG_SHAPE.at(span, "a mission has 'do' or 'machine', not both"))
+    if bodies[0] == "do":
+        return root.get("do")
+    entry = root.entries["machine"]
+    return Mapping({"machine": entry}, entry.key.span)
 
 
 def _text(root: Mapping, key: str) -> str:
@@ -73,8 +96,13 @@ def _as_mapping(node: Node) -> Mapping:
 class _Reader:
     """Numbers the nodes in the order of the text, and keeps where it is."""
 
-    def __init__(self, report: Report) -> None:
+    def __init__(self, report: Report, root: Mapping, skills: Collection[str]) -> None:
         self.report = report
+        self.skills = skills
+        data = root.get("data")
+        self.data = {name: entry.value for name, entry in data.entries.items()} if isinstance(data, Mapping) else {}
+        self.patterns: dict[str, Pattern] = {}  # where in the data the items of loops stand
+        self.found: dict[tuple[str, ...], Node] = {}  # the nodes in the data
         self.nodes: list[program.Node | None] = []
         self.names: dict[str, Span] = {}
         self.paths: list[str] = []  # of the nodes that are being read, from the outside in
@@ -93,36 +121,96 @@ class _Reader:
             mapping = Mapping(span=node.span)
             key, kind = "", None
         else:
-            key, kind = find_key(mapping, self)
+            key, kind = find_key(mapping, self, self.skills)
         name = self.name_of(mapping)
         self.paths.append(self.path_of(step, name or (kind.name if kind else key), bool(name)))
         self.nodes[number] = self.read(NodeReader(mapping, key, number, self), kind, parent, name)
         self.paths.pop()
         return number
 
+    def state(self, name: str, entry: Entry, parent: int) -> int:
+        """Read a state of a machine, and return its number."""
+        number = len(self.nodes)
+        self.nodes.append(None)
+        mapping = as_state(entry)
+        if mapping is not entry.value:
+            self.add(codes.WRONG_SHAPE.at(entry.key.span, f"the state '{name}' needs 'do' and 'next'"))
+        self.paths.append(f"{self.paths[-1]}.{name}")
+        state = all_kinds()[STATE]
+        self.nodes[number] = self.read(NodeReader(mapping, name, number, self), state, parent, name, entry.key.span)
+        for key, one in mapping.entries.items():
+            if key not in (*STATE_KEYS, *modifier_keys()):
+                message, what = f"unknown key '{key}' in the state '{name}'", "keys of a state"
+                valid, taken = (*STATE_KEYS, *modifier_keys()), mapping.entries
+                self.add(codes.UNKNOWN_KEY.misspelt(one.key.span, message, key, valid, what, taken=taken))
+        self.paths.pop()
+        return number
+
+    def loop(self, item: str, expression: Expression) -> None:
+        """Note where in the data the item of a loop stands."""
+        pattern = pattern_of(expression, self.patterns)
+        if pattern:
+            self.patterns[item] = (*pattern, ITEM)
+
+    def held(self, expression: Expression, parent: int) -> list[int]:
+        """Read the nodes in the data that an expression may give."""
+        pattern = pattern_of(expression, self.patterns)
+        found = list(matching(self.data, pattern)) if pattern else []
+        numbers = []
+        for key, node in found:
+            self.found[key] = node
+            number = self.child(node, ".".join(key), parent)
+            read = self.nodes[number]
+            if read:
+                self.nodes[number] = replace(read, held=key)
+            numbers.append(number)
+        return numbers
+
+    def outputs(self, node: Node | None) -> dict[str, Asked]:
+        """Read the outputs: a map from names to expressions."""
+        if node is None:
+            return {}
+        if not isinstance(node, Mapping):
+            self.add(codes.WRONG_SHAPE.at(node.span, "'outputs' needs a map from names to values"))
+            return {}
+        reader = NodeReader(node, "outputs", len(self.nodes), self)
+        read: dict[str, Asked] = {}
+        for name, entry in node.entries.items():
+            reader.check_name(entry.key)
+            before = len(reader.asked)
+            reader.expression(name, UNKNOWN, "a value")
+            read.update((name, asked) for asked in reader.asked[before:])
+        return read
+
     def path_of(self, step: str, word: str, is_name: bool) -> str:
         """Return the path of a node from the one around it; names stand alone, and `do` only at the beginning."""
         if not self.paths:
-            return f"{step}.{word}"
+            return f"{step}.{word}" if step else word
         if step.isdigit():
             return f"{self.paths[-1]}.{word}" if is_name else f"{self.paths[-1]}.{word}.{step}"
-        return f"{self.paths[-1]}.{word}" if step == "do" else f"{self.paths[-1]}.{step}.{word}"
+        return f"{self.paths[-1]}.{word}" if step in ("do", word) else f"{self.paths[-1]}.{step}.{word}"
 
-    def read(self, reader: NodeReader, kind: Kind | None, parent: int | None, name: str) -> program.Node:
+    def read(
+        self, reader: NodeReader, kind: Kind | None, parent: int | None, name: str, span: Span | None = None
+    ) -> program.Node:
         """Read the value, the options and the modifiers of a node."""
         options = kind.task.read(reader) if kind else reader.arguments()
-        modifiers = {key: cls.read(reader, key) for key, cls in MODIFIERS.items() if reader.has(key)}
+        read = {}
+        for key, cls in modifiers().items():
+            is_state = kind is not None and kind.is_inner
+            if any(reader.has(one) for one in (key, *cls.keys)) and (is_state or not cls.only_states):
+                read[key] = cls.read(reader, key)
         return program.Node(
             number=reader.number,
             kind=kind.name if kind else "",
             name=name,
             path=self.paths[-1],
-            span=reader.span,
+            span=span or reader.span,
             parent=parent,
             children=tuple(reader.children),
             end=len(self.nodes),
             options=options,
-            modifiers=modifiers,
+            modifiers=read,
             asked=tuple(reader.asked),
             item=reader.item,
             skill="" if kind else reader.key,
@@ -172,7 +260,30 @@ class _Reader:
             self.add(codes.MISSING.at(entry.key.span, f"the interrupt '{name}' needs 'when': a condition"))
         else:
             reader.condition("when")
-        afterwards = reader.choice("afterwards", AFTERWARDS)
+        afterwards, restarts = self.afterwards(reader)
         reaction = value.get("do")
         root = None if reaction is None else self.child(reaction, f"interrupts.{name}", None)
-        return Interrupt(name, reader.asked[0], root, afterwards, entry.key.span) if reader.asked else None
+        if not reader.asked:
+            return None
+        targets = self.targets(restarts) if restarts else ()
+        return Interrupt(name, reader.asked[0], root, afterwards, entry.key.span, restarts, targets)
+
+    def afterwards(self, reader: NodeReader) -> tuple[str, Scalar | None]:
+        """Read what comes after a reaction: a word, or `restart` with the name of what begins anew."""
+        value = reader.mapping.get("afterwards")
+        if not isinstance(value, Mapping):
+            return reader.choice("afterwards", AFTERWARDS), None
+        inner = reader.inside(value, (RESTART,), "'afterwards'")
+        return RESTART, inner.scalar(RESTART, "the name of a node, a state or a loop's item")
+
+    def targets(self, named: Scalar) -> tuple[Target, ...]:
+        """Return all nodes, states and loops over an item with a name."""
+        nodes = [node for node in self.nodes if node]
+        found = [Target(node.number, node.item == named.text) for node in nodes if named.text in (node.name, node.item)]
+        if not found:
+            known = {name for node in nodes for name in (node.name, node.item) if name}
+            message = f"nothing in the mission is named '{named.text}'"
+            self.add(
+                machine_codes.UNKNOWN_TARGET.misspelt(named.span, message, named.text, known, "names of the mission")
+            )
+        return tuple(found)

@@ -47,22 +47,26 @@ class KindTask(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of mission node: its word, the keys that belong to it with what each is for, and its task class."""
+    """A kind of mission node: its word, the keys that belong to it with what each is for, and its task class.
+
+    One that is `inner` stands only inside another one, as a state in a machine: it has no word of the language.
+    """
 
     name: str
     options: Mapping[str, str]
     task: KindTask
+    is_inner: bool = False
 
 
 K = TypeVar("K", bound=KindTask)
 _KINDS: dict[str, Kind] = {}
 
 
-def kind(name: str, options: Mapping[str, str] = MappingProxyType({})) -> Callable[[K], K]:
+def kind(name: str, options: Mapping[str, str] = MappingProxyType({}), *, is_inner: bool = False) -> Callable[[K], K]:
     """Register a task class under the word of its kind; `options` tells in a sentence what each of its keys is for."""
 
     def register(task: K) -> K:
-        _KINDS[name] = Kind(name, options, task)
+        _KINDS[name] = Kind(name, options, task, is_inner)
         return task
 
     return register
@@ -70,7 +74,13 @@ def kind(name: str, options: Mapping[str, str] = MappingProxyType({})) -> Callab
 
 @cache
 def kinds() -> dict[str, Kind]:
-    """Return all kinds by their word, sorted."""
+    """Return all kinds that a mission may write, by their word, sorted."""
+    return {name: found for name, found in all_kinds().items() if not found.is_inner}
+
+
+@cache
+def all_kinds() -> dict[str, Kind]:
+    """Return all kinds of nodes in a program by name, sorted."""
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{package.__name__}.{module.name}")
     return dict(sorted(_KINDS.items()))

@@ -86,7 +86,7 @@ class RunScope:
         return 0 if name in self.data or name in self._inputs else self._values.count(name)
 
 
-class _Inner:
+class Inner:
     """A scope within another one, which it asks for all that it does not know."""
 
     def __init__(self, outer: MissionScope) -> None:
@@ -113,7 +113,7 @@ class _Inner:
         return self.outer.count(name)
 
 
-class ItemScope(_Inner):
+class ItemScope(Inner):
     """What the body of a loop sees: also the item."""
 
     def __init__(self, outer: MissionScope, name: str) -> None:
@@ -126,21 +126,21 @@ class ItemScope(_Inner):
         return self.item if name == self.name else self.outer.variable(name)
 
 
-class SinceScope(_Inner):
+class SinceScope(Inner):
     """What a node sees that asks `new($x)`: messages count from its start."""
 
     def __init__(self, outer: MissionScope, names: frozenset[str]) -> None:
         super().__init__(outer)
         self._names = names
-        self._seen: dict[str, int] = {}
+        self.seen: dict[str, int] = {}
 
     def mark(self) -> None:
         """Count from now on."""
-        self._seen = {name: self.outer.count(name) for name in self._names}
+        self.seen = {name: self.outer.count(name) for name in self._names}
 
     def is_new(self, name: str, /) -> bool:
         """Tell whether a message came since `mark`."""
-        return self.outer.count(name) > self._seen.get(name, 0)
+        return self.outer.count(name) > self.seen.get(name, 0)
 
 
 def new_names(expression: Expression) -> frozenset[str]:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.expressions.text import Slot, parse_template
-from rbxcompose.expressions.tree import ExpressionError
-from rbxcompose.expressions.types import UNKNOWN, Type, TypeKind
+from rbxcompose.expressions.types import TypeKind
 from rbxcompose.findings import Finding, Related, nearest
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions import codes
-from rbxcompose.missions.modifiers import MODIFIERS
-from rbxcompose.missions.program import ROOT, Argument, Program, RobotNames, Skill
-from rbxcompose.missions.registry import kinds
-from rbxcompose.missions.spans import expression_of, inner_span
-from rbxcompose.missions.views import NodeScope, View, base_names, findings_of, views
+from rbxcompose.missions.kinds.parallel import ParallelOptions
+from rbxcompose.missions.machines import STATE
+from rbxcompose.missions.modifiers.registry import modifiers
+from rbxcompose.missions.program import END, ROOT, Argument, Program, RobotNames, Skill
+from rbxcompose.missions.registry import all_kinds, kinds
+from rbxcompose.missions.typing import check_written
+from rbxcompose.missions.views import View, base_scope, findings_of, views
 from rbxcompose.missions.watching import POSE
 
 STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
@@ -25,20 +25,22 @@ def check_program(program: Program, robot: RobotNames) -> Iterator[Finding]:
     yield from _clashes(program, robot)
     for view in views(program, robot):
         node = view.node
-        for asked in node.asked:
+        for asked in (one for one in node.asked if not one.is_assigned):
             yield from view.typed(asked.expression, asked.wanted, asked.scalar, codes.WRONG_TYPE)
         if node.kind:
-            yield from kinds()[node.kind].task.check(view)
+            yield from all_kinds()[node.kind].task.check(view)
         elif node.skill:
             yield from _skill(view)
         for key in node.modifiers:
-            yield from MODIFIERS[key].check(view)
+            yield from modifiers()[key].check(view)
         if node.item:
             yield from _item_clash(view)
-    scope = NodeScope(base_names(program, robot), robot.places)
+    scope = base_scope(program, robot)
     for interrupt in program.interrupts:
         when = interrupt.when
         yield from findings_of(when.expression, when.wanted, when.scalar, scope, codes.WRONG_TYPE)
+    for asked in program.outputs.values():
+        yield from findings_of(asked.expression, asked.wanted, asked.scalar, scope, codes.WRONG_TYPE)
     yield from _not_restartable(program, robot)
 
 
@@ -53,9 +55,17 @@ def _clashes(program: Program, robot: RobotNames) -> Iterator[Finding]:
     for name in program.inputs.keys() & program.data.keys():
         related = [Related(program.inputs[name].span, "the input")]
         yield codes.NAME_CLASH.at(program.data[name].span, f"'{name}' is an input and a datum", related=related)
-    for view_node in program.nodes:
-        if view_node.name in robot.skills:
-            yield codes.NAME_CLASH.at(view_node.span, f"a node cannot be named like the skill '{view_node.name}'")
+    for node in program.nodes:
+        if node.name in robot.skills and node.kind != STATE:
+            yield codes.NAME_CLASH.at(node.span, f"a node cannot be named like the skill '{node.name}'")
+        saved = node.modifiers.get("save")
+        if isinstance(saved, Scalar) and (saved.text in robot.values or saved.text in program.inputs):
+            yield codes.NAME_CLASH.at(saved.span, f"'{saved.text}' is taken: choose another name for what is kept")
+        if isinstance(node.options, ParallelOptions):
+            for branch, child in zip(node.options.branches, node.children, strict=False):
+                if branch in kinds() or branch in robot.skills:
+                    message = f"the branch '{branch}' is named like a kind or a skill"
+                    yield codes.NAME_CLASH.at(program.nodes[child].span, message)
 
 
 def _item_clash(view: View) -> Iterator[Finding]:
@@ -100,32 +110,21 @@ def _argument(view: View, skill: Skill, argument: Argument) -> Iterator[Finding]
         if argument.value.plain and not argument.value.text:
             yield codes.WRONG_ARGUMENT.at(argument.span, f"the argument '{name}' of '{skill.name}' has no value")
         else:
-            yield from _value(view, argument.value, skill.arguments[name])
+            yield from check_written(view, argument.value, skill.arguments[name], codes.WRONG_ARGUMENT)
     elif skill.arguments[name].kind not in STRUCTURED:
         message = f"the argument '{name}' of '{skill.name}' must be {skill.arguments[name].phrase}"
         yield codes.WRONG_ARGUMENT.at(argument.span, message)
 
 
-def _value(view: View, scalar: Scalar, wanted: Type) -> Iterator[Finding]:
-    try:
-        if wanted.kind is not TypeKind.TEXT:
-            yield from view.typed(expression_of(scalar), wanted, scalar, codes.WRONG_ARGUMENT)
-            return
-        for slot in parse_template(scalar.text).parts:
-            if isinstance(slot, Slot):
-                part = Scalar(slot.value.text, inner_span(scalar, slot.start, slot.end))
-                yield from view.typed(slot.value, UNKNOWN, part, codes.WRONG_ARGUMENT)
-    except ExpressionError as error:
-        yield codes.NO_EXPRESSION.at(inner_span(scalar, error.start, error.end), error.message, help=error.help)
-
-
 def _not_restartable(program: Program, robot: RobotNames) -> Iterator[Finding]:
     """Yield the skills of the mission proper that an interrupt may start again although that does them no good."""
-    if not program.interrupts:
+    cutting = [one for one in program.interrupts if one.afterwards != END]
+    if not cutting:
         return
     for node in program.below(ROOT):
         skill = robot.skills.get(node.skill)
-        if skill and not skill.restartable:
-            related = [Related(program.interrupts[0].span, "this may cut it short")]
-            message = f"the skill '{skill.name}' cannot be restarted, but 'afterwards: continue' would do so"
+        if skill and not skill.restartable and not skill.pausable:
+            related = [Related(cutting[0].span, "this may cut it short")]
+            afterwards = cutting[0].afterwards
+            message = f"the skill '{skill.name}' cannot be restarted, but 'afterwards: {afterwards}' would do so"
             yield codes.NOT_RESTARTABLE.at(node.span, message, related=related)

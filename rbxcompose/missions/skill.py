@@ -10,21 +10,25 @@ from rbxcompose.expressions.types import Type, TypeKind
 from rbxcompose.expressions.values import Place, Value
 from rbxcompose.manifest.tree import Node as Located
 from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions.events import SkillEnded, SkillStarted
+from rbxcompose.missions.events import Reported, SkillEnded, SkillStarted
+from rbxcompose.missions.leaf import Leaf
 from rbxcompose.missions.literals import literal
 from rbxcompose.missions.program import Argument, Skill
+from rbxcompose.missions.results import Result
 from rbxcompose.missions.spans import expression_of
-from rbxcompose.missions.statuses import IDLE, NAMES, RUNNING
+from rbxcompose.missions.statuses import FAILURE, NAMES, RUNNING, SUCCESS
 from rbxcompose.missions.task import NodeFailed, Site, Task
 
-Getter = Callable[["SkillTask"], Value]
+Getter = Callable[[Task], Value]
+SUCCESS_WORD, FAILURE_WORD = NAMES[SUCCESS], NAMES[FAILURE]  # what an outcome counts as
 PLACED = (TypeKind.PLACE, TypeKind.POSE)
 
 
-class SkillTask(Task):
-    """A leaf that asks something of the robot and waits for its result."""
+class SkillTask(Leaf):
+    """A leaf that asks a skill of the robot."""
 
-    __slots__ = ("arguments", "getters", "is_asked", "result", "skill", "started")
+    __slots__ = ("arguments", "getters", "skill", "started")
+    saved = (*Leaf.saved, "arguments", "started")
 
     def __init__(self, site: Site, skill: Skill, arguments: tuple[Argument, ...]) -> None:
         super().__init__(site)
@@ -32,8 +36,6 @@ class SkillTask(Task):
         names = [(argument.name or skill.main, argument.value) for argument in arguments]
         self.getters: Mapping[str, Getter] = {name: getter(value, skill.arguments[name]) for name, value in names}
         self.arguments: dict[str, Value] = {}
-        self.is_asked = False  # the world is at it, and has not told how it ended
-        self.result = IDLE
         self.started = 0.0  # [s] of robot time
 
     def begin(self) -> int:
@@ -41,18 +43,11 @@ class SkillTask(Task):
         self.arguments = {name: get(self) for name, get in self.getters.items()}
         return self.ask()
 
-    def proceed(self) -> int:
-        """Return the result, once there is one."""
-        if self.is_asked:
-            return RUNNING
-        if self.result == RUNNING:
-            return self.ask()
-        return self.result
-
     def ask(self) -> int:
         """Start the skill; it is asked again after a pause."""
-        self.started, self.result, self.is_asked = self.engine.now, RUNNING, True
+        self.started, self.status = self.engine.now, RUNNING
         self.engine.say(SkillStarted(self.number, self.skill.name, self.arguments))
+        self.is_asked = True
         try:
             self.engine.world.start(self.number, self.skill.name, self.arguments)
         except Exception:
@@ -60,33 +55,42 @@ class SkillTask(Task):
             raise
         return RUNNING
 
-    def ended(self, result: int, message: str) -> None:
+    def ended(self, result: Result) -> None:
         """Take the result from the world."""
-        self.is_asked = False
-        self.result = result
-        self.say_ended(NAMES[result], message)
+        super().ended(result)
+        message = self.engine.reasons[self.number] if self.status == FAILURE else result.message
+        self.say_ended(self.outcome or NAMES[self.status], message)
 
-    def halt(self) -> None:
-        """Ask the world to stop it."""
-        super().halt()
-        self.stop()
+    def judged(self, result: Result) -> tuple[int, str, str]:
+        """Return what the outcome counts as; one that the skill did not declare is a failure."""
+        outcome = result.outcome
+        if outcome in ("", SUCCESS_WORD, FAILURE_WORD):
+            return super().judged(result)
+        if outcome not in self.skill.outcomes:
+            message = f"the skill '{self.skill.name}' ended with an outcome that it does not declare: '{outcome}'"
+            self.engine.say(Reported(self.engine.program.nodes[self.number].path, message))
+            return FAILURE, "", message
+        status = SUCCESS if self.skill.outcomes[outcome] == SUCCESS_WORD else FAILURE
+        return status, outcome, result.message or outcome
 
     def suspend(self, anew: bool) -> bool:
-        """Ask the world to stop it, to be started or asked again; a result that has come already stays."""
-        if not self.is_asked:
+        """Hold the skill if it can pause and is to go on, else stop it."""
+        if self.is_asked and self.skill.pausable and not self._begins_anew():
+            if not self.is_held:
+                self.is_held = True
+                self.engine.world.pause(self.number)
             return False
-        self.stop()
-        self.statuses[self.number] = IDLE
-        self.engine.cut_short.append(self.number)
-        return anew
+        return super().suspend(anew)
+
+    def _begins_anew(self) -> bool:
+        nodes = self.engine.program.nodes
+        return any(one.number <= self.number < nodes[one.number].end for one in self.engine.restarting)
 
     def stop(self) -> None:
         """Stop what the world is at."""
         if self.is_asked:
-            self.is_asked = False
-            self.engine.forget_result(self.number)
             self.say_ended("halted", self.engine.because)
-            self.engine.world.halt(self.number)
+        super().stop()
 
     def say_ended(self, result: str, message: str) -> None:
         """Say how it ended, and how long it took."""
@@ -100,18 +104,18 @@ def getter(value: Located, wanted: Type) -> Getter:
         return lambda task: constant
     if wanted.kind is TypeKind.TEXT:
         template = parse_template(value.text)
-        return lambda task: task.engine.filled(template, task.scope)
+        return lambda task: task.run.filled(template, task.scope)
     expression = expression_of(value)
     if wanted.kind in PLACED:
-        return lambda task: _place(task, evaluate(expression, task.scope))
+        return lambda task: place(task, evaluate(expression, task.scope))
     if wanted.kind is TypeKind.CHOICE:
         return lambda task: _word(evaluate(expression, task.scope))
     return lambda task: evaluate(expression, task.scope)
 
 
-def _place(task: SkillTask, value: Value) -> Value:
+def place(task: Task, value: Value) -> Value:
     """Return the place that a text names; a place or a pose as it is."""
-    found = task.engine.places.get(value, value) if isinstance(value, str) else value
+    found = task.engine.robot.places.get(value, value) if isinstance(value, str) else value
     if isinstance(found, str):
         raise NodeFailed(f"there is no place '{found}'")
     return found

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from rbxcompose.expressions.parser import parse
 from rbxcompose.expressions.tree import Expression, Flag, Number, Text, Word
 from rbxcompose.findings import Span
@@ -21,7 +19,7 @@ def inner_span(scalar: Scalar, start: int, end: int) -> Span:
     if span.line != span.end_line or span.end_column - span.column != len(scalar.text) + 2 * quotes:
         return span
     first = span.column + quotes + start
-    return replace(span, column=first, end_column=max(first + 1, span.column + quotes + end))
+    return span._replace(column=first, end_column=max(first + 1, span.column + quotes + end))
 
 
 def expression_of(scalar: Scalar) -> Expression:

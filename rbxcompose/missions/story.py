@@ -14,11 +14,15 @@ from rbxcompose.missions.events import (
     Logged,
     MissionEnded,
     MissionEvent,
+    NodeEnded,
+    NodeStarted,
+    Published,
     Reported,
     SkillEnded,
     SkillStarted,
+    Transition,
 )
-from rbxcompose.missions.program import Skill
+from rbxcompose.missions.program import RESTART, Skill
 from rbxcompose.missions.showing import show
 from rbxcompose.units import format_number
 
@@ -36,7 +40,7 @@ class Story:
         self._results: dict[str, Counter[str]] = {}
 
     def tell(self, event: MissionEvent) -> tuple[Level, str]:
-        """Return the line for an event, and how bad it is."""
+        """Return the line for an event, empty for one that others tell as well, and how bad it is."""
         match event:
             case SkillStarted(leaf=leaf, skill=skill, arguments=arguments):
                 self._labels[leaf] = " ".join([skill, *self._written(skill, arguments)])
@@ -44,28 +48,35 @@ class Story:
             case SkillEnded(leaf=leaf, skill=skill, result=result, duration=duration, message=message):
                 self._results.setdefault(skill, Counter())[result] += 1
                 text = f"{self._labels[leaf]}: {result} ({format_number(round(duration, 1))} s)"
-                return RESULTS[result], _with(text, message)
+                return RESULTS.get(result, Level.OK), _with(text, message)
             case InterruptStarted(name=name, condition=condition, shown=shown):
                 values = ", ".join(f"{name} {value}" for name, value in shown.items())
                 return Level.OK, f"interrupt {name}: {condition}" + (f" ({values})" if values else "")
-            case InterruptEnded(name=name, back_to=leaves):
-                back = " and ".join(self._labels[leaf] for leaf in leaves)
-                return Level.OK, f"interrupt {name} done" + (f", back to {back}" if back else "")
+            case InterruptEnded(name=name, afterwards=afterwards, back_to=leaves):
+                back = " and ".join(self._labels[leaf] for leaf in leaves if leaf in self._labels)
+                return Level.OK, f"interrupt {name} done" + _afterwards(afterwards, back)
+            case NodeStarted(name=name, is_state=is_state):
+                return Level.OK, f"state {name}" if is_state else f"{name} begins"
+            case NodeEnded(name=name, result=result, is_state=is_state):
+                return Level.OK, "" if is_state else f"{name}: {result}"
+            case Transition(state=state, outcome=outcome, to=to):
+                return Level.OK, f"{state}: {outcome}, on to {to}"
+            case Published(topic=topic, fields=fields):
+                return Level.OK, f"published on {topic}: {show(None, fields)}"
             case Logged(level=level, text=text):
                 return LEVELS[level], text
             case Reported(path=path, message=message):
                 return Level.WARN, f"{path}: {message}"
-            case MissionEnded(result=result, message=message):
-                return Level.ERROR if result == "failure" else Level.OK, _with(
-                    f"mission {self._mission}: {result}", message
-                )
+            case MissionEnded(result=result):
+                text = f"mission {self._mission}: {result}"
+                return Level.ERROR if result == "failure" else Level.OK, _with(text, event.words)
         assert_never(event)
 
     def skills(self) -> str:
         """Return how often each skill ended how: `go_to 12 (11 success, 1 failure), recharge 1 (1 success)`."""
         counted = []
         for skill, results in self._results.items():
-            each = ", ".join(f"{results[result]} {result}" for result in RESULTS if results[result])
+            each = ", ".join(f"{results[result]} {result}" for result in sorted(results, key=_usual_first))
             counted.append(f"{skill} {results.total()} ({each})")
         return ", ".join(counted)
 
@@ -76,6 +87,17 @@ class Story:
             text = value.name if isinstance(value, Place) else show(skill.arguments.get(argument), value)
             texts.append(text if argument == skill.main else f"{argument} {text}")
         return texts
+
+
+def _usual_first(result: str) -> tuple[int, str]:
+    usual = list(RESULTS)
+    return (usual.index(result) if result in usual else len(usual), result)
+
+
+def _afterwards(afterwards: str, back: str) -> str:
+    if afterwards == RESTART:
+        return ", begins anew"
+    return f", back to {back}" if back else ""
 
 
 def _with(text: str, message: str) -> str:

@@ -5,17 +5,19 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN, Type
+from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Finding
 from rbxcompose.missions.statuses import FAILURE, IDLE, RUNNING
 
 if TYPE_CHECKING:
     from rbxcompose.missions.engine import Engine
-    from rbxcompose.missions.program import Node
+    from rbxcompose.missions.program import Node, Target
+    from rbxcompose.missions.run import Run
     from rbxcompose.missions.scopes import ItemScope, MissionScope
     from rbxcompose.missions.views import View
 
@@ -26,29 +28,35 @@ class NodeFailed(Exception):  # noqa: N818 - it ends a node, as a failure would;
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """What a task is made from: the engine, its node, what its expressions see, the tasks below it.
+    """What a task is made from: the engine, the run of its mission, its node, what its expressions see, those below.
 
-    `item` is what the tasks below see of a loop, for a node that has one.
+    `item` is what the tasks below see of a loop, for a node that has one; `inner` is the run of the mission that a
+    `use` runs.
     """
 
     engine: Engine
+    run: Run
     node: Node
     scope: MissionScope
     children: tuple[Task, ...] = ()
     item: ItemScope | None = None
+    inner: Run | None = None
 
 
 class Task(ABC):
     """The running side of a node; kinds fill in `begin` and, if they take time, `proceed`.
 
     `current` is the task below that runs now. A task without one goes on by starting the child that it was at, so
-    that a child which was suspended to begin anew needs no further bookkeeping.
+    that a child which was suspended to begin anew needs no further bookkeeping. `saved` are the names of what else
+    makes up its state.
     """
 
-    __slots__ = ("current", "end", "engine", "number", "scope", "statuses")
+    __slots__ = ("current", "end", "engine", "number", "run", "scope", "statuses")
+    saved: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, site: Site) -> None:
         self.engine = site.engine
+        self.run = site.run
         self.number = site.node.number
         self.end = site.node.end
         self.scope = site.scope
@@ -57,6 +65,8 @@ class Task(ABC):
 
     def start(self) -> int:
         """Begin, and return the status after the first tick."""
+        if self.engine.reasons:
+            self.engine.reasons.pop(self.number, None)  # of an earlier run
         try:
             status = self.begin()
         except Exception as error:  # whatever a leaf does wrong ends its node, not the engine
@@ -76,6 +86,11 @@ class Task(ABC):
     def halt(self) -> None:
         """Stop what runs here and below; only for a task that runs."""
         self.statuses[self.number] = IDLE
+        self.engine.places.leave(self)
+        self.halt_below()
+
+    def halt_below(self) -> None:
+        """Stop what runs below."""
         child = self.current
         if child is not None:
             self.current = None
@@ -91,6 +106,24 @@ class Task(ABC):
         if child is not None and child.suspend(anew):
             self.current = None
         return False
+
+    def restart(self, target: Target) -> bool:
+        """Let what is named begin again, if it runs below; tell whether it does."""
+        child = self.current
+        if child is None:
+            return False
+        if child.number == target.number and not target.is_round and self.number != target.number:
+            self.current = None
+            child.halt()
+            return True
+        return child.restart(target)
+
+    def restored(self) -> None:  # noqa: B027 - most kinds have nothing to do
+        """Bring in order what follows from the state, after it was restored."""
+
+    def result(self) -> Value:
+        """Return what `save` keeps of this node."""
+        return None
 
     @staticmethod
     def waits(node: Node) -> bool:
@@ -122,7 +155,7 @@ class Task(ABC):
         return status
 
     def forget(self) -> None:
-        """Set the nodes below to idle, before they run once more."""
+        """Set the statuses of the nodes below to idle, before they run once more."""
         first = self.number + 1
         self.statuses[first : self.end] = [IDLE] * (self.end - first)
 
@@ -134,7 +167,7 @@ class Task(ABC):
         """
         value = evaluate(expression, self.scope)
         if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
-            raise NodeFailed(f"{what} must be a number from 0 on, not {self.engine.show('', value)}")
+            raise NodeFailed(f"{what} must be a number from 0 on, not {self.run.show('', value)}")
         return value
 
     def count_of(self, expression: Expression, what: str) -> int:
@@ -145,11 +178,12 @@ class Task(ABC):
         """
         value = self.number_of(expression, what)
         if value != int(value):
-            raise NodeFailed(f"{what} must be a whole number, not {self.engine.show('', value)}")
+            raise NodeFailed(f"{what} must be a whole number, not {self.run.show('', value)}")
         return int(value)
 
     def _broken(self, error: Exception) -> int:
-        if self.current is not None:
-            self.halt()
+        self.halt_below()
+        self.engine.places.forget(self.number, self.end)
+        self.engine.outcome = ""
         self.engine.failed(self, error)
         return FAILURE

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from rbxcompose.expressions.check import Problem, check_value
 from rbxcompose.expressions.tree import Expression, Word
-from rbxcompose.expressions.types import PLACE, POSE, Type, TypeKind
-from rbxcompose.findings import Finding, Kind, replacement
+from rbxcompose.expressions.types import PLACE, POSE, TEXT, UNKNOWN, Type, TypeKind
+from rbxcompose.findings import Finding, Kind, Span, nearest, replacement
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions import codes
 from rbxcompose.missions.program import Node, Program, RobotNames
-from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.registry import all_kinds
 from rbxcompose.missions.spans import inner_span
 from rbxcompose.missions.watching import POSE as POSE_NAME
 
@@ -25,6 +25,7 @@ class NodeScope:
 
     names: Mapping[str, Type]
     places: Iterable[str]
+    removed: Mapping[str, Span] = field(default_factory=dict)  # places that are gone, with what took them away
 
     def variable(self, name: str) -> Type | None:
         """Return the type of `$name`, if there is one."""
@@ -63,7 +64,7 @@ class View:
 
 
 def _waits(node: Node) -> bool:
-    kind = kinds().get(node.kind)
+    kind = all_kinds().get(node.kind)
     return kind is not None and kind.task.waits(node)
 
 
@@ -74,20 +75,26 @@ def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
         POSE_NAME: POSE,
         **{name: one.type for name, one in program.inputs.items()},
         **{name: datum.type for name, datum in program.data.items()},
+        **{name: UNKNOWN for name in program.saved if name not in program.data},
     }
+
+
+def base_scope(program: Program, robot: RobotNames) -> NodeScope:
+    """Return what all of a mission sees."""
+    return NodeScope(base_names(program, robot), robot.places, robot.removed)
 
 
 def views(program: Program, robot: RobotNames) -> Iterator[View]:
     """Yield each node with what it sees, in the order of the text."""
-    base = NodeScope(base_names(program, robot), robot.places)
+    base = base_scope(program, robot)
     below: dict[int, NodeScope] = {}  # what the children of a node see
     for node in program.nodes:
         scope = base if node.parent is None else below[node.parent]
         view = View(program, robot, node, scope)
         below[node.number] = scope
-        if node.item:
-            item = kinds()[node.kind].task.item_type(view)
-            below[node.number] = NodeScope({**scope.names, node.item: item}, robot.places)
+        if node.item and node.kind:
+            item = all_kinds()[node.kind].task.item_type(view)
+            below[node.number] = replace(scope, names={**scope.names, node.item: item})
         yield view
 
 
@@ -105,6 +112,10 @@ def findings_of(
         elif unknown_word and wanted.kind in _MEASURED and isinstance(expression.tree, Word):
             message = f"this must be {wanted.phrase}; nothing is named '{unknown_word}'"
             yield kind.at(span, message, fix=fix)
+        elif unknown_word and wanted == TEXT and unknown_word not in scope.removed:
+            yield _no_text(unknown_word, span, scope, kind)
+        elif unknown_word in scope.removed:
+            yield codes.removed_place(span, unknown_word, scope.removed[unknown_word])
         elif unknown_word and scope.word(unknown_word) is None:
             unquoted = f"there is no place '{unknown_word}'"
             yield codes.UNKNOWN_PLACE.at(span, unquoted, help=problem.help, fix=fix)
@@ -114,6 +125,15 @@ def findings_of(
             yield codes.UNKNOWN_NAME.at(span, problem.message, help=problem.help, fix=fix)
         else:
             yield kind.at(span, problem.message, help=problem.help, fix=fix)
+
+
+def _no_text(word: str, span: Span, scope: NodeScope, kind: Kind) -> Finding:
+    """Return the finding about a bare word that stands for a text: a misspelt place, or one that needs quotes."""
+    message = f"there is no place '{word}'"
+    if near := nearest(word, scope.words()):
+        return codes.UNKNOWN_PLACE.at(span, message, help=f"did you mean '{near[0]}', or the text '\"{word}\"'?")
+    fix = replacement(span, word, f'"{word}"', is_safe=False)
+    return kind.at(span, message, help=f"a text needs quotes: write '\"{word}\"'", fix=fix)
 
 
 def _at(problem: Problem, names: Iterable[tuple[str, int]]) -> str:

@@ -25,20 +25,32 @@ class BatteryCore:
     """Charge that falls from 1 to 0 over `settings.runtime`; replacing `settings` keeps the level."""
 
     def __init__(self, settings: BatterySettings, level: float = 1.0) -> None:
-        self.settings = settings
-        self._level = level
+        self._settings = settings
+        self._start, self._drained = level, 0.0  # a ratio, and for how long it has drained since then [s]
+
+    @property
+    def settings(self) -> BatterySettings:
+        """How it drains and complains."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: BatterySettings) -> None:
+        self.set(self.level)
+        self._settings = settings
 
     @property
     def level(self) -> float:
-        """Charge as a ratio from 0 to 1."""
-        return self._level
+        """Charge as a ratio from 0 to 1, from the whole time at once: steps would add up what each rounds off."""
+        runtime = self._settings.runtime
+        left = (self._start * runtime - self._drained) / runtime
+        return left if left > NOTHING_LEFT else 0.0
 
     @property
     def status(self) -> tuple[Level, str]:
         """Level of the diagnostics and what to tell people."""
-        if self._level < self.settings.error:
+        if self.level < self.settings.error:
             return Level.ERROR, "Low battery"
-        if self._level < self.settings.warn:
+        if self.level < self.settings.warn:
             return Level.WARN, "Medium battery"
         return Level.OK, "Battery OK"
 
@@ -46,10 +58,9 @@ class BatteryCore:
         """Set the charge; return why not if `level` is no ratio from 0 to 1, else nothing."""
         if not 0.0 <= level <= 1.0:
             return f"a battery level lies between 0 % and 100 %, not at {level * 100:g} %"
-        self._level = level
+        self._start, self._drained = level, 0.0
         return ""
 
     def step(self, dt: float) -> None:
         """Drain for `dt` [s]."""
-        left = self._level - dt / self.settings.runtime
-        self._level = left if left > NOTHING_LEFT else 0.0
+        self._drained += dt

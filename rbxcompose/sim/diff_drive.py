@@ -67,10 +67,14 @@ class DiffDriveCore:
             self._target = velocity
             self._target_until = now + self.settings.command_timeout
 
+    def forget(self) -> None:
+        """Brake until the next command."""
+        self._target_until = -math.inf
+
     def brake(self) -> None:
         """Come to rest and stay there, whatever is commanded, until `release`."""
         self._braking = True
-        self._target_until = -math.inf
+        self.forget()
 
     def release(self) -> None:
         """Follow commands again; the base stays at rest until the next one."""

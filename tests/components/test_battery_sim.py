@@ -19,6 +19,17 @@ def test_it_tells_its_level_from_0_to_100_once_a_second() -> None:
     assert [message.data for message in levels] == pytest.approx([90.0, 80.0, 70.0])
 
 
+@pytest.mark.parametrize("runtime", [20, 60, 100])
+def test_a_level_that_is_a_whole_percentage_is_told_exactly(runtime: int) -> None:
+    robot = Bench(instance("battery", "battery_sim", {"runtime": f"{runtime} s"}))
+    levels = robot.collect("/battery_level", Float32)
+    robot.advance(float(runtime))
+    whole = {
+        second: 100 * (runtime - second) // runtime for second in range(1, runtime + 1) if 100 * second % runtime == 0
+    }
+    assert {second: levels[second - 1].data for second in whole} == whole
+
+
 def test_a_level_that_is_set_is_told_at_once() -> None:
     robot = bench()
     robot.advance(5.5)

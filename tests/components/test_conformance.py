@@ -15,7 +15,7 @@ from rbxcompose.plan.model import Instance
 from rbxcompose.rendering.text import render_text
 from rbxcompose.sdk.ports import In, Serves
 from rbxcompose.sdk.registry import component_names, component_type
-from rbxcompose.testing import Bench
+from rbxcompose.testing import Bench, clock_uses
 
 ROBOT = """
 rbx: 1
@@ -101,6 +101,11 @@ def test_it_does_the_same_for_the_same_input(name: str, tmp_path: Path) -> None:
         return [record.to_json() for record in robot.records]
 
     assert run() == run()
+
+
+@all_types
+def test_it_never_asks_for_time_itself(name: str) -> None:
+    assert clock_uses(Path(inspect.getfile(component_type(name)))) == []
 
 
 @all_types

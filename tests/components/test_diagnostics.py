@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from rbxcompose.diagnostics.levels import Level
-from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
 from rbxcompose.testing import Bench, instance
 
 
@@ -47,3 +47,17 @@ def test_components_that_are_lost_are_stale_with_the_cause() -> None:
     robot.advance(0.0)
     status = next(one for one in reports[-1].status if one.name == "/power/battery")
     assert (status.level, status.message) == (Level.STALE, "its process was killed (signal 9)")
+
+
+def test_going_down_nothing_is_told_to_have_become_better() -> None:
+    robot = bench()
+    robot.advance(6.0)
+    robot.host.brake()
+    robot.advance(0.0)
+    robot.publish("/diagnostics", DiagnosticArray(status=(DiagnosticStatus(name="battery", level=0),)))
+    robot.advance(1.0)
+    assert [text for text in robot.texts() if "/power" in text] == [
+        "diagnostics: /power is WARN: battery: Medium battery"
+    ]
+    robot.advance(3.0)
+    assert robot.texts()[-1] == "diagnostics: /power is ERROR: battery: Low battery"

@@ -2,9 +2,11 @@ from __future__ import annotations
 
 import pytest
 
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.qos import Qos
 from rbxcompose.testing import Bench, instance
 
 FORWARDS = Twist(linear=Vector3(x=0.4))
@@ -68,3 +70,25 @@ def test_the_summary_tells_the_way_driven() -> None:
     drive(robot, 2.0)
     robot.advance(2.0)
     assert robot.host.summary()["base"]["distance driven"] == "0.96 m"
+
+
+@pytest.mark.parametrize(
+    ("speeds", "message"),
+    [
+        ([0.7], "commands: 1 cut to the limits"),
+        ([5.0, 5.0], "commands: 2 dropped as absurd"),
+        ([5.0, 0.7], "commands: 1 dropped as absurd, 1 cut to the limits"),
+    ],
+)
+def test_commands_that_are_not_followed_are_counted_by_what_was_done_with_them(
+    speeds: list[float], message: str
+) -> None:
+    robot = bench()
+    told: list[str] = []
+    robot.bus.subscribe(
+        "test", "/diagnostics", DiagnosticArray, Qos.EVENT, lambda one: told.extend(each.message for each in one.status)
+    )
+    for speed in speeds:
+        robot.publish("/cmd_vel", Twist(linear=Vector3(x=speed)))
+    robot.advance(0.1)
+    assert message in told

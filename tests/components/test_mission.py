@@ -2,137 +2,13 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Callable, Mapping
-from typing import Any
-
 import pytest
 
-from rbxcompose.clock import Clock, SteppedClock
 from rbxcompose.components.mission import Mission, MissionConfig
-from rbxcompose.diagnostics.levels import Level
-from rbxcompose.expressions.types import TYPES
-from rbxcompose.findings import Report
+from rbxcompose.expressions.values import NOT_ARRIVED
 from rbxcompose.geometry import Pose2
-from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.missions.goals import skill_of
-from rbxcompose.missions.program import Program
-from rbxcompose.missions.reading import read_program
-from rbxcompose.missions.sources import SkillSource, ValueSource
-from rbxcompose.msgs.nav2_msgs import NavigateToPose
-from rbxcompose.msgs.rbxcompose_msgs import Recharge
-from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.sdk import Ended, Outcome, Place, Refused
-
-PLACES = {"dock": Place("dock", 0.5, 0.5, 0.0), "corner": Place("corner", 1.0, 0.0, 0.0)}
-
-
-def program_of(text: str) -> Program:
-    root, findings = read_text(textwrap.dedent(text), "mission.yaml")
-    assert isinstance(root, Tree)
-    assert not findings
-    report = Report()
-    program = read_program(root, report)
-    assert program is not None
-    assert not report.has_errors, list(report)
-    return program
-
-
-class Goal:
-    """A goal at the fake server."""
-
-    def __init__(self, request: Any, then: Callable[[Ended[Any]], None]) -> None:
-        self.request = request
-        self.then = then
-        self.is_cancelled = False
-
-    def cancel(self) -> None:
-        self.is_cancelled = True
-
-
-class Server:
-    """An action server that tests drive by hand."""
-
-    def __init__(self) -> None:
-        self.is_available = True
-        self.goals: list[Goal] = []
-
-    def __call__(self, request: Any, then: Callable[[Ended[Any]], None], feedback: object = None, /) -> Goal:
-        self.goals.append(Goal(request, then))
-        return self.goals[-1]
-
-    def end(self, outcome: Outcome, message: str = "") -> None:
-        self.goals[-1].then(Ended(outcome, None, message))
-
-
-class Look:
-    def __init__(self) -> None:
-        self.pose: Pose2 | None = None
-
-    def now(self) -> Pose2 | None:
-        return self.pose
-
-
-class Robot:
-    """A mission component with a fake context and fake ports, on a stepped clock."""
-
-    def __init__(self, text: str, start: str | None = "test") -> None:
-        self.stepped = SteppedClock()
-        self.clock: Clock = self.stepped
-        self.is_stopped = False
-        self.lines: list[str] = []
-        self.levels: list[Level] = []
-        self.events: list[dict[str, object]] = []
-        self.statuses: list[str] = []
-        self.wakes: list[float] = []
-        config = MissionConfig(
-            programs={"test": program_of(text)},
-            start=start,
-            values={"battery": ValueSource("battery_level", "std_msgs/msg/Float32", "data", 0.01, TYPES["ratio"])},
-            places=PLACES,
-            skills={
-                "go_to": SkillSource(skill_of(NavigateToPose, "go_to"), "nav2_msgs/action/NavigateToPose", "go_to"),
-                "recharge": SkillSource(
-                    skill_of(Recharge, "recharge", restartable=False), "rbxcompose_msgs/action/Recharge", "recharge"
-                ),
-            },
-        )
-        self.go_to, self.recharge, self.look = Server(), Server(), Look()
-        self.mission = Mission("mission", config, self)
-        self.mission.bound = {"skill_go_to": self.go_to, "skill_recharge": self.recharge, "pose": self.look}
-        self.mission.configure()
-        self.mission.activate()
-
-    def log(self, level: Level, text: str) -> None:
-        self.lines.append(f"{self.clock.now():g} {text}")
-        self.levels.append(level)
-
-    def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
-        self.statuses.append(message)
-
-    def wake_at(self, time: float) -> None:
-        self.wakes.append(time)
-
-    def notify(self, event: str, **data: object) -> None:
-        self.events.append({"event": event, **data})
-
-    def level(self, percent: float) -> None:
-        self.mission.received("value_battery", Float32(data=percent))
-
-    def start(self) -> None:
-        self.mission.start()
-        self.advance(0.0)
-
-    def advance(self, seconds: float) -> None:
-        """Let time pass, and wake the component whenever it asked for it."""
-        end = self.clock.now() + seconds
-        while due := sorted(time for time in self.wakes if time <= end):
-            self.wakes.remove(due[0])
-            self.stepped.advance_to(max(due[0], self.clock.now()))
-            self.mission.wake()
-        self.stepped.advance_to(end)
-
+from rbxcompose.sdk import Ended, Outcome, Refused
+from tests.executive.fake_robot import Robot
 
 PATROL = """
 interrupts:
@@ -145,10 +21,45 @@ do:
 """
 
 
+def ports_of(text: str) -> list[str]:
+    return sorted(Mission.ports(Robot(text).mission.config))
+
+
 def test_it_declares_only_what_its_missions_use() -> None:
-    assert sorted(Mission.ports(Robot(PATROL).mission.config)) == ["skill_go_to", "skill_recharge", "value_battery"]
-    assert sorted(Mission.ports(Robot("do:\n  check: distance($pose, dock) < 1 m").mission.config)) == ["pose"]
+    assert ports_of(PATROL) == ["publishes_mission_events", "skill_go_to", "skill_recharge", "value_battery"]
+    assert ports_of("do:\n  check: distance($pose, dock) < 1 m") == ["pose", "publishes_mission_events"]
+    nearest = "do:\n  for: place\n  in: [dock, corner]\n  order: nearest\n  do:\n    go_to: $place"
+    assert ports_of(nearest) == ["pose", "publishes_mission_events", "skill_go_to"]
     assert Mission.ports(MissionConfig()) == {}
+
+
+def test_a_loop_over_the_nearest_place_waits_for_the_pose() -> None:
+    robot = Robot("do:\n  for: place\n  in: [dock, corner]\n  order: nearest\n  do:\n    go_to: $place")
+    robot.start()
+    robot.advance(0.0)
+    assert robot.lines == ["0 mission test waits for pose"]
+    robot.look.pose = Pose2(0.9, 0.0, 0.0)
+    robot.advance(0.1)
+    assert robot.lines[1:] == ["0.1 go_to corner"]
+
+
+def test_a_pose_that_no_mission_reads_has_not_arrived() -> None:
+    robot = Robot("do: recharge")
+    del robot.mission.bound["pose"]
+    _, world = robot.mission.world(lambda leaf, result: None, lambda event: None)
+    assert world.value("pose") is NOT_ARRIVED
+
+
+def test_a_mission_that_waits_for_a_value_says_so_again_each_minute() -> None:
+    robot = Robot(PATROL)
+    robot.start()
+    robot.advance(130.0)
+    text = "waits for battery, of which nothing has come for 60 s"
+    assert robot.lines == ["0 mission test waits for battery", f"60 mission test {text}", f"120 mission test {text}"]
+    assert robot.events == [{"event": "mission_waits", "mission": "test", "message": text}] * 2
+    robot.level(100.0)
+    robot.advance(0.0)
+    assert robot.lines[-1] == "130 go_to corner"
 
 
 def test_it_waits_for_every_value_that_is_read_then_tells_its_story() -> None:
@@ -351,3 +262,10 @@ def test_going_down_halts_the_mission_for_good() -> None:
 def test_an_unknown_command_is_refused() -> None:
     with pytest.raises(Refused, match="does not know"):
         Robot(GO).mission.command("dance")
+
+
+def test_the_summary_of_a_mission_that_calls_no_skill_has_no_skills() -> None:
+    robot = Robot("do:\n  log: Hello")
+    robot.start()
+    robot.advance(1.0)
+    assert robot.mission.summary() == {"mission": "test: success"}

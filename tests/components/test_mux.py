@@ -1,6 +1,9 @@
 from __future__ import annotations
 
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.msgs.std_msgs import Empty
+from rbxcompose.qos import Qos
 from rbxcompose.testing import Bench, instance
 
 SLOW, FAST, ZERO = Twist(linear=Vector3(x=0.1)), Twist(linear=Vector3(x=0.4)), Twist()
@@ -65,3 +68,54 @@ def test_nothing_follows_the_last_zero_when_the_robot_goes_down() -> None:
     robot.publish("/cmd_vel/teleop", FAST)
     robot.advance(1.0)
     assert out == [ZERO]
+
+
+def locked_bench() -> tuple[Bench, list[DiagnosticStatus]]:
+    inputs = {"teleop": {"priority": 100, "timeout": "0.5 s"}, "navigation": {"priority": 10, "timeout": "0.5 s"}}
+    locks = {"deadman": {"priority": 50, "timeout": "0.3 s"}}
+    robot = Bench(instance("cmd_vel", "mux", {"output": "cmd_vel", "inputs": inputs, "locks": locks}))
+    told: list[DiagnosticStatus] = []
+
+    def note(message: DiagnosticArray) -> None:
+        told.extend(status for status in message.status if status.name == "cmd_vel")
+
+    robot.bus.subscribe("test", "/diagnostics", DiagnosticArray, Qos.EVENT, note)
+    return robot, told
+
+
+def test_a_lock_without_a_heartbeat_is_a_warning_that_names_what_is_locked_out() -> None:
+    robot, told = locked_bench()
+    robot.advance(0.5)
+    assert (told[-1].level, told[-1].message) == (1, "deadman gives no heartbeat: navigation is locked out")
+    robot.publish("/cmd_vel/deadman", Empty())
+    assert (told[-1].level, told[-1].message) == (0, "no input")
+    robot.advance(0.5)
+    assert told[-1].level == 1
+
+
+def test_a_lock_without_a_heartbeat_is_still_a_warning_when_the_robot_goes_down() -> None:
+    robot, told = locked_bench()
+    robot.advance(0.5)
+    robot.host.brake()
+    robot.publish("/cmd_vel/navigation", SLOW)
+    robot.advance(0.0)
+    assert (told[-1].level, robot.texts()) == (1, [])
+
+
+def test_commands_that_are_locked_out_are_told_in_the_log_once_each_time() -> None:
+    robot, _ = locked_bench()
+    for _ in range(2):
+        for _ in range(10):
+            robot.publish("/cmd_vel/navigation", SLOW)
+            robot.advance(0.1)
+        robot.advance(1.0)
+    line = "cmd_vel: commands are not let through: deadman gives no heartbeat: navigation is locked out"
+    assert robot.texts() == [line] * 2
+
+
+def test_an_open_lock_and_commands_above_it_are_told_nowhere() -> None:
+    robot, _ = locked_bench()
+    robot.publish("/cmd_vel/teleop", FAST)
+    robot.publish("/cmd_vel/deadman", Empty())
+    robot.publish("/cmd_vel/navigation", SLOW)
+    assert robot.texts() == []

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from rbxcompose.config import Place
 from rbxcompose.expressions.types import FLAG, POSE, TEXT, TYPES, quantity_of
@@ -13,12 +13,14 @@ from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping as Tree
 from rbxcompose.missions.engine import Engine
-from rbxcompose.missions.events import MissionEvent
+from rbxcompose.missions.events import MissionEnded, MissionEvent
 from rbxcompose.missions.program import Program, RobotNames, Skill
 from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.results import Result
 from rbxcompose.missions.semantics import check_program
 from rbxcompose.missions.statuses import IDLE, NAMES, RUNNING
 from rbxcompose.missions.story import Story
+from rbxcompose.missions.world import PLAIN, Settings
 from rbxcompose.units import LENGTH
 
 PLACES = {name: Place(name, float(x), 0.0, 0.0) for x, name in enumerate(("dock", "kitchen", "corner_1", "corner_2"))}
@@ -28,10 +30,14 @@ SKILLS = {
     "recharge": Skill("recharge", claims="base"),
     "say": Skill("say", {"words": TEXT}, "words"),
     "pour": Skill("pour", restartable=False),
+    "look": Skill("look", outcomes={"empty": "failure", "person": "success"}, results={"people": TYPES["count"]}),
+    "hold": Skill("hold", pausable=True),
     **{name: Skill(name) for name in ("a", "b", "c", "d", "react", "first", "second")},
 }
 VALUES = {"battery": TYPES["ratio"], "door": FLAG, "count_of_people": TYPES["count"]}
-ROBOT = RobotNames(VALUES, PLACES, SKILLS)
+TOPICS = {"greetings": "std_msgs/msg/String", "steering": "geometry_msgs/msg/Twist"}
+SERVICES = {"reset": "std_srvs/srv/Trigger", "light": "std_srvs/srv/SetBool"}
+ROBOT = RobotNames(VALUES, PLACES, SKILLS, topics=TOPICS, services=SERVICES)
 
 
 def tree(text: str, file: str = "mission.yaml") -> Tree:
@@ -42,12 +48,12 @@ def tree(text: str, file: str = "mission.yaml") -> Tree:
     return root
 
 
-def program_of(text: str) -> Program:
+def program_of(text: str, robot: RobotNames = ROBOT) -> Program:
     """Return the program of a mission without mistakes; the head of the file may be left out."""
     report = Report()
     program = read_program(tree(text), report)
     if program:
-        report.extend(check_program(program, ROBOT))
+        report.extend(check_program(program, robot))
     assert not report.has_errors, list(report)
     assert program is not None
     return program
@@ -55,13 +61,20 @@ def program_of(text: str) -> Program:
 
 @dataclass
 class Simulated:
-    """A world in virtual time: a skill takes `takes[skill]` [s], else 1 s, and fails at the calls `fails[skill]`."""
+    """A world in virtual time: a skill takes `takes[skill]` [s], else 1 s, and fails at the calls `fails[skill]`.
+
+    `outcomes[skill]` are the outcomes of its calls in turn, where they are not empty; `tells[skill]` is what it found.
+    """
 
     program: Program
     inputs: Mapping[str, Value] = field(default_factory=dict)
     takes: Mapping[str, float] = field(default_factory=dict)
     fails: Mapping[str, frozenset[int]] = field(default_factory=dict)
     raises: frozenset[str] = frozenset()
+    robot: RobotNames = ROBOT
+    settings: Settings = PLAIN
+    outcomes: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    tells: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Make the engine; nothing has happened."""
@@ -70,13 +83,15 @@ class Simulated:
         self.counts: dict[str, int] = {}
         self.arrived: dict[str, float] = {}
         self.running: dict[int, tuple[float, str]] = {}
+        self.held: dict[int, tuple[float, str]] = {}
+        self.published: list[tuple[float, str, dict[str, Value]]] = []
         self.calls: dict[str, int] = {}
         self.events: list[tuple[float, MissionEvent]] = []
         self.told: list[str] = []
         self.story = Story("test", SKILLS)
         self.changes: list[tuple[float, Callable[[], None]]] = []
         defaults = {name: one.default.value for name, one in self.program.inputs.items() if one.default}
-        self.engine = Engine(self.program, ROBOT, {**defaults, **self.inputs}, self)
+        self.engine = Engine(self.program, self.robot, {**defaults, **self.inputs}, self, self.settings)
 
     def at(self, time: float, change: Callable[[], None]) -> None:
         """Do something at a time, before the tick of that instant."""
@@ -110,8 +125,27 @@ class Simulated:
 
     def halt(self, leaf: int, /) -> None:
         """Stop a skill that runs."""
-        assert leaf in self.running, "a leaf is halted that does not run"
-        del self.running[leaf]
+        assert leaf in self.running or leaf in self.held, "a leaf is halted that does not run"
+        self.running.pop(leaf, None)
+        self.held.pop(leaf, None)
+
+    def pause(self, leaf: int, /) -> None:
+        """Hold a skill: its time stands still."""
+        end, skill = self.running.pop(leaf)
+        self.held[leaf] = (end - self.now, skill)
+
+    def resume(self, leaf: int, /) -> None:
+        """Let a skill go on."""
+        rest, skill = self.held.pop(leaf)
+        self.running[leaf] = (self.now + rest, skill)
+
+    def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
+        """Write a message down."""
+        self.published.append((self.now, topic, dict(fields)))
+
+    def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
+        """Begin a call; it takes as long as a skill."""
+        self.start(leaf, service, fields)
 
     def say(self, event: MissionEvent, /) -> None:
         """Write an event down."""
@@ -124,7 +158,16 @@ class Simulated:
         failed = self.calls[skill] in self.fails.get(skill, frozenset())
         if skill == "recharge" and not failed:
             self.set("battery", 1.0)
-        self.engine.ended(leaf, not failed, "no luck" if failed else "")
+        outcomes = self.outcomes.get(skill, ())
+        outcome = outcomes[self.calls[skill] - 1] if self.calls[skill] <= len(outcomes) else ""
+        self.engine.ended(leaf, Result(not failed, "no luck" if failed else "", outcome, self.tells.get(skill, {})))
+
+    @property
+    def ended(self) -> str:
+        """Return the outcome of the mission, which may be the name of an end."""
+        event = self.events[-1][1]
+        assert isinstance(event, MissionEnded), "it has not ended"
+        return event.outcome
 
     def advance(self, until: float) -> str:
         """Jump from event to event until a time [s] or the end, and return the status."""
@@ -148,6 +191,15 @@ class Simulated:
         return NAMES[self.engine.status]
 
 
-def simulate(text: str, **settings: object) -> Simulated:
-    """Return a simulated robot with the mission of this text."""
-    return Simulated(program_of(text), **settings)  # type: ignore[arg-type]
+def simulate(text: str, used: Mapping[str, str] | None = None, /, **settings: object) -> Simulated:
+    """Return a simulated robot with the mission of this text; `used` are the texts of missions that it may use."""
+    robot = robot_with(used or {})
+    return Simulated(program_of(text, robot), robot=robot, **settings)  # type: ignore[arg-type]
+
+
+def robot_with(used: Mapping[str, str]) -> RobotNames:
+    """Return the names of a robot with missions of these texts; each may use those before it."""
+    robot = ROBOT
+    for name, one in used.items():
+        robot = replace(robot, missions={**robot.missions, name: program_of(one, robot)})
+    return robot

@@ -1,113 +1,46 @@
-"""Laws of the engine for random missions: nothing raises, every leaf that starts ends or is halted exactly once."""
+"""Laws of the engine for random missions of all kinds and modifiers."""
 
 from __future__ import annotations
 
-import textwrap
-from collections import Counter
+import copy
+import itertools
+import json
+import re
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.findings import Report
 from rbxcompose.missions.events import SkillEnded, SkillStarted
-from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.snapshot import restore, save
 from rbxcompose.missions.statuses import IDLE, RUNNING
-from tests.missions.simulated import Simulated, tree
+from rbxcompose.missions.world import Settings
+from tests.missions.random_missions import CASES, FAILING, NODES, Case, Node, schedule
+from tests.missions.simulated import Simulated, simulate
+from tests.missions.test_composites import skills
 
-LEAVES = (
-    "a",
-    "b",
-    "recharge",
-    "wait: 0.7 s",
-    "check: $battery > 50 %",
-    "wait_for: $door",
-    "set:\n  n: $n + 1",
-    "log: hi",
-)
-MODIFIERS = ("optional: true", "timeout: 1.3 s", "attempts: 2", "only_if: $door", "attempts: forever")
+END = 8.125  # [s], between two instants at which something may be due
+FAULT = re.compile(r"\b[A-Z]\w*(Error|Exception): ")
+LATER = st.integers(0, 32).map(lambda quarters: quarters / 4 + 0.125)
 
 
-def indented(text: str) -> str:
-    return textwrap.indent(text, "  ")
+class Watching:
+    """An observer that knows which nodes run."""
+
+    def __init__(self) -> None:
+        self.running: set[int] = set()
+
+    def started(self, number: int, /) -> None:
+        """A node starts only if it does not run."""
+        assert number not in self.running
+        self.running.add(number)
+
+    def ended(self, number: int, status: int, outcome: str, /) -> None:
+        """A node ends only if it runs."""
+        self.running.remove(number)
 
 
-def listed(nodes: list[str]) -> str:
-    return "\n".join("- " + textwrap.indent(node, "  ").lstrip() for node in nodes)
-
-
-def with_colon(node: str) -> str:
-    return node if ":" in node else f"{node}:"
-
-
-def composites(nodes: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
-    lists = st.lists(nodes, min_size=1, max_size=3).map(listed)
-    return st.one_of(
-        lists.map(lambda steps: f"sequence:\n{indented(steps)}"),
-        lists.map(lambda steps: f"fallback:\n{indented(steps)}"),
-        st.tuples(st.integers(0, 3), nodes).map(lambda one: f"repeat: {one[0]}\ndo:\n{indented(one[1])}"),
-        nodes.map(lambda node: f"repeat: forever\nuntil: $battery < 50 %\nevery: 0.4 s\ndo:\n{indented(node)}"),
-        nodes.map(lambda node: f"for: item\nin: [1, 2]\nif_one_fails: next\ndo:\n{indented(node)}"),
-        st.tuples(nodes, nodes).map(lambda pair: f"if: $door\nthen:\n{indented(pair[0])}\nelse:\n{indented(pair[1])}"),
-        st.tuples(nodes, st.sampled_from(MODIFIERS)).map(modified),
-    )
-
-
-def modified(pair: tuple[str, str]) -> str:
-    node, modifier = pair
-    key = modifier.split(":", maxsplit=1)[0]
-    return node if f"{key}:" in node else f"{with_colon(node)}\n{modifier}"
-
-
-NODES = st.recursive(st.sampled_from(LEAVES), composites, max_leaves=8)
-CHANGES = st.lists(
-    st.tuples(st.integers(0, 60).map(lambda tenths: tenths / 10), st.sampled_from(("door", "low", "full", "pause"))),
-    max_size=8,
-)
-
-
-def mission(body: str, reaction: str) -> str:
-    return (
-        f"data: {{n: 0}}\ninterrupts:\n  open:\n    when: $door\n    do: b\n"
-        f"  low:\n    when: $battery < 50 %\n    do:\n{textwrap.indent(reaction, '      ')}\ndo:\n{indented(body)}\n"
-    )
-
-
-def run(body: str, reaction: str, changes: list[tuple[float, str]], failing: frozenset[int]) -> Simulated:
-    report = Report()
-    # A loop variable is used twice where one loop stands in another: that is a finding, but no matter here.
-    program = read_program(tree(mission(body, reaction)), report)
-    assert program is not None
-    assert not report.has_errors, list(report)
-    simulated = Simulated(program, fails=dict.fromkeys(("a", "b"), failing), takes={"b": 0.3})
-    simulated.set("battery", 1.0)
-    for time, change in changes:
-        simulated.at(time, lambda time=time, change=change: alter(simulated, time, change))  # type: ignore[misc]
-    simulated.advance(8.0)
-    return simulated
-
-
-def alter(simulated: Simulated, time: float, change: str) -> None:
-    match change:
-        case "door":
-            simulated.set("door", simulated.values.get("door") is not True)
-        case "low" | "full":
-            simulated.set("battery", 0.2 if change == "low" else 1.0)
-        case _ if simulated.engine.is_paused:
-            simulated.engine.resume(time)
-        case _:
-            simulated.engine.pause(time)
-
-
-@settings(max_examples=150, deadline=None)
-@given(NODES, NODES, CHANGES, st.frozensets(st.integers(1, 4)))
-def test_every_leaf_that_starts_ends_or_is_halted_exactly_once(
-    body: str, reaction: str, changes: list[tuple[float, str]], failing: frozenset[int]
-) -> None:
-    simulated = run(body, reaction, changes, failing)
-    simulated.engine.abort(simulated.now)
-    assert simulated.running == {}
-    assert simulated.engine.status not in (IDLE, RUNNING)
-    assert RUNNING not in [simulated.engine.statuses[leaf] for leaf in simulated.engine._leaves]
+def check_leaves(simulated: Simulated) -> None:
+    """See that every leaf that started has ended, or was halted, exactly once."""
     running: set[int] = set()
     for _, event in simulated.events:
         if isinstance(event, SkillStarted):
@@ -118,19 +51,110 @@ def test_every_leaf_that_starts_ends_or_is_halted_exactly_once(
     assert not running
 
 
-@settings(max_examples=50, deadline=None)
-@given(NODES, NODES, CHANGES, st.frozensets(st.integers(1, 4)))
-def test_the_same_mission_with_the_same_events_tells_the_same_story(
-    body: str, reaction: str, changes: list[tuple[float, str]], failing: frozenset[int]
+@settings(max_examples=80, deadline=None)
+@given(CASES)
+def test_every_node_that_starts_ends_or_is_halted_exactly_once_and_nothing_raises(case: Case) -> None:
+    watching = Watching()
+    simulated = case.simulated(Settings(observer=watching))
+    simulated.advance(END)
+    simulated.engine.abort(simulated.now)
+    assert (simulated.running, simulated.held, watching.running) == ({}, {}, set())
+    assert simulated.engine.status not in (IDLE, RUNNING)
+    assert RUNNING not in simulated.engine.statuses
+    assert not [line for line in simulated.told if FAULT.search(line)]
+    check_leaves(simulated)
+
+
+@settings(max_examples=30, deadline=None)
+@given(CASES)
+def test_the_same_mission_with_the_same_events_tells_the_same_story(case: Case) -> None:
+    first, second = case.simulated(), case.simulated(Settings(observer=Watching()))  # who looks on changes nothing
+    assert (first.advance(END), first.told) == (second.advance(END), second.told)
+
+
+@settings(max_examples=30, deadline=None)
+@given(CASES, LATER)
+def test_a_mission_that_is_saved_and_restored_goes_on_as_if_nothing_had_been(case: Case, at: float) -> None:
+    first = case.simulated()
+    first.advance(at)
+    second = case.simulated()
+    second.engine.tick(0.0)  # whatever state it is in, restoring replaces it
+    restore(second.engine, json.loads(json.dumps(save(first.engine))))
+    assert save(second.engine) == save(first.engine)
+    for name in ("values", "counts", "arrived", "running", "held", "calls"):
+        setattr(second, name, dict(getattr(first, name)))
+    second.now, second.changes, second.story = first.now, [], copy.deepcopy(first.story)
+    schedule(second, [change for change in case.changes if change[0] > first.now])
+    told = len(first.told)
+    second.told.clear()
+    assert second.advance(END) == first.advance(END)
+    assert second.told == first.told[told:]
+
+
+@settings(max_examples=30, deadline=None)
+@given(CASES, st.lists(st.integers(0, 80), max_size=10))
+def test_ticks_at_which_nothing_is_due_change_nothing(case: Case, extra: list[int]) -> None:
+    plain, disturbed = case.simulated(), case.simulated()
+    for tenths in extra:
+        disturbed.at(tenths / 10 + 0.037, lambda: None)
+    assert (disturbed.advance(END), disturbed.told) == (plain.advance(END), plain.told)
+
+
+LASTING = st.sampled_from(("hold", {"wait": "0.75 s"}, {"log": "hi"}, {"set": {"n": "$n + 1"}}))
+
+
+def _lasting(nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
+    some = st.lists(nodes, min_size=1, max_size=3)
+    return st.one_of(
+        some.map(lambda steps: {"sequence": steps}),
+        some.map(lambda steps: {"parallel": steps}),
+        some.map(lambda steps: {"sequence": steps, "timeout": "2 s", "optional": True}),
+        nodes.map(lambda do: {"repeat": 2, "every": "1.75 s", "do": do}),
+        nodes.map(lambda do: {"sequence": [do, {"check": "false"}], "attempts": 2, "attempt_pause": "0.5 s"}),
+    )
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.recursive(LASTING, _lasting, max_leaves=6), LATER, st.integers(1, 40))
+def test_a_pause_stops_everything_and_shifts_what_follows(body: Node, at: float, quarters: int) -> None:
+    case, lasts = Case(body, "react", "continue"), quarters / 4
+    plain, paused = case.simulated(), case.simulated()
+    plain.advance(40.0)
+    paused.advance(at)
+    told = len(paused.told)
+    paused.engine.pause(at)
+    if paused.engine.status == RUNNING:
+        assert paused.running == {}
+        assert (paused.engine.next_wake(), paused.engine.reads()) == (None, frozenset())
+        paused.now += lasts
+        paused.engine.resume(paused.now)
+        paused.advance(40.0 + lasts)
+    expected = [time + lasts for time, _ in plain.events[told:]]
+    assert [time for time, _ in paused.events[told:]] == expected
+    assert [type(event) for _, event in paused.events] == [type(event) for _, event in plain.events]
+
+
+BRANCHES = st.lists(
+    st.sampled_from(("a", "b", "c", "[a, d]", "[d, {check: false}]", "{wait: 1 s}", "{check: true, only_if: false}")),
+    min_size=2,
+    max_size=3,
+)
+
+
+@settings(max_examples=30, deadline=None)
+@given(BRANCHES, st.sampled_from(("all", "any", "1", "2")), st.sampled_from(("any", "all", "1", "2")), FAILING)
+def test_the_order_of_branches_never_changes_the_result(
+    branches: list[str], succeed_when: str, fail_when: str, failing: frozenset[int]
 ) -> None:
-    first, second = (run(body, reaction, changes, failing) for _ in range(2))
-    assert first.told == second.told
-    assert Counter(first.calls) == Counter(second.calls)
+    found = set()
+    for order in itertools.permutations(branches):
+        steps = "".join(f"    - {one}\n" for one in order)
+        text = f"do:\n  parallel:\n{steps}  succeed_when: {succeed_when}\n  fail_when: {fail_when}\n"
+        simulated = simulate(text, takes={"b": 2.0, "c": 0.5}, fails={"b": failing, "c": failing})
+        found.add((simulated.advance(20), simulated.now, tuple(sorted(skills(simulated)))))
+    assert len(found) == 1
 
 
-@settings(max_examples=50, deadline=None)
-@given(NODES, st.frozensets(st.integers(1, 4)), st.lists(st.integers(0, 80), max_size=10))
-def test_ticks_at_which_nothing_is_due_change_nothing(body: str, failing: frozenset[int], extra: list[int]) -> None:
-    plain = run(body, "react", [], failing)
-    disturbed = run(body, "react", [(tenths / 10 + 0.037, "full") for tenths in extra], failing)
-    assert disturbed.told == plain.told
+@given(NODES)
+def test_random_missions_are_of_all_sorts(node: Node) -> None:
+    assert Case(node, node, "continue").program().nodes

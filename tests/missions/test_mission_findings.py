@@ -143,17 +143,76 @@ do:
   - pour
 """
 
+DEEDS = """\
+name: deeds
+inputs:
+  rounds:
+    type: count
+    default: 1
+data:
+  n: 0
+outputs:
+  sum: $m + 1
+interrupts:
+  low:
+    when: $battery < 30 %
+    afterwards: end
+do:
+  - publish: greeting
+    message: hi
+  - publish: greetings
+    message: hi $nobody
+  - publish: steering
+    message:
+      liner:
+        x: 1
+      angular:
+        z: true
+        w: 2
+  - publish: steering
+    message: 3
+  - call: light
+    request: {data: 5}
+  - call: lamp
+  - a:
+    on_success:
+      set: {m: 1}
+      publish: greetings
+      message: $who
+  - parallel:
+      a:
+        go_to: dock
+      rest: [{wait: 1 s}, recharge]
+    succeed_when: 3
+  - choose: $n
+    cases:
+      1: a
+      1.0: b
+      $k: c
+  - look:
+    save: rounds
+  - machine:
+      start: one
+      states:
+        one:
+          do: {set: {n: $n + 1}}
+          on_enter:
+            set: {k: 1}
+          next: one
+  - pour
+"""
+
 
 def mission_findings(text: str) -> Report:
     """Return all that is said of a mission."""
     report = Report()
-    program = read_program(tree(text), report)
+    program = read_program(tree(text), report, ROBOT.skills)
     if program:
         report.extend(check_program(program, ROBOT))
     return report
 
 
-@pytest.mark.parametrize(("name", "text"), [("shape", SHAPE), ("meaning", MEANING)])
+@pytest.mark.parametrize(("name", "text"), [("shape", SHAPE), ("meaning", MEANING), ("deeds", DEEDS)])
 def test_all_mistakes_are_found_in_one_run(name: str, text: str, golden: Golden) -> None:
     report = mission_findings(text)
     rendered = "".join(render_text(one_by_one(finding), {"mission.yaml": text}) for finding in report)
@@ -189,7 +248,7 @@ def test_each_docs_page_shows_what_is_found_and_how_it_is_right(code: str) -> No
         assert not findings or is_found
         if isinstance(root, Mapping):
             report = Report()
-            program = read_program(root, report)
+            program = read_program(root, report, ROBOT.skills)
             if program:
                 report.extend(check_program(program, ROBOT))
             assert (code in {finding.code for finding in report}) == is_found

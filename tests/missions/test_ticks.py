@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rbxcompose.missions.results import Result
 from tests.missions.simulated import simulate
 from tests.missions.test_composites import fails, skills
 
@@ -106,7 +107,7 @@ def test_an_abort_halts_what_runs_and_ends_the_mission() -> None:
 def test_a_result_for_a_leaf_that_does_not_run_is_no_result() -> None:
     simulated = simulate("do: [a, b]")
     simulated.engine.tick(0.0)
-    simulated.engine.ended(2, False, "late")
+    simulated.engine.ended(2, Result(False, "late"))
     simulated.engine.tick(0.5)
     assert skills(simulated) == ["0 a"]
 

@@ -46,6 +46,16 @@ def test_it_complains_strictly_below_its_thresholds(level: float, status: tuple[
     assert BatteryCore(SETTINGS, level).status == status
 
 
+def test_it_does_not_complain_at_a_threshold_that_it_came_to_in_small_steps() -> None:
+    battery = BatteryCore(BatterySettings(runtime=20.0))
+    for _ in range(10):
+        battery.step(1.0)
+    assert battery.status == (Level.OK, "Battery OK")
+    for _ in range(6):
+        battery.step(1.0)
+    assert battery.status == (Level.WARN, "Medium battery")
+
+
 def test_the_level_can_be_set() -> None:
     battery = BatteryCore(SETTINGS)
     assert battery.set(0.25) == ""

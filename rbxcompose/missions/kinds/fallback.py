@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from rbxcompose.missions.in_turn import InTurn
+from rbxcompose.missions.in_turn import OPTIONS, InTurn
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import SUCCESS
 
 
-@kind("fallback")
+@kind("fallback", OPTIONS)
 class Fallback(InTurn):
     """Try the nodes of a list in order; the first success is the fallback's own, a skipped one is passed over.
 

@@ -28,13 +28,14 @@ class If(Task):
             log: The battery has $battery
     """
 
-    __slots__ = ("chosen", "condition", "otherwise", "then")
+    __slots__ = ("branches", "condition", "index")
+    saved = ("index",)
 
     def __init__(self, site: Site, options: Expression) -> None:
         super().__init__(site)
         self.condition = options
-        self.then = self.chosen = site.children[0]
-        self.otherwise = site.children[1] if len(site.children) > 1 else None
+        self.branches = site.children
+        self.index = 0  # of the one that was chosen
 
     @staticmethod
     def read(reader: NodeReader) -> Expression:
@@ -47,12 +48,10 @@ class If(Task):
 
     def begin(self) -> int:
         """Choose, and start what was chosen."""
-        chosen = self.then if holds(self.condition, self.scope) else self.otherwise
-        if chosen is None:
-            return SKIPPED
-        self.chosen = chosen
-        return self.advance(chosen)
+        if not (self.engine.places.kept and self.engine.places.take_up(self)):
+            self.index = 0 if holds(self.condition, self.scope) else 1
+        return self.proceed() if self.index < len(self.branches) else SKIPPED
 
     def proceed(self) -> int:
         """Go on with what was chosen."""
-        return self.advance(self.chosen)
+        return self.advance(self.branches[self.index])

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 from rbxcompose.expressions.text import Template
 from rbxcompose.missions.events import Logged
+from rbxcompose.missions.moments import LEVELS
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import SUCCESS
 from rbxcompose.missions.task import Site, Task
 
 if TYPE_CHECKING:
     from rbxcompose.missions.node_reader import NodeReader
-
-LEVELS = ("info", "warn", "error")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,5 +47,5 @@ class Log(Task):
 
     def begin(self) -> int:
         """Say it."""
-        self.engine.say(Logged(self.options.level, self.engine.filled(self.options.text, self.scope)))
+        self.engine.say(Logged(self.options.level, self.run.filled(self.options.text, self.scope)))
         return SUCCESS

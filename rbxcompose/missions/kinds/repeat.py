@@ -51,6 +51,7 @@ class Repeat(Task):
     """
 
     __slots__ = ("body", "did", "due", "is_between", "left", "options", "period")
+    saved = ("did", "due", "is_between", "left", "period")
 
     def __init__(self, site: Site, options: RepeatOptions) -> None:
         super().__init__(site)
@@ -85,7 +86,10 @@ class Repeat(Task):
             yield codes.NEVER_WAITS.at(view.node.span, "this loop never waits", help=help_text)
 
     def begin(self) -> int:
-        """Start the first round."""
+        """Start the first round, or the one in which it was halted."""
+        if self.engine.places.kept and self.engine.places.take_up(self):
+            self.due = self.engine.time if self.is_between else self.engine.time + self.period
+            return self.proceed()
         rounds, every = self.options.rounds, self.options.every
         self.left = math.inf if rounds is None else self.count_of(rounds, "'repeat'")
         self.period = 0.0 if every is None else self.number_of(every, "'every'")
@@ -105,8 +109,11 @@ class Repeat(Task):
             self.due = self.engine.time + self.period
             self.forget()
         status = self.advance(self.body)
-        if status in (RUNNING, FAILURE):
-            return status
+        if status == RUNNING:
+            return RUNNING
+        self.engine.outcome = ""
+        if status == FAILURE:
+            return FAILURE
         if status == SUCCESS:
             self.did = SUCCESS
         self.left -= 1

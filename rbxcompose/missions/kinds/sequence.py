@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from rbxcompose.missions.in_turn import InTurn
+from rbxcompose.missions.in_turn import OPTIONS, InTurn
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE
 
 
-@kind("sequence")
+@kind("sequence", OPTIONS)
 class Sequence(InTurn):
     """Do the nodes of a list in order; the first failure is the sequence's own.
 
@@ -20,3 +20,4 @@ class Sequence(InTurn):
 
     __slots__ = ()
     decides = FAILURE
+    is_kept_after_failure = True

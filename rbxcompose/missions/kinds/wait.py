@@ -25,6 +25,7 @@ class Wait(Task):
     """
 
     __slots__ = ("deadline", "duration")
+    saved = ("deadline",)
 
     def __init__(self, site: Site, options: Expression) -> None:
         super().__init__(site)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.registry import kind
-from rbxcompose.missions.statuses import RUNNING, SUCCESS
+from rbxcompose.missions.statuses import IDLE, RUNNING, SUCCESS
 from rbxcompose.missions.task import Site, Task
 from rbxcompose.missions.watching import Watched
 
@@ -55,4 +55,6 @@ class WaitFor(Task):
 
     def suspend(self, anew: bool) -> bool:
         """Nothing is to be stopped; after an interrupt it starts again."""
+        if anew:
+            self.statuses[self.number] = IDLE
         return anew

@@ -1,0 +1,104 @@
+"""A simulated chore."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from rbxcompose.geometry import AT_REST, Velocity2
+from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.msgs.nav2_msgs import Wait
+from rbxcompose.msgs.stamps import to_duration, to_seconds
+from rbxcompose.sdk import AngularSpeed, Component, Config, Live, Out, ServedGoal, ServesAction, Speed, Time, component
+from rbxcompose.sim.chore import ChoreCore, ChoreSettings
+
+LONGEST = 24 * 3600.0  # [s]
+
+
+class ChoreSimConfig(Config):
+    """How the base moves while the chore is done."""
+
+    speed: Annotated[Speed, Live()] = Field(0.05, ge=0)
+    """To and fro: forwards in one stroke, backwards in the next."""
+    turn_rate: Annotated[AngularSpeed, Live()] = 0.0
+    """How fast it turns meanwhile, always to the same side."""
+    stroke: Annotated[Time, Live()] = Field(1.0, gt=0)
+    """Duration of a stroke."""
+
+
+@component("chore_sim")
+class ChoreSim(Component[ChoreSimConfig]):
+    """A chore such as vacuuming, which takes the time that its goal tells and moves the base a little.
+
+    Its skill is called `chore` unless `connect` names it. A second goal is refused while it is busy.
+
+    Example:
+        vacuum: {type: chore_sim, speed: 5 cm/s, connect: {chore: vacuum, cmd_vel: cmd_vel/vacuum}}
+    """
+
+    rate = 20.0
+    simulated = True
+    cmd_vel = Out(Twist, "cmd_vel", qos="command")
+    chore = ServesAction(Wait, "chore", claims="base", pausable=True)
+
+    def configure(self) -> None:
+        """Nothing is to be done."""
+        self.core = ChoreCore(settings_of(self.config))
+        self.doing: object = None  # the goal that the core works on
+        self.moving = False
+
+    def reconfigure(self, old: ChoreSimConfig) -> None:
+        """Go on with the same chore as it is set now."""
+        self.core.settings = settings_of(self.config)
+
+    def accept_chore(self, goal: Wait.Goal) -> str:
+        """Refuse a goal while another one is carried out, and a time that makes no sense."""
+        current, time = self.chore.current, to_seconds(goal.time)
+        if current is not None and not current.cancel_requested:
+            return f"{self.name} is busy for {self.core.left:.1f} s more"
+        return "" if 0.0 <= time <= LONGEST else f"it cannot take {time:g} s"
+
+    def step(self, dt: float) -> None:
+        """Carry the goal on, or hold it."""
+        goal = self.chore.current
+        if goal is None:
+            self.rest()
+        elif goal.cancel_requested:
+            self.rest()
+            goal.canceled(Wait.Result(total_elapsed_time=to_duration(self.core.done)))
+        elif goal.is_paused:
+            self.rest()
+        else:
+            self.work(goal, dt)
+
+    def work(self, goal: ServedGoal[Wait.Goal, Wait.Result, Wait.Feedback], dt: float) -> None:
+        """Work for one cycle and tell how much is left."""
+        if goal is not self.doing:
+            self.doing = goal
+            self.core.start(to_seconds(goal.request.time))
+        if self.core.is_done:
+            self.rest()
+            goal.succeeded(Wait.Result(total_elapsed_time=to_duration(self.core.done)))
+            return
+        self.drive(self.core.step(dt))
+        goal.feedback(Wait.Feedback(time_left=to_duration(max(self.core.left, 0.0))))
+
+    def hold(self) -> None:
+        """Command rest: no step follows while robot time stands still."""
+        self.rest()
+
+    def rest(self) -> None:
+        """Command rest, once."""
+        if self.moving:
+            self.drive(AT_REST)
+
+    def drive(self, velocity: Velocity2) -> None:
+        """Publish a velocity."""
+        self.moving = velocity != AT_REST
+        self.cmd_vel(Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular)))
+
+
+def settings_of(config: ChoreSimConfig) -> ChoreSettings:
+    """Return the settings of the core."""
+    return ChoreSettings(config.speed, config.turn_rate, config.stroke)

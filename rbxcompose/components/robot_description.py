@@ -1,0 +1,28 @@
+"""The robot's URDF on the bus."""
+
+from __future__ import annotations
+
+from rbxcompose.msgs.std_msgs import String
+from rbxcompose.sdk import Component, Config, Out, component
+
+
+class RobotDescriptionConfig(Config):
+    """What is told."""
+
+    urdf: str
+    """Text of the URDF."""
+
+
+@component("robot_description")
+class RobotDescription(Component[RobotDescriptionConfig]):
+    """Tells what the robot's body is: its URDF, which viewers and other programs of ROS 2 read from this topic.
+
+    Example:
+        shape: {type: robot_description, urdf: '<robot name="cart"><link name="base"/></robot>'}
+    """
+
+    robot_description = Out(String, "robot_description", qos="latched")
+
+    def activate(self) -> None:
+        """Publish once; who subscribes later is given it, too."""
+        self.robot_description(String(data=self.config.urdf))

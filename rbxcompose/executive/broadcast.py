@@ -1,0 +1,55 @@
+"""What viewers in other processes see of missions: the whole when they ask, then what changes.
+
+The keys are `missions` (a list, for who asks) and `missions/NAME`, below the robot's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from rbxcompose.executive.missions import Missions
+from rbxcompose.executive.running import Running
+from rbxcompose.sdk.bound import Window
+
+PATH = "missions"
+WHOLE = "whole"  # the question about one mission
+_ALWAYS = frozenset({"mission", "version", "whole", "state"})  # what is in all news
+
+Open = Callable[[str, str], Window]  # takes a path and the question that is asked there
+
+
+class Broadcast:
+    """A window for each mission of a robot."""
+
+    def __init__(self, names: Iterable[str], open_window: Open) -> None:
+        self._list = open_window(PATH, "ls")
+        self._feeds = {name: Feed(open_window(f"{PATH}/{name}", f"{WHOLE} {name}")) for name in names}
+
+    def tell(self, missions: Missions) -> None:
+        """Tell what has changed to those who watch; nothing is put together for nobody."""
+        for name, one in missions.runs.items():
+            self._feeds[name].tell(one)
+
+
+class Feed:
+    """What was told last of one mission."""
+
+    def __init__(self, window: Window) -> None:
+        self._window = window
+        self._run: Running | None = None
+        self._told: dict[str, Any] = {}
+
+    def tell(self, one: Running) -> None:
+        """Tell what is new, if anybody listens and there is something."""
+        if not self._window.is_watched:
+            return
+        if one is not self._run:
+            self._run, self._told = one, {}
+        seen = one.seen(self._told.get("version", 0))
+        fresh = {key: value for key, value in seen.items() if key in _ALWAYS or self._told.get(key) != value}
+        fresh |= {"statuses": seen["statuses"], "data": seen["data"]}
+        if all(self._told.get(key) == seen[key] for key in ("version", "state", "transitions", "began")):
+            return
+        self._told = seen
+        self._window.put(fresh)

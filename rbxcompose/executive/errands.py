@@ -1,0 +1,227 @@
+"""What a leaf of a mission waits for: a goal at a server, a call of a service, a skill in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rbxcompose.executive.shell import PAUSES, SKILL, Shell
+from rbxcompose.expressions.values import Value
+from rbxcompose.missions.goals import SUCCESS, values_of
+from rbxcompose.missions.program import Skill
+from rbxcompose.missions.results import Result
+from rbxcompose.missions.sources import OUTCOME
+from rbxcompose.msgs.std_srvs import SetBool
+from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal
+
+BACK_WITHIN = 5.0  # [s] in which a server that is not there must come
+STOP_WITHIN = 0.5  # [s] in which the stop that cancelled a goal is heard of here
+LOOK_AGAIN = 0.1  # [s] between two looks at what nothing announces
+MESSAGE = "message"  # the field of a result or an answer that gives a reason
+
+Done = Callable[[Result], None]
+
+
+class Errand:
+    """Something on its way for one leaf; `done` is called once, unless it is halted before."""
+
+    def __init__(self, shell: Shell, done: Done) -> None:
+        self._shell = shell
+        self._done: Done | None = done
+
+    def begin(self) -> None:
+        """Begin; what it raises is a failure of the leaf."""
+        raise NotImplementedError
+
+    def halt(self) -> None:
+        """Stop, and tell nothing any more."""
+        self._done = None
+
+    def pause(self) -> None:
+        """Hold it as it is."""
+
+    def resume(self) -> None:
+        """Go on."""
+
+    def next_look(self) -> float | None:
+        """Return when it wants to be looked after [s]; None: it is told what happens."""
+        return None
+
+    def look(self) -> None:
+        """Look after it."""
+
+    def end(self, result: Result) -> None:
+        """Tell how it ended."""
+        if self._done is not None:
+            done, self._done = self._done, None
+            done(result)
+            self._shell.look_soon()
+
+    @property
+    def is_over(self) -> bool:
+        """Tell whether it has ended or was halted."""
+        return self._done is None
+
+
+class Waiting(Errand):
+    """An errand that needs a server: it waits for one for a while."""
+
+    def __init__(self, shell: Shell, done: Done, name: str) -> None:
+        super().__init__(shell, done)
+        self.name = name
+        self.is_sent = False
+        self.until = 0.0  # [s] how long it waits
+        self.earliest = 0.0  # [s] who has just gone may still be in the books
+        self.why = ""  # it fails, if nobody comes
+
+    def send(self) -> bool:
+        """Send it, if a server is there; return whether it was sent."""
+        raise NotImplementedError
+
+    def begin(self) -> None:
+        """Send it, or wait for a server."""
+        if not self.send():
+            self.wait(f"nobody serves {self.name}", f"nobody serves {self.name}")
+
+    def wait(self, told: str, why: str) -> None:
+        """Wait for a server; after the time it fails, with this reason."""
+        now = self._shell.now
+        self.is_sent, self.why = False, why
+        self.earliest, self.until = now + LOOK_AGAIN, now + BACK_WITHIN
+        self._shell.warn(f"{told}; waiting for up to {BACK_WITHIN:.0f} s")
+
+    def next_look(self) -> float | None:
+        """Look after it while nobody is at it."""
+        return None if self.is_sent else self._shell.now + LOOK_AGAIN
+
+    def look(self) -> None:
+        """Send it again once a server is back; give up after the time."""
+        if self.is_sent or self._shell.now < self.earliest:
+            return
+        if self.send():
+            self._shell.info(f"{self.name}: sent again")
+        elif self._shell.now >= self.until:
+            self.end(Result(False, self.why))
+
+
+class GoalErrand(Waiting):
+    """A goal of an action."""
+
+    def __init__(self, shell: Shell, done: Done, skill: Skill, goal: Any) -> None:
+        super().__init__(shell, done, skill.name)
+        self._skill, self._goal = skill, goal
+        self._handle: SentGoal | None = None
+        self._is_paused = False
+
+    def send(self) -> bool:
+        """Send the goal, unless it was cancelled: that may have been a stop, which is heard of soon."""
+        caller = self._shell.bound[SKILL + self._skill.name]
+        if self.why == CANCELLED or not caller.is_available:
+            return False
+        sent: list[SentGoal] = []
+        self.is_sent = True
+        handle: SentGoal = caller(self._goal, lambda ended: self._ended(sent[0] if sent else None, ended))
+        sent.append(handle)
+        self._handle = handle if self.is_sent else None
+        return True
+
+    def halt(self) -> None:
+        """Cancel the goal."""
+        super().halt()
+        if self._handle is not None:
+            self._handle.cancel()
+
+    def pause(self) -> None:
+        """Ask the server to hold it; if it does not, the goal is cancelled, and sent again later."""
+        self._is_paused = True
+        self._ask_to_pause(True)
+
+    def resume(self) -> None:
+        """Let it go on; send it again if it is not there any more."""
+        self._is_paused = False
+        if self.is_sent:
+            self._ask_to_pause(False)
+        else:
+            self.why = ""
+            self.begin()
+
+    def _ask_to_pause(self, is_paused: bool) -> None:
+        handle = self._handle
+        caller = self._shell.bound.get(PAUSES + self._skill.name)
+        if handle is None or caller is None:
+            return
+
+        def answered(reply: Reply[SetBool.Response]) -> None:
+            is_done = reply.response is not None and reply.response.success
+            if not is_done and self._handle is handle and self._is_paused is is_paused:
+                handle.cancel()
+                self._lose()
+                if not is_paused:
+                    self.begin()
+
+        caller(SetBool.Request(data=is_paused), answered)
+
+    def _lose(self) -> None:
+        self._handle, self.is_sent = None, False
+
+    def _ended(self, handle: SentGoal | None, ended: Ended[Any]) -> None:
+        if self.is_over or (handle is not None and handle is not self._handle):
+            return  # it was halted or given up meanwhile
+        self._lose()
+        if self._is_paused and ended.outcome is not Outcome.SUCCEEDED:
+            return  # who stopped the robot also ended the goal: it is sent again at the resume
+        match ended.outcome:
+            case Outcome.SUCCEEDED | Outcome.ABORTED:
+                self.end(_result(self._skill, ended))
+            case Outcome.LOST if self._skill.restartable:
+                self.wait(f"the server of {self.name} is gone", GONE)
+            case Outcome.LOST:
+                self.end(Result(False, GONE))
+            case Outcome.CANCELED:
+                # A stop cancels goals, too, and may be on its way to this process: then it is no failure.
+                self.why, self.earliest = CANCELLED, self._shell.now
+                self.until = self._shell.now + STOP_WITHIN
+            case _:
+                self.end(Result(False, ended.message or str(ended.outcome)))
+        self._shell.look_soon()
+
+
+GONE, CANCELLED = "its server is gone", "cancelled by someone else"
+
+
+def _result(skill: Skill, ended: Ended[Any]) -> Result:
+    """Return what the end of a goal says: an outcome and a reason stand in the fields of these names."""
+    values = values_of(ended.result)
+    is_good = ended.outcome is Outcome.SUCCEEDED
+    told = values.get(OUTCOME) if skill.outcomes else ""
+    reason = ended.message or _text(values) or ("" if is_good else str(ended.outcome))
+    return Result(is_good, reason, told if isinstance(told, str) else "", values)
+
+
+def _text(values: Mapping[str, Value]) -> str:
+    told = values.get(MESSAGE, "")
+    return told if isinstance(told, str) else ""
+
+
+class CallErrand(Waiting):
+    """A call of a service; an answer that says `success: false` is a failure."""
+
+    def __init__(self, shell: Shell, done: Done, name: str, port: str, request: Any) -> None:
+        super().__init__(shell, done, name)
+        self._port, self._request = port, request
+
+    def send(self) -> bool:
+        """Send the request."""
+        caller = self._shell.bound[self._port]
+        if not caller.is_available:
+            return False
+        self.is_sent = True
+        caller(self._request, self._answered)
+        return True
+
+    def _answered(self, reply: Reply[Any]) -> None:
+        if reply.response is None:
+            self.end(Result(False, reply.error))
+            return
+        values = values_of(reply.response)
+        self.end(Result(values.get(SUCCESS) is not False, _text(values), values=values))

@@ -1,0 +1,164 @@
+"""All missions of a robot: which run, whether another one may begin beside them, what people want of them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.executive.running import MakeWorld, Running, claims_of
+from rbxcompose.executive.shell import Equipment
+from rbxcompose.expressions.values import Value
+from rbxcompose.findings import suggest
+from rbxcompose.missions.beginning import NoSuchState, start_at
+from rbxcompose.missions.inputs import bind_texts
+from rbxcompose.missions.linking import link
+from rbxcompose.missions.logbook import Record
+from rbxcompose.missions.picture import picture_of, picture_to_data
+from rbxcompose.missions.program import Program
+from rbxcompose.missions.statuses import IDLE, NAMES
+from rbxcompose.missions.world import Observer, Settings
+from rbxcompose.sdk.bound import Refused
+
+MOST_RECORDS = 20_000  # of the log that are kept
+
+Told = Callable[[str, Level, str], None]  # mission, level, line of its story
+
+
+class Missions:
+    """The missions that run, in the order in which they began, and those that have ended, until they run again."""
+
+    def __init__(self, equipment: Equipment, make: MakeWorld, tell: Told, publish: Callable[[Record], None]) -> None:
+        self._equipment, self.make, self._tell, self._publish = equipment, make, tell, publish
+        self.observer: Observer | None = None  # of all that begin from now on
+        self.runs: dict[str, Running] = {}
+        self.records: deque[Record] = deque(maxlen=MOST_RECORDS)
+        self.written = 0  # records so far
+        self._counts: dict[str, int] = {}
+
+    def __iter__(self) -> Iterator[Running]:
+        """Return those that run or are held."""
+        return (one for one in list(self.runs.values()) if not one.is_over)
+
+    @property
+    def names(self) -> list[str]:
+        """Return the names of those that run or are held."""
+        return [one.name for one in self]
+
+    def run(self, name: str, given: Mapping[str, str], start: str = "") -> Running:
+        """Begin a mission with these inputs, as text; in the state `start` of its machines, if one is named.
+
+        Raises:
+            Refused: if there is none, an input does not fit, or what runs needs the same part of the robot.
+        """
+        program = self._program(name)
+        if name in self.names:
+            raise Refused(f"mission {name} runs already")
+        inputs = self._inputs(name, program, given)
+        linked = link(program, self._equipment.names.missions)
+        if clash := self._clash(linked):
+            raise Refused(clash)
+        try:
+            settings = Settings(start_at=start_at(linked, start) if start else {}, observer=self.observer)
+        except NoSuchState as error:
+            raise Refused(str(error)) from error
+        self._counts[name] = self._counts.get(name, 0) + 1
+        number = self._counts[name]
+        self.runs.pop(name, None)
+        self.runs[name] = Running(
+            program,
+            self._equipment.names,
+            inputs,
+            self.make,
+            lambda level, text: self._tell(name, level, text),
+            lambda record: self._write({**record, "run": number}),
+            name=name,
+            settings=settings,
+        )
+        return self.runs[name]
+
+    def seen(self, name: str, since: int = 0) -> dict[str, Any]:
+        """Return for a viewer what is new of a mission since a version of its own, 0 for the whole.
+
+        Raises:
+            Refused: if it has not been running.
+        """
+        return self._begun(name).seen(since)
+
+    def picture(self, name: str) -> dict[str, Any]:
+        """Return the picture of a mission, as data.
+
+        Raises:
+            Refused: if it has not been running.
+        """
+        engine = self._begun(name).engine
+        return picture_to_data(picture_of(engine.program, engine.robot))
+
+    def running(self, name: str, what: Callable[[Running], bool] = lambda one: True, word: str = "running") -> Running:
+        """Return the mission of this name, or without one the only one of which `what` holds.
+
+        Raises:
+            Refused: if it does not run, or it is not clear which one is meant.
+        """
+        if name:
+            if name not in self.names:
+                self._program(name)
+                raise Refused(f"mission {name} is not running")
+            return self.runs[name]
+        found = [one for one in self if what(one)]
+        if len(found) == 1:
+            return found[0]
+        if not found:
+            only = list(self)
+            if len(only) == 1:
+                return only[0]
+            raise Refused(f"no mission is {word}")
+        raise Refused(f"several missions are {word}: {', '.join(one.name for one in found)}; name one")
+
+    def listed(self) -> list[dict[str, Any]]:
+        """Return all missions of the robot with how they stand."""
+        names, start = self._equipment.names, []
+        for name, program in self._equipment.programs.items():
+            one = self.runs.get(name)
+            claims = sorted(claims_of(link(program, names.missions), names.skills)) if name in names.missions else []
+            how = one.state if one else NAMES[IDLE]
+            start.append({"name": name, "about": program.about, "state": how, "claims": claims})
+        return start
+
+    def since(self, number: int) -> dict[str, Any]:
+        """Return the records of the log that were written after so many."""
+        first = self.written - len(self.records)
+        return {"next": self.written, "records": [one for at, one in enumerate(self.records, first) if at >= number]}
+
+    def _begun(self, name: str) -> Running:
+        if name not in self.runs:
+            raise Refused(f"mission {name} has not been running")
+        return self.runs[name]
+
+    def _program(self, name: str) -> Program:
+        programs = self._equipment.programs
+        if name not in programs:
+            raise Refused(f"the robot has no mission '{name}': {suggest(name, programs, 'its missions')}")
+        return programs[name]
+
+    def _inputs(self, name: str, program: Program, given: Mapping[str, str]) -> Mapping[str, Value]:
+        """Return the robot's inputs for a mission with those that were given laid over them."""
+        known = self._equipment.inputs.get(name, {})
+        inputs, findings = bind_texts(program, given, known, self._equipment.names.places)
+        if findings:
+            raise Refused("; ".join(one.message for one in findings))
+        return inputs
+
+    def _clash(self, linked: Program) -> str:
+        """Return why a mission cannot run beside those that do; empty if it can."""
+        wanted = claims_of(linked, self._equipment.names.skills)
+        for other in self:
+            if common := sorted(wanted & other.claims):
+                return f"{' and '.join(common)} {'is' if len(common) == 1 else 'are'} in use by {other.name}"
+        return ""
+
+    def _write(self, record: Record) -> None:
+        self.written += 1
+        self.records.append(record)
+        self._publish(record)

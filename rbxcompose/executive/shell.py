@@ -1,0 +1,83 @@
+"""What the executive needs of the component that it lives in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from rbxcompose.missions.program import Program, RobotNames
+from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource
+
+VALUE, SKILL, PAUSES, PUBLISHES, CALLS = "value_", "skill_", "pauses_", "publishes_", "calls_"  # begin names of ports
+
+
+class Equipment(Protocol):
+    """The robot's missions, and what they may ask of it."""
+
+    @property
+    def programs(self) -> Mapping[str, Program]:
+        """Return the missions by name."""
+        ...
+
+    @property
+    def inputs(self) -> Mapping[str, Mapping[str, Any]]:
+        """Return the robot's values for inputs, by mission and name."""
+        ...
+
+    @property
+    def values(self) -> Mapping[str, ValueSource]:
+        """Return where values come from."""
+        ...
+
+    @property
+    def skills(self) -> Mapping[str, SkillSource]:
+        """Return the skills."""
+        ...
+
+    @property
+    def topics(self) -> Mapping[str, TopicSource]:
+        """Return the topics on which missions publish."""
+        ...
+
+    @property
+    def services(self) -> Mapping[str, str]:
+        """Return the services that missions call, with their ROS types."""
+        ...
+
+    @property
+    def names(self) -> RobotNames:
+        """Return what the robot gives to missions."""
+        ...
+
+
+class Shell(Protocol):
+    """The component: its time, its live ports by name, its log."""
+
+    bound: dict[str, Any]
+
+    @property
+    def equipment(self) -> Equipment:
+        """Return what there is."""
+        ...
+
+    @property
+    def now(self) -> float:
+        """Return robot time [s]."""
+        ...
+
+    def info(self, text: str) -> None:
+        """Log an event of the robot's story."""
+        ...
+
+    def warn(self, text: str) -> None:
+        """Log something that a person should look at."""
+        ...
+
+    def look_soon(self) -> None:
+        """Be woken at this instant."""
+        ...
+
+
+def port_name(beginning: str, topic: str) -> str:
+    """Return the name of the port for a topic or a service."""
+    return beginning + topic.strip("/").replace("/", "_")

@@ -1,0 +1,124 @@
+"""The world of one running mission: its values, skills, topics and services are those of the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from rbxcompose.executive.arrivals import Arrivals
+from rbxcompose.executive.errands import CallErrand, Done, Errand, GoalErrand
+from rbxcompose.executive.python_skills import PythonErrand
+from rbxcompose.executive.shell import CALLS, PUBLISHES, SKILL, Shell, port_name
+from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
+from rbxcompose.missions.events import MissionEvent
+from rbxcompose.missions.goals import filled, goal_of, message_of
+from rbxcompose.missions.results import Result
+from rbxcompose.missions.sources import Way
+from rbxcompose.missions.watching import POSE
+from rbxcompose.msgs import registry
+from rbxcompose.sdk.skills import skill_type
+
+
+class RobotWorld:
+    """Carries out what an engine asks; `ended` hears of results, `say` of events."""
+
+    def __init__(
+        self,
+        shell: Shell,
+        arrivals: Arrivals,
+        ended: Callable[[int, Result], None],
+        say: Callable[[MissionEvent], None],
+    ) -> None:
+        self._shell, self._arrivals, self._told, self._say = shell, arrivals, ended, say
+        self._errands: dict[int, Errand] = {}
+
+    # Values
+
+    def value(self, name: str, /) -> Value | NotArrived:
+        """Return the newest value in SI."""
+        if name == POSE:
+            pose = self._shell.bound[POSE].now() if POSE in self._shell.bound else None
+            return NOT_ARRIVED if pose is None else pose
+        return self._arrivals.value(name)
+
+    def age(self, name: str, /) -> float | NotArrived:
+        """Return the time since the last message [s]; the pose, which is computed when it is asked for, is of now."""
+        if name == POSE:
+            return NOT_ARRIVED if self.value(POSE) is NOT_ARRIVED else 0.0
+        return self._arrivals.age(name, self._shell.now)
+
+    def count(self, name: str, /) -> int:
+        """Return how many messages have come; the pose comes without any."""
+        return 0 if name == POSE else self._arrivals.count(name)
+
+    # What a mission does
+
+    def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
+        """Begin a skill: a goal is sent, a service is called, or Python runs."""
+        self._begin(leaf, self._errand(self._done(leaf), skill, arguments))
+
+    def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
+        """Call a service."""
+        request = message_of(registry.service(self._shell.equipment.services[service]).Request, fields)
+        self._begin(leaf, CallErrand(self._shell, self._done(leaf), service, port_name(CALLS, service), request))
+
+    def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
+        """Publish a message; raises ValueError if a field does not fit."""
+        message = registry.message(self._shell.equipment.topics[topic].message)
+        self._shell.bound[port_name(PUBLISHES, topic)](message_of(message, fields))
+
+    def halt(self, leaf: int, /) -> None:
+        """Stop what a leaf asked for."""
+        errand = self._errands.pop(leaf, None)
+        if errand is not None:
+            errand.halt()
+
+    def pause(self, leaf: int, /) -> None:
+        """Hold the skill of a leaf."""
+        self._errands[leaf].pause()
+
+    def resume(self, leaf: int, /) -> None:
+        """Let the skill of a leaf go on."""
+        self._errands[leaf].resume()
+
+    def say(self, event: MissionEvent, /) -> None:
+        """Pass on what happens."""
+        self._say(event)
+
+    # What nothing announces
+
+    def next_look(self) -> float | None:
+        """Return when to look after what is on its way [s]."""
+        return min((time for one in self._errands.values() if (time := one.next_look()) is not None), default=None)
+
+    def look(self) -> None:
+        """Look after what is on its way."""
+        for errand in list(self._errands.values()):
+            errand.look()
+
+    def _errand(self, done: Done, skill: str, arguments: Mapping[str, Value]) -> Errand:
+        source = self._shell.equipment.skills[skill]
+        match source.way:
+            case Way.ACTION:
+                goal = goal_of(registry.action(source.action), arguments)
+                return GoalErrand(self._shell, done, source.skill, goal)
+            case Way.SERVICE:
+                request = filled(registry.service(source.action).Request, arguments)
+                return CallErrand(self._shell, done, skill, SKILL + skill, request)
+            case Way.PYTHON:
+                return PythonErrand(self._shell, done, skill_type(skill), arguments)
+
+    def _begin(self, leaf: int, errand: Errand) -> None:
+        self._errands[leaf] = errand
+        try:
+            errand.begin()
+        except Exception:
+            self._errands.pop(leaf, None)
+            raise
+
+    def _done(self, leaf: int) -> Done:
+        return partial(self._ended, leaf)
+
+    def _ended(self, leaf: int, result: Result) -> None:
+        self._errands.pop(leaf, None)
+        self._told(leaf, result)

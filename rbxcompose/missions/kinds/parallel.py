@@ -1,0 +1,205 @@
+"""`parallel`: several nodes at the same time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rbxcompose.expressions.evaluate import holds
+from rbxcompose.expressions.tree import Expression, Number
+from rbxcompose.findings import Finding
+from rbxcompose.missions import deed_codes
+from rbxcompose.missions.branches import BranchScope, Ended, Outcome, check_outcomes, read_outcomes
+from rbxcompose.missions.claims import check_claims
+from rbxcompose.missions.registry import kind
+from rbxcompose.missions.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
+from rbxcompose.missions.task import NodeFailed, Site, Task
+
+if TYPE_CHECKING:
+    from rbxcompose.missions.node_reader import NodeReader
+    from rbxcompose.missions.program import Node, Target
+    from rbxcompose.missions.views import View
+
+ALL, ANY = "all", "any"
+
+
+@dataclass(frozen=True, slots=True)
+class ParallelOptions:
+    """When it has succeeded or failed (`all`, `any`, or a number of branches), and what its outcome is then."""
+
+    branches: tuple[str, ...] = ()  # names, if they have any
+    succeed_when: Expression | str = ALL
+    fail_when: Expression | str = ANY
+    ends_with: str = ""
+    wait_for_all: bool = False
+    outcomes: tuple[Outcome, ...] = ()
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Return all `$names` that its outcomes read beside its branches."""
+        conditions = (one.condition for one in self.outcomes if one.condition)
+        return frozenset(name.name for one in conditions for name in one.names).difference(self.branches)
+
+
+@kind(
+    "parallel",
+    {
+        "succeed_when": "How many branches must succeed: `all`, `any` or a number.",
+        "fail_when": "How many branches must fail for the whole to fail: `any`, `all` or a number.",
+        "ends_with": "The branch whose result is the result; failures of others do not count.",
+        "wait_for_all": "Whether it goes on until all branches have ended, also when it is decided.",
+        "outcomes": "Of a state's body: outcome by condition over the results of the branches; the first one wins.",
+    },
+)
+class Parallel(Task):
+    """Do several nodes at the same time; at each tick all that have not ended are ticked, then it is judged.
+
+    Example:
+        do:
+          parallel:
+            drive:
+              go_to: corner_1
+            talk:
+              log: On my way
+    """
+
+    __slots__ = ("children", "names", "options", "results", "runs", "wanted")
+    saved = ("names", "results", "runs", "wanted")
+
+    def __init__(self, site: Site, options: ParallelOptions) -> None:
+        super().__init__(site)
+        self.children = site.children
+        self.options = options
+        self.results = [IDLE] * len(self.children)
+        self.names = [""] * len(self.children)  # outcomes of their own
+        self.runs = [False] * len(self.children)
+        self.wanted = (0, 0)  # how many must succeed, how many must fail; 0 for all
+
+    @staticmethod
+    def read(reader: NodeReader) -> ParallelOptions:
+        """Read the branches, and what decides."""
+        branches = reader.branches()
+        ends_with = reader.branch("ends_with", branches) if reader.has("ends_with") else ""
+        return ParallelOptions(
+            branches,
+            reader.count_or("succeed_when", (ALL, ANY)) if reader.has("succeed_when") else ALL,
+            reader.count_or("fail_when", (ANY, ALL)) if reader.has("fail_when") else ANY,
+            ends_with,
+            reader.flag("wait_for_all") if reader.has("wait_for_all") else False,
+            read_outcomes(reader, branches),
+        )
+
+    @staticmethod
+    def check(view: View) -> Iterator[Finding]:
+        """The conditions of its outcomes see its branches."""
+        options = view.node.options
+        if isinstance(options, ParallelOptions):
+            yield from check_outcomes(view, options.branches, options.outcomes)
+            yield from _too_many(view.node, options)
+            yield from check_claims(view)
+
+    def begin(self) -> int:
+        """Start all branches; after a deep history those that had not ended."""
+        if not (self.engine.places.kept and self.engine.places.take_up(self)):
+            self.results = [IDLE] * len(self.children)
+            self.names = [""] * len(self.children)
+        self.runs = [False] * len(self.children)
+        options = self.options
+        self.wanted = (self._many(options.succeed_when, "'succeed_when'"), self._many(options.fail_when, "'fail_when'"))
+        return self.proceed()
+
+    def proceed(self) -> int:
+        """Tick every branch that has not ended, then judge."""
+        results, runs, engine = self.results, self.runs, self.engine
+        for index, child in enumerate(self.children):
+            if results[index] > RUNNING:
+                continue
+            engine.outcome = ""
+            status = child.tick() if runs[index] else child.start()
+            results[index] = status
+            runs[index] = status == RUNNING
+            if status != RUNNING:
+                self.names[index] = engine.outcome
+        status = self._judge()
+        if status != RUNNING:
+            self.halt_below()
+            self._name_outcome()
+        else:
+            engine.outcome = ""
+        return status
+
+    def halt_below(self) -> None:
+        """Stop all branches that run."""
+        for index, child in enumerate(self.children):
+            if self.runs[index]:
+                self.runs[index] = False
+                child.halt()
+
+    def suspend(self, anew: bool) -> bool:
+        """Suspend all branches that run."""
+        for index, child in enumerate(self.children):
+            if self.runs[index] and child.suspend(anew):
+                self.runs[index] = False
+        return False
+
+    def restart(self, target: Target) -> bool:
+        """Let what is named begin again in the branches that run."""
+        for index, child in enumerate(self.children):
+            if not self.runs[index]:
+                continue
+            if child.number == target.number and not target.is_round:
+                self.runs[index] = False
+                child.halt()
+                return True
+            if child.restart(target):
+                return True
+        return False
+
+    def _judge(self) -> int:
+        results = self.results
+        open_ones = results.count(RUNNING)
+        if open_ones and self.options.wait_for_all:
+            return RUNNING
+        if self.options.ends_with:
+            return results[self.options.branches.index(self.options.ends_with)]
+        failed, succeeded = results.count(FAILURE), results.count(SUCCESS)
+        counted = failed + succeeded + open_ones
+        if not counted:
+            return SKIPPED
+        to_succeed, to_fail = (many or counted for many in self.wanted)
+        if failed >= to_fail or succeeded + open_ones < to_succeed:
+            return FAILURE
+        return SUCCESS if succeeded >= to_succeed else RUNNING
+
+    def _name_outcome(self) -> None:
+        """Find the outcome by the conditions; without them it is that of the branch it ends with, or the plain one."""
+        options = self.options
+        self.engine.outcome = self.names[options.branches.index(options.ends_with)] if options.ends_with else ""
+        if not options.outcomes:
+            return
+        ended = {name: Ended.of(self.results[i], self.names[i]) for i, name in enumerate(options.branches)}
+        scope = BranchScope(self.scope, ended)
+        for outcome in options.outcomes:
+            if outcome.condition is None or holds(outcome.condition, scope):
+                self.engine.outcome = outcome.name
+                return
+        raise NodeFailed("none of its outcomes holds")
+
+    def _many(self, written: Expression | str, what: str) -> int:
+        """Return the number of branches that is asked for; 0 for all of them."""
+        if isinstance(written, str):
+            return 0 if written == ALL else 1
+        number = self.count_of(written, what)
+        if number < 1:
+            raise NodeFailed(f"{what} must be at least 1")
+        return number
+
+
+def _too_many(node: Node, options: ParallelOptions) -> Iterator[Finding]:
+    for key, wanted in (("succeed_when", options.succeed_when), ("fail_when", options.fail_when)):
+        tree = wanted.tree if isinstance(wanted, Expression) else None
+        if isinstance(tree, Number) and tree.value > len(node.children) > 0:
+            span = next(asked.scalar.span for asked in node.asked if asked.expression is wanted)
+            message = f"'{key}' counts {tree.value:.0f} branches; there are {len(node.children)}"
+            yield deed_codes.TOO_MANY.at(span, message)

@@ -1,0 +1,126 @@
+"""`use`: a mission within a mission."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rbxcompose.expressions.evaluate import evaluate
+from rbxcompose.expressions.values import NotArrivedError, Value
+from rbxcompose.missions.calling import UseOptions, check_use, read_use
+from rbxcompose.missions.history import HISTORY, WithHistory
+from rbxcompose.missions.places import LAST
+from rbxcompose.missions.registry import kind
+from rbxcompose.missions.skill import PLACED, getter, place
+from rbxcompose.missions.statuses import FAILURE, RUNNING
+from rbxcompose.missions.task import Site
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rbxcompose.findings import Finding
+    from rbxcompose.missions.node_reader import NodeReader
+    from rbxcompose.missions.program import Target
+    from rbxcompose.missions.views import View
+
+
+@kind("use", {"with": "Values for the inputs of the mission.", "history": HISTORY})
+class Use(WithHistory):
+    """Run another mission of the robot; its outputs can be kept with `save`.
+
+    It sees the robot's values and places, and of this mission only what `with` gives it.
+
+    Example:
+        do:
+          - go_to: corner_1
+          - use: patrol
+            with:
+              rounds: 1
+    """
+
+    __slots__ = ("getters", "inner", "options", "outputs")
+    saved = ("outputs",)
+
+    def __init__(self, site: Site, options: UseOptions) -> None:
+        super().__init__(site)
+        if site.inner is None:
+            raise TypeError(f"the mission of '{site.node.path}' is not linked")
+        self.inner = site.inner
+        self.options = options
+        self.history = options.history
+        self.outputs: dict[str, Value] = {}
+        inputs = self.inner.program.inputs
+        self.getters = {one.name: getter(one.value, inputs[one.name].type) for one in options.arguments}
+
+    @staticmethod
+    def read(reader: NodeReader) -> UseOptions:
+        """Read the name, `with` and `history`."""
+        return read_use(reader)
+
+    @staticmethod
+    def check(view: View) -> Iterator[Finding]:
+        """The mission exists, and its inputs get values that fit."""
+        return check_use(view)
+
+    def begin(self) -> int:
+        """Start the mission; with a deep history, with its data and at its place."""
+        self.outputs = {}
+        if self.engine.places.kept and self.engine.places.take_up(self) and self.inner.begun:
+            self.inner.begin_again()
+        else:
+            self.inner.begin(self._inputs())
+        self.forget()
+        return self.proceed()
+
+    def proceed(self) -> int:
+        """Go on with the mission."""
+        status = self.inner.tick(self.engine.time)
+        if status != RUNNING:
+            self.forget_places()
+            self.outputs = self._outputs()
+            if self.inner.ending == FAILURE:
+                self.engine.reasons[self.number] = self.inner.message or "its mission was to end in failure"
+        return status
+
+    def halt(self) -> None:
+        """Stop the mission; with `last` its main node keeps its place, and the mission begins with fresh data."""
+        super().halt()
+        if self.history == LAST:
+            self.engine.places.kept.discard(self)
+            self.engine.places.kept.update(self.inner.main_tasks())
+
+    def halt_below(self) -> None:
+        """Stop what runs in the mission."""
+        self.inner.halt()
+
+    def suspend(self, anew: bool) -> bool:
+        """Suspend the leaves of the mission."""
+        self.inner.suspend(anew)
+        return False
+
+    def restart(self, target: Target) -> bool:
+        """Nothing in another mission can be named."""
+        return False
+
+    def result(self) -> Value:
+        """Return the outputs."""
+        return self.outputs
+
+    def _inputs(self) -> dict[str, Value]:
+        found: dict[str, Value] = {}
+        for name, declared in self.inner.program.inputs.items():
+            if name in self.getters:
+                found[name] = self.getters[name](self)
+            elif declared.default:
+                value = declared.default.value
+                found[name] = place(self, value) if declared.type.kind in PLACED else value
+        return found
+
+    def _outputs(self) -> dict[str, Value]:
+        """Return the outputs; one that has no value, because what it reads has not arrived, is left out."""
+        found = {}
+        for name, asked in self.inner.program.outputs.items():
+            try:
+                found[name] = evaluate(asked.expression, self.inner.scope)
+            except NotArrivedError:
+                continue
+        return found

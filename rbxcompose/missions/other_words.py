@@ -1,0 +1,37 @@
+"""What people write who know another language, and our word for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rbxcompose.findings import Finding, replacement
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions import codes
+
+SETTINGS: Mapping[str, str] = {
+    "delay": "wait",
+    "if": "only_if",
+    "limit": "timeout",
+    "max_time": "timeout",
+    "otherwise": "else",
+    "retries": "attempts",
+    "retry": "attempts",
+    "sleep": "wait",
+    "tries": "attempts",
+    "unless": "skip_if",
+    "when": "only_if",
+    "while": "as_long_as",
+}
+"""Beside a step: a setting of ours, or a step of its own."""
+
+FLAGS: Mapping[str, str] = {"no": "false", "off": "false", "on": "true", "yes": "true"}
+ENDLESS: Mapping[str, str] = dict.fromkeys(("always", "endless", "endlessly", "infinite", "unlimited"), "forever")
+
+
+def not_our_word(scalar: Scalar, message: str, ours: Mapping[str, str]) -> Finding:
+    """Return the finding about a word that cannot stand here, cured if it is one of those that have ours."""
+    meant = ours.get(scalar.text.lower(), "")
+    if not meant:
+        return codes.NOT_A_CHOICE.at(scalar.span, message)
+    fix = replacement(scalar.span, scalar.text, meant)
+    return codes.NOT_A_CHOICE.at(scalar.span, message, help=f"write '{meant}'", fix=fix)

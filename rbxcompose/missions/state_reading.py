@@ -1,0 +1,114 @@
+"""Reads machines and states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rbxcompose.findings import Span
+from rbxcompose.manifest.tree import Entry, Scalar
+from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.missions import codes, machine_codes
+from rbxcompose.missions.history import WithHistory
+from rbxcompose.missions.machines import ENDS, MachineOptions, Next, StateOptions
+from rbxcompose.missions.node_reader import WORDS, NodeReader
+from rbxcompose.missions.statuses import FAILURE, NAMES, SUCCESS
+
+MACHINE_KEYS = ("start", "states", "ends", "history")
+BODIES = ("do", "machine")
+STATE_KEYS = (*BODIES, "on_enter", "on_exit", "next")
+RESULTS = (NAMES[SUCCESS], NAMES[FAILURE])
+
+
+def read_machine(reader: NodeReader) -> MachineOptions:
+    """Read the map below `machine`: the first state, the states, ends and history."""
+    value = reader.map_of(reader.key, "a map with 'start' and 'states'")
+    if value is None:
+        return MachineOptions()
+    inner = reader.inside(value, MACHINE_KEYS, "a machine")
+    states = value.get("states")
+    names: tuple[str, ...] = ()
+    if isinstance(states, Tree) and states.entries:
+        names = tuple(states.entries)
+        for name, entry in states.entries.items():
+            reader.check_name(entry.key)
+            reader.state(name, entry)
+    else:
+        span = inner.key_span("states") if "states" in value else reader.span
+        reader.add(codes.MISSING.at(span, "a machine needs 'states': a map from names to states"))
+    ends = _ends(inner, names)
+    start = inner.scalar("start", "the name of a state") if "start" in value else None
+    if "start" not in value:
+        reader.add(codes.MISSING.at(reader.span, "a machine needs 'start': the state in which it begins"))
+    elif start and names and start.text not in names:
+        message = f"there is no state '{start.text}'"
+        reader.add(
+            machine_codes.UNKNOWN_STATE.misspelt(start.span, message, start.text, names, "states of this machine")
+        )
+    history = WithHistory.read_history(inner)
+    return MachineOptions(start.text if start else "", names, ends, history, start.span if start else None)
+
+
+def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:
+    """Read the ends with what each counts as; `finished` and `failed` are always there."""
+    value = inner.mapping.get("ends")
+    if value is None:
+        return ENDS
+    if not isinstance(value, Tree):
+        inner.add(codes.WRONG_SHAPE.at(value.span, "'ends' needs a map such as 'lost: failure'"))
+        return ENDS
+    read = dict(ENDS)
+    for name, entry in value.entries.items():
+        inner.check_name(entry.key)
+        if name in ENDS:
+            inner.add(codes.NAME_CLASH.at(entry.key.span, f"the end '{name}' exists already"))
+        elif name in states or name in RESULTS:
+            inner.add(
+                codes.NAME_CLASH.at(entry.key.span, f"an end cannot be named '{name}': that means something else")
+            )
+        word = entry.value.text if isinstance(entry.value, Scalar) else ""
+        if word not in RESULTS:
+            message = f"the end '{name}' must count as 'success' or 'failure'"
+            inner.add(codes.NOT_A_CHOICE.misspelt(entry.value.span, message, word, RESULTS, WORDS))
+        read[name] = word if word in RESULTS else RESULTS[1]
+    return read
+
+
+def read_state(reader: NodeReader) -> StateOptions:
+    """Read the body of a state and where it leads to."""
+    bodies = [key for key in BODIES if reader.has(key)]
+    if len(bodies) == len(BODIES):
+        reader.add(codes.WRONG_SHAPE.at(reader.key_span("machine"), "a state has 'do' or 'machine', not both"))
+    if not bodies:
+        reader.add(codes.MISSING.at(reader.span, "a state needs 'do' (or 'machine'): what is done in it"))
+    elif bodies[0] == "do":
+        reader.child("do")
+    else:
+        entry = reader.mapping.entries["machine"]
+        reader.child_node(Tree({"machine": entry}, entry.key.span), "machine")
+    return StateOptions(_next(reader))
+
+
+def _next(reader: NodeReader) -> Next | None:
+    value = reader.mapping.get("next")
+    if value is None:
+        return None
+    if isinstance(value, Scalar) and value.text:
+        return Next({"": value.text}, {"": value.span})
+    if not isinstance(value, Tree) or not value.entries:
+        reader.add(
+            codes.WRONG_SHAPE.at(reader.key_span("next"), "'next' needs a state, or a map from outcomes to states")
+        )
+        return Next()
+    to: dict[str, str] = {}
+    spans: dict[str, Span] = {}
+    for outcome, entry in value.entries.items():
+        if isinstance(entry.value, Scalar) and entry.value.text:
+            to[outcome], spans[outcome] = entry.value.text, entry.value.span
+        else:
+            reader.add(codes.WRONG_SHAPE.at(entry.key.span, f"the outcome '{outcome}' needs the name of a state"))
+    return Next(to, spans, {outcome: entry.key.span for outcome, entry in value.entries.items()})
+
+
+def as_state(entry: Entry) -> Tree:
+    """Return the mapping of a state, also if it was written wrongly."""
+    return entry.value if isinstance(entry.value, Tree) else Tree({}, entry.key.span)

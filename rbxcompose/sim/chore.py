@@ -1,0 +1,48 @@
+"""Twin of a chore: the base moves to and fro a little for as long as the chore takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rbxcompose.geometry import AT_REST, Velocity2
+
+NOTHING_LEFT = 1e-9  # [s] below this the sum of many small steps is rounding, not work
+
+
+@dataclass(frozen=True, slots=True)
+class ChoreSettings:
+    """How the base moves meanwhile."""
+
+    speed: float = 0.0
+    """Forwards in one stroke, backwards in the next [m/s]."""
+    turn_rate: float = 0.0
+    """To the left in all strokes [rad/s]."""
+    stroke: float = 1.0
+    """Duration of a stroke [s], above zero."""
+
+
+class ChoreCore:
+    """Work that takes a time, in strokes; each begins its count anew."""
+
+    def __init__(self, settings: ChoreSettings) -> None:
+        self.settings = settings
+        self.done = 0.0  # [s]
+        self.left = 0.0  # [s]
+
+    def start(self, duration: float) -> None:
+        """Begin a chore of `duration` [s]."""
+        self.done, self.left = 0.0, duration
+
+    @property
+    def is_done(self) -> bool:
+        """Tell whether nothing is left to do."""
+        return self.left <= NOTHING_LEFT
+
+    def step(self, dt: float) -> Velocity2:
+        """Work for `dt` [s]; return the velocity of the base for it."""
+        if self.is_done:
+            return AT_REST
+        stroke = int((self.done + NOTHING_LEFT) / self.settings.stroke)
+        self.done, self.left = self.done + dt, self.left - dt
+        speed = self.settings.speed if stroke % 2 == 0 else -self.settings.speed
+        return Velocity2(speed, self.settings.turn_rate)

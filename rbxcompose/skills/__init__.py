@@ -1,0 +1,1 @@
+"""Skills in Python that ship with the project, one file each."""

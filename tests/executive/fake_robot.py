@@ -1,0 +1,240 @@
+"""A fake robot for missions: servers that tests drive by hand, time that they advance."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+from rbxcompose.clock import Clock, SteppedClock
+from rbxcompose.components.mission import Mission, MissionConfig
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.expressions.types import FLAG, TEXT, TYPES
+from rbxcompose.findings import Report
+from rbxcompose.geometry import Pose2
+from rbxcompose.manifest.reader import read_text
+from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.missions.goals import skill_of
+from rbxcompose.missions.messages import sent_by
+from rbxcompose.missions.program import Program, Skill
+from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, Way
+from rbxcompose.model.skills import python_skills
+from rbxcompose.msgs.geometry_msgs import PoseStamped
+from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.msgs.rbxcompose_msgs import Recharge
+from rbxcompose.msgs.std_msgs import Float32
+from rbxcompose.sdk import Activity, Ended, Outcome, Place, skill
+from rbxcompose.sdk.bound import Reply
+
+
+@skill("toy_count", outcomes={"nobody": "failure"})
+def toy_count(room: Place, least: int = 1) -> str | dict[str, int]:
+    """Find as many people as the place is metres away."""
+    return {"people": int(room.x)} if room.x >= least else "nobody"
+
+
+@skill("toy_raise")
+def toy_raise() -> None:
+    """Raise."""
+    raise ZeroDivisionError("no such thing")
+
+
+@skill("toy_slow", claims="arm", pausable=True)
+class ToySlow(Activity):
+    """Take a second, and fail if told to; `heard` is what happened to all of them."""
+
+    rate = 10.0
+    heard: ClassVar[list[str]] = []
+
+    def start(self, fails: bool = False) -> None:
+        """Begin."""
+        self.left, self.fails = 10, fails
+
+    def step(self, now: float) -> bool | None:
+        """Count down."""
+        self.left -= 1
+        return None if self.left else not self.fails
+
+    def halt(self) -> None:
+        """Tell."""
+        self.heard.append("halt")
+
+    def pause(self, now: float) -> None:
+        """Tell."""
+        self.heard.append("pause")
+
+    def resume(self, now: float) -> None:
+        """Tell."""
+        self.heard.append("resume")
+
+
+PLACES = {"dock": Place("dock", 0.5, 0.5, 0.0), "corner": Place("corner", 1.0, 0.0, 0.0)}
+
+
+def program_of(text: str) -> Program:
+    root, findings = read_text(textwrap.dedent(text), "mission.yaml")
+    assert isinstance(root, Tree)
+    assert not findings
+    report = Report()
+    program = read_program(root, report)
+    assert program is not None
+    assert not report.has_errors, list(report)
+    return program
+
+
+class Goal:
+    """A goal at the fake server."""
+
+    def __init__(self, request: Any, then: Callable[[Ended[Any]], None]) -> None:
+        self.request = request
+        self.then = then
+        self.is_cancelled = False
+
+    def cancel(self) -> None:
+        self.is_cancelled = True
+
+
+class Server:
+    """An action server that tests drive by hand."""
+
+    def __init__(self) -> None:
+        self.is_available = True
+        self.goals: list[Goal] = []
+
+    def __call__(self, request: Any, then: Callable[[Ended[Any]], None], feedback: object = None, /) -> Goal:
+        self.goals.append(Goal(request, then))
+        return self.goals[-1]
+
+    def end(self, outcome: Outcome, message: str = "", result: Any = None) -> None:
+        self.goals[-1].then(Ended(outcome, result, message))
+
+
+class Service:
+    """A server of a service that tests drive by hand."""
+
+    def __init__(self) -> None:
+        self.is_available = True
+        self.asked: list[tuple[Any, Callable[[Reply[Any]], None]]] = []
+
+    def __call__(self, request: Any, then: Callable[[Reply[Any]], None], /, *, timeout: float = 5.0) -> None:
+        self.asked.append((request, then))
+
+    def answer(self, response: Any, error: str = "") -> None:
+        self.asked[-1][1](Reply(response, error))
+
+
+class Look:
+    def __init__(self) -> None:
+        self.pose: Pose2 | None = None
+
+    def now(self) -> Pose2 | None:
+        return self.pose
+
+
+class FakeWindow:
+    """A window whose viewer is the test."""
+
+    def __init__(self, question: str) -> None:
+        self.question = question
+        self.is_watched = False
+        self.news: list[Any] = []
+
+    def put(self, value: object, /) -> None:
+        self.news.append(json.loads(json.dumps(value)))
+
+
+class Robot:
+    """A mission component with a fake context and fake ports, on a stepped clock."""
+
+    def __init__(self, text: str, start: str | None = "test", **others: str) -> None:
+        self.stepped = SteppedClock()
+        self.clock: Clock = self.stepped
+        self.is_stopped = False
+        self.lines: list[str] = []
+        self.levels: list[Level] = []
+        self.events: list[dict[str, object]] = []
+        self.statuses: list[str] = []
+        self.wakes: list[float] = []
+        self.windows: dict[str, FakeWindow] = {}
+        programs = {name: program_of(one) for name, one in {"test": text, **others}.items()}
+        published, called = sent_by(programs.values())
+        topics = {"words": TopicSource("std_msgs/msg/String"), "goal": TopicSource(PoseStamped.TYPE)}
+        config = MissionConfig(
+            programs=programs,
+            start=start,
+            values={"battery": ValueSource("battery_level", "std_msgs/msg/Float32", "data", 1, 100, TYPES["ratio"])},
+            places=PLACES,
+            skills={
+                "go_to": SkillSource(
+                    skill_of(NavigateToPose, "go_to", "base"), "nav2_msgs/action/NavigateToPose", "go_to"
+                ),
+                "recharge": SkillSource(
+                    skill_of(Recharge, "recharge", restartable=False), "rbxcompose_msgs/action/Recharge", "recharge"
+                ),
+                "scan": SkillSource(
+                    skill_of(Recharge, "scan", "head", pausable=True), "rbxcompose_msgs/action/Recharge", "scan"
+                ),
+                "switch": SkillSource(
+                    Skill("switch", {"data": FLAG}, "data", results={"message": TEXT}),
+                    "std_srvs/srv/SetBool",
+                    "switch",
+                    Way.SERVICE,
+                ),
+                **{one.skill.name: one for one in python_skills(["say", "toy_count", "toy_raise", "toy_slow"])},
+            },
+            topics={name: topics[name] for name in published},
+            services=dict.fromkeys(called, "std_srvs/srv/Trigger"),
+        )
+        self.go_to, self.recharge, self.look = Server(), Server(), Look()
+        self.mission = Mission("mission", config, self)
+        self.scan, self.pauses, self.switch, self.reset = Server(), Service(), Service(), Service()
+        self.sent: list[Any] = []
+        self.published: list[dict[str, Any]] = []
+        self.mission.bound = {
+            "skill_go_to": self.go_to,
+            "skill_recharge": self.recharge,
+            "pose": self.look,
+            "skill_scan": self.scan,
+            "pauses_scan": self.pauses,
+            "skill_switch": self.switch,
+            "calls_reset": self.reset,
+            "publishes_words": self.sent.append,
+            "publishes_goal": self.sent.append,
+            "publishes_mission_events": lambda message: self.published.append(json.loads(message.data)),
+        }
+        self.mission.configure()
+        self.mission.activate()
+
+    def log(self, level: Level, text: str) -> None:
+        self.lines.append(f"{self.clock.now():g} {text}")
+        self.levels.append(level)
+
+    def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
+        self.statuses.append(message)
+
+    def wake_at(self, time: float) -> None:
+        self.wakes.append(time)
+
+    def notify(self, event: str, **data: object) -> None:
+        self.events.append({"event": event, **data})
+
+    def window(self, path: str, question: str) -> FakeWindow:
+        return self.windows.setdefault(path, FakeWindow(question))
+
+    def level(self, percent: float) -> None:
+        self.mission.received("value_battery", Float32(data=percent))
+
+    def start(self) -> None:
+        self.mission.start()
+        self.advance(0.0)
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass, and wake the component whenever it asked for it."""
+        end = self.clock.now() + seconds
+        while due := sorted(time for time in self.wakes if time <= end):
+            self.wakes.remove(due[0])
+            self.stepped.advance_to(max(due[0], self.clock.now()))
+            self.mission.wake()
+        self.stepped.advance_to(max(end, self.clock.now()))  # something may have taken its time

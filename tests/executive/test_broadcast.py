@@ -1,0 +1,99 @@
+"""What viewers are told of missions: news while somebody watches, from which they know what is there."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from rbxcompose.missions.mirror import joined
+from rbxcompose.missions.replica import Replica
+from rbxcompose.sdk.bound import Refused
+from tests.executive.fake_robot import FakeWindow, Robot
+
+COUNT = """
+data:
+  round: 0
+do:
+  repeat: 3
+  do:
+    - set:
+        round: $round + 1
+    - wait: 1 s
+"""
+
+
+def watched(robot: Robot) -> FakeWindow:
+    window = robot.windows["missions/test"]
+    window.is_watched = True
+    return window
+
+
+def test_nothing_is_put_together_while_nobody_watches(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = Robot(COUNT)
+    monkeypatch.setattr("rbxcompose.executive.running.Mirror.look", lambda *_: pytest.fail("looked for nobody"))
+    robot.start()
+    robot.advance(10.0)
+    assert robot.windows["missions/test"].news == []
+
+
+def test_news_are_what_changed_and_add_up_to_what_is_there() -> None:
+    robot = Robot(COUNT)
+    window = watched(robot)
+    robot.start()
+    robot.advance(10.0)
+    known = joined({}, window.news[0])
+    for one in window.news[1:]:
+        assert not one["whole"]
+        known = joined(known, one)
+    there = json.loads(robot.mission.query("whole test"))
+    assert known["state"] == "success"
+    for own in ("picture", "whole", "version"):
+        known.pop(own, None)
+        del there[own]
+    assert known == {**there, "statuses": {int(number): one for number, one in there["statuses"].items()}}
+    assert [one["data"] for one in window.news[1:4]] == [{"round": 2}, {"round": 3}, {}]
+    assert "transitions" not in window.news[1]
+
+
+def test_who_comes_in_the_middle_hears_what_was_not_told_before() -> None:
+    robot = Robot(COUNT)
+    robot.start()
+    robot.advance(1.5)
+    window = watched(robot)
+    robot.advance(1.0)
+    assert [one["data"] for one in window.news] == [{"round": 3}]
+
+
+@pytest.mark.parametrize(("words", "state"), [("pause", "paused"), ("cancel", "halted")])
+def test_what_people_do_is_told_at_once(words: str, state: str) -> None:
+    robot = Robot(COUNT)
+    window = watched(robot)
+    robot.start()
+    robot.mission.command(words)
+    assert window.news[-1]["state"] == state
+
+
+def test_another_run_begins_with_a_whole() -> None:
+    robot = Robot(COUNT)
+    window = watched(robot)
+    robot.start()
+    robot.advance(10.0)
+    told = len(window.news)
+    robot.mission.command("run test")
+    robot.advance(0.0)
+    assert window.news[told]["whole"]
+    assert window.news[told]["data"] == {"round": 1}
+
+
+def test_the_whole_has_all_that_a_viewer_needs() -> None:
+    robot = Robot(COUNT)
+    question = robot.windows["missions/test"].question
+    with pytest.raises(Refused, match="has not been running"):
+        robot.mission.query(question)
+    robot.start()
+    replica = Replica()
+    replica.answered({"source": "s", "sequence": 0, "value": json.loads(robot.mission.query(question))})
+    assert (replica.seen["mission"], replica.seen["state"], replica.seen["data"]) == ("test", "running", {"round": 1})
+    assert replica.seen["picture"]["count"] == len(replica.seen["statuses"])
+    assert robot.windows["missions"].question == "ls"

@@ -1,0 +1,100 @@
+"""The log of a mission, and the mission run again from it."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from rbxcompose.missions.logbook import INPUTS, ReplayError, replay
+from rbxcompose.msgs.rbxcompose_msgs import Recharge
+from rbxcompose.sdk import Outcome
+from tests.executive.fake_robot import Robot
+
+MISSION = """
+inputs:
+  low:
+    type: ratio
+    default: 50 %
+data:
+  visited: []
+  pause: 1 s
+interrupts:
+  battery_low:
+    when: $battery < $low
+    do:
+      - go_to: dock
+      - recharge
+    afterwards: continue
+do:
+  - for: place
+    in: [corner, dock]
+    order: random
+    do:
+      go_to: $place
+      timeout: 10 s
+      optional: true
+  - wait: $pause
+  - fallback:
+      - toy_raise
+      - check: age($battery) < 1 s
+      - say: enough
+  - publish: words
+    message: done at $battery
+"""
+
+
+def recorded() -> tuple[Robot, list[dict[str, Any]]]:
+    """Run a mission with all that may happen to one, and return what was logged, as it comes from a file."""
+    robot = Robot(MISSION)
+    robot.mission.config.inputs["test"] = {"low": 0.5}
+    robot.start()
+    robot.level(100.0)
+    robot.advance(2.0)
+    robot.level(40.0)
+    robot.advance(1.0)
+    robot.go_to.end(Outcome.SUCCEEDED)
+    robot.advance(1.0)
+    robot.level(90.0)
+    robot.recharge.end(Outcome.SUCCEEDED, result=Recharge.Result(level=90.0))
+    robot.advance(3.0)
+    robot.mission.command("pause")
+    robot.advance(5.0)
+    robot.mission.command("resume")
+    robot.advance(11.0)
+    robot.go_to.end(Outcome.ABORTED, "stuck")
+    robot.advance(20.0)
+    assert robot.mission.missions.runs["test"].is_over, robot.lines
+    return robot, [json.loads(json.dumps(one)) for one in robot.mission.missions.records]
+
+
+def told(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [{key: value for key, value in one.items() if key not in ("mission", "run")} for one in records]
+
+
+def test_a_replay_of_a_log_tells_the_same() -> None:
+    robot, records = recorded()
+    before = [one for one in records if one["event"] not in INPUTS]
+    again = replay(records, robot.mission.config.programs["test"], robot.mission.config.names)
+    assert told(again) == told(before)
+    assert {"interrupt_started", "reported", "published", "mission_ended"} <= {one["event"] for one in again}
+
+
+def test_what_came_in_is_not_published_but_what_was_done_is() -> None:
+    robot, records = recorded()
+    assert robot.published == [one for one in records if one["event"] not in INPUTS]
+
+
+def test_a_log_without_its_beginning_cannot_be_replayed() -> None:
+    robot, records = recorded()
+    with pytest.raises(ReplayError):
+        replay(records[1:], robot.mission.config.programs["test"], robot.mission.config.names)
+
+
+def test_another_mission_gives_another_trace() -> None:
+    robot, records = recorded()
+    other = Robot(MISSION.replace("wait: $pause", "wait: 2 s")).mission.config
+    assert replay(records, other.programs["test"], other.names) != replay(
+        records, robot.mission.config.programs["test"], robot.mission.config.names
+    )
