@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from rbxcompose.expressions.text import Template
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import COUNT, FLAG, UNKNOWN, Type, TypeKind
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
-from rbxcompose.missions.modifiers import MODIFIERS
-from rbxcompose.missions.node_reader import FOREVER, UNREADABLE, NodeReader
-from rbxcompose.missions.program import Assignment
+from rbxcompose.missions.messages import Message
+from rbxcompose.missions.modifiers.registry import Modifier, modifiers
+from rbxcompose.missions.moments import Moments
+from rbxcompose.missions.node_reader import UNREADABLE, NodeReader
+from rbxcompose.missions.program import Asked, Assignment
 from rbxcompose.missions.registry import Kind
 from rbxcompose.schema.scalars import Schema, computed
 from rbxcompose.schema.settle import DEFINITIONS
@@ -21,12 +25,33 @@ TEXT: Schema = {"type": ["string", "number", "boolean"]}
 ITEM_NAME: Schema = {"type": "string", "pattern": "^[a-z][a-z0-9_]*$", "maxLength": 60}
 
 
+MACHINE: Schema = {"$ref": f"{DEFINITIONS}machine"}
+DEEDS: Schema = {"$ref": f"{DEFINITIONS}deeds"}
+ANYTHING: Schema = {"type": ["string", "number", "boolean", "object", "array"]}
+MAPS: dict[str, Schema] = {  # by the key that takes the map
+    "machine": MACHINE,
+    "outcomes": {"type": "object", "minProperties": 1, "propertyNames": ITEM_NAME, "additionalProperties": EXPRESSION},
+    "with": {"type": "object", "minProperties": 1, "propertyNames": ITEM_NAME, "additionalProperties": ANYTHING},
+}
+
+
 class _Nobody:
     """Takes what a reader would hand on: there is nothing to be read."""
 
     def child(self, node: Node, step: str, parent: int) -> int:
         """Give every node the same number."""
         return 0
+
+    def state(self, name: str, entry: Entry, parent: int) -> int:
+        """Give every node the same number."""
+        return 0
+
+    def loop(self, item: str, expression: Expression) -> None:
+        """Note nothing."""
+
+    def held(self, expression: Expression, parent: int) -> list[int]:
+        """Find nothing."""
+        return []
 
     def add(self, finding: Finding) -> None:
         """Drop it: an empty mapping lacks everything."""
@@ -46,16 +71,63 @@ class Asking(NodeReader):
         self.optional.add(key)
         return True
 
+    def scalar(self, key: str, what: str) -> Scalar | None:
+        """Note a word."""
+        self.schemas[key] = {"type": "string", "minLength": 1}
+        return None
+
     def expression(self, key: str, wanted: Type, what: str) -> Expression:
         """Note an expression."""
         self.schemas[key] = EXPRESSION if wanted == UNKNOWN else computed(wanted)
         return UNREADABLE
 
-    def count_or_forever(self, key: str) -> Expression | None:
-        """Note a whole number or `forever`."""
-        count = computed(COUNT, f"a number or '{FOREVER}'")
-        self.schemas[key] = {**count, "pattern": f"^{FOREVER}$|{count['pattern']}", "examples": [3, FOREVER]}
+    def count_or(self, key: str, words: tuple[str, ...]) -> Expression | str:
+        """Note a whole number or some words."""
+        listed = " or ".join(f"'{word}'" for word in words)
+        count = computed(COUNT, f"a number or {listed}")
+        pattern = "|".join([*(f"^{word}$" for word in words), str(count["pattern"])])
+        self.schemas[key] = {**count, "pattern": pattern, "examples": [3, *words]}
+        return words[0]
+
+    def map_of(self, key: str, what: str) -> Mapping | None:
+        """Note a map."""
+        self.schemas[key] = MAPS[key]
         return None
+
+    def branch(self, key: str, branches: tuple[str, ...]) -> str:
+        """Note a name."""
+        self.schemas[key] = ITEM_NAME
+        return ""
+
+    def name(self, key: str, what: str) -> Scalar:
+        """Note a name."""
+        self.schemas[key] = ITEM_NAME
+        return Scalar("", Mapping().span)
+
+    def branches(self) -> tuple[str, ...]:
+        """Note a list or a map of nodes."""
+        several = {"minItems": 1, "items": NODE, "minProperties": 1, "additionalProperties": NODE}
+        self.schemas[self.key] = {"type": ["object", "array"], "propertyNames": ITEM_NAME, **several}
+        return ()
+
+    def cases(self, key: str) -> tuple[Asked, ...]:
+        """Note a map from values to nodes."""
+        self.schemas[key] = {"type": "object", "minProperties": 1, "additionalProperties": NODE}
+        return ()
+
+    def message(self, target: str, body: str) -> Message:
+        """Note a name and what is sent."""
+        self.schemas[target] = {"type": "string", "minLength": 1}
+        self.schemas[body] = ANYTHING
+        self.optional.add(body)
+        return Message(Scalar("", Mapping().span), None)
+
+    def moments(self, keys: Iterable[str]) -> Moments:
+        """Note hooks, each of which may be missing."""
+        for key in keys:
+            self.schemas[key] = DEEDS
+            self.optional.add(key)
+        return Moments()
 
     def flag(self, key: str) -> bool:
         """Note `true` or `false`."""
@@ -92,10 +164,10 @@ class Asking(NodeReader):
         self.schemas[key] = {"anyOf": [words, {"type": "string"}]}
         return ()
 
-    def assignments(self) -> tuple[Assignment, ...]:
+    def assignments(self, key: str) -> tuple[Assignment, ...]:
         """Note a map from names to expressions."""
         entries = {"propertyNames": ITEM_NAME, "additionalProperties": EXPRESSION}
-        self.schemas[self.key] = {"type": "object", "minProperties": 1, **entries}
+        self.schemas[key] = {"type": "object", "minProperties": 1, **entries}
         return ()
 
 
@@ -110,12 +182,19 @@ def kind_schema(kind: Kind) -> tuple[dict[str, Schema], list[str]]:
 
 def modifier_schemas() -> dict[str, Schema]:
     """Return the schemas of the modifiers, which any node may have."""
-    made = {}
-    for key, cls in MODIFIERS.items():
-        asking = Asking(key)
-        cls.read(asking, key)
-        made[key] = {**_beside(asking.schemas[key]), "description": first_line(cls.__doc__)}
+    made: dict[str, Schema] = {}
+    for key, cls in modifiers().items():
+        if not cls.only_states:
+            made |= modifier_schema(key, cls)
     return made
+
+
+def modifier_schema(key: str, cls: type[Modifier]) -> dict[str, Schema]:
+    """Return the schemas of the keys that a modifier reads, described."""
+    asking = Asking(key)
+    cls.read(asking, key)
+    about = {key: first_line(cls.__doc__), **cls.keys}
+    return {name: {**_beside(schema), "description": about[name]} for name, schema in asking.schemas.items()}
 
 
 def argument_schema(wanted: Type) -> Schema:

@@ -11,9 +11,11 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
+from rbxcompose.replacing import replace_file
 from rbxcompose.schema.mission import mission_schema
 from rbxcompose.schema.robot import overlay_schema, part_schema, robot_schema
 from rbxcompose.schema.scalars import Schema
+from rbxcompose.schema.trial import trial_schema
 from rbxcompose.sdk import registry
 
 MAKERS: Mapping[str, Callable[[Iterable[str]], Schema]] = {
@@ -21,6 +23,7 @@ MAKERS: Mapping[str, Callable[[Iterable[str]], Schema]] = {
     "Part": part_schema,
     "Overlay": overlay_schema,
     "Mission": mission_schema,
+    "Test": trial_schema,
 }
 """How the schema of a kind is made from the names of component types."""
 
@@ -28,7 +31,7 @@ MAKERS: Mapping[str, Callable[[Iterable[str]], Schema]] = {
 @cache
 def installed_schema(kind: str) -> Schema:
     """Return the schema of a kind of manifest with all component types that are installed; not to be changed."""
-    return MAKERS[kind](registry.component_names())
+    return MAKERS[kind](registry.usable_names())
 
 
 def as_text(schema: Schema) -> str:
@@ -46,7 +49,7 @@ def main(folder: Path) -> None:
     """Write all schemas into `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files().items():
-        (folder / name).write_text(text, encoding="utf-8")
+        replace_file(folder / name, text.encode())
 
 
 if __name__ == "__main__":

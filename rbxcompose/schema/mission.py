@@ -11,20 +11,29 @@ from rbxcompose.expressions.types import FLAG, TYPES
 from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.manifest.models import Header
 from rbxcompose.missions.goals import skill_of
-from rbxcompose.missions.program import Skill
-from rbxcompose.missions.reading import AFTERWARDS, INTERRUPT_KEYS, KEYS
+from rbxcompose.missions.history import HISTORY
+from rbxcompose.missions.modifiers.entering import ON_ENTER
+from rbxcompose.missions.modifiers.registry import modifiers
+from rbxcompose.missions.moments import DEEDS
+from rbxcompose.missions.places import HISTORIES
+from rbxcompose.missions.program import AFTERWARDS, RESTART, Skill
+from rbxcompose.missions.reading import INTERRUPT_KEYS, KEYS
 from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.state_reading import MACHINE_KEYS, RESULTS
 from rbxcompose.schema.asking import (
+    EXPRESSION,
     ITEM_NAME,
+    MACHINE,
     NODE,
     argument_schema,
     first_line,
     kind_schema,
+    modifier_schema,
     modifier_schemas,
 )
 from rbxcompose.schema.robot import document
 from rbxcompose.schema.scalars import Schema, computed
-from rbxcompose.schema.settle import schemas_of
+from rbxcompose.schema.settle import DEFINITIONS, schemas_of
 from rbxcompose.sdk.ports import ServesAction
 from rbxcompose.sdk.registry import component_type
 
@@ -38,10 +47,23 @@ _ABOUT = {
     "data": "Values of the mission's own by name, with what they are at the start; `set` changes them.",
     "interrupts": "Conditions that cut the mission short, by name; the first one that holds wins.",
     "rate": "How often conditions are asked that nothing announces.",
+    "outputs": "What the mission gives to one that uses it: expressions by name.",
     "do": "What the mission does.",
+    "machine": "What the mission does, as a state machine.",
     "when": "The condition that cuts the mission short.",
     "reaction": "What is done then.",
-    "afterwards": "What comes after the reaction: `continue` starts again what was cut short.",
+    "afterwards": "What comes after the reaction: `continue` starts again what was cut short, `restart` begins anew.",
+}
+_MACHINE = {
+    "start": "The state in which it begins.",
+    "states": "The states by name.",
+    "ends": "Ends beside `finished` and `failed`, each with what it counts as.",
+    "history": HISTORY,
+}
+_STATE = {
+    "do": "What is done in the state; how it ends decides where the machine goes.",
+    "machine": "A machine within the state.",
+    "next": "The next state or end by outcome, or one word if the body cannot fail.",
 }
 
 
@@ -57,18 +79,30 @@ def mission_schema(types: Iterable[str]) -> Schema:
         "data": {"type": ["object", "null"], "propertyNames": ITEM_NAME},
         "interrupts": {"type": ["object", "null"], "propertyNames": ITEM_NAME, "additionalProperties": _interrupt()},
         "rate": computed(TYPES["frequency"]),
+        "outputs": {"type": ["object", "null"], "propertyNames": ITEM_NAME, "additionalProperties": EXPRESSION},
         "do": {"allOf": [NODE]},
+        "machine": {"allOf": [MACHINE]},
     }
     made = {key: {**properties[key], "description": _ABOUT[key]} for key in KEYS if key in properties}
     schema = document("Mission", MissionFile, made, definitions | _nodes(types))
-    return {**schema, "required": [*schema["required"], "do"]}
+    # Which of the two bodies is missing is told by `check`: editors name neither well where a choice fails.
+    return {**schema, "anyOf": [{"required": ["do"]}, {"required": ["machine"]}]}
 
 
 def _interrupt() -> Schema:
     properties = {
         "when": {**computed(FLAG), "description": _ABOUT["when"]},
         "do": {"allOf": [NODE], "description": _ABOUT["reaction"]},
-        "afterwards": {"enum": list(AFTERWARDS), "default": AFTERWARDS[0], "description": _ABOUT["afterwards"]},
+        "afterwards": {
+            "type": ["string", "object"],
+            "pattern": "|".join(f"^{word}$" for word in AFTERWARDS),
+            "examples": list(AFTERWARDS),
+            "default": AFTERWARDS[0],
+            "properties": {RESTART: {**ITEM_NAME, "description": "A node, a state, or the item of a loop."}},
+            "required": [RESTART],
+            "additionalProperties": False,
+            "description": _ABOUT["afterwards"],
+        },
     }
     return {
         "type": "object",
@@ -98,7 +132,45 @@ def _nodes(types: Iterable[str]) -> dict[str, Schema]:
     mapping = {"type": "object", "minProperties": 1, "properties": anywhere, "allOf": chosen}
     # One schema with several types, not a choice of schemas: editors then tell the mistake of the type that is there.
     node = {**word, **steps, **mapping, "type": ["string", "array", "object"], "description": ANY_NODE}
-    return {"node": node, "steps": {**steps, "description": "Nodes, one after the other."}}
+    listed = {**steps, "description": "Nodes, one after the other."}
+    return {"node": node, "steps": listed, "deeds": _deeds(), "machine": _machine(), "state": _state(anywhere)}
+
+
+def _deeds() -> Schema:
+    """Return the schema of what a hook does."""
+    keys: dict[str, Schema] = {}
+    for word in DEEDS:
+        keys |= kind_schema(kinds()[word])[0]
+    return {"type": "object", "minProperties": 1, "properties": keys, "additionalProperties": False}
+
+
+def _machine() -> Schema:
+    """Return the schema of a machine."""
+    ends = {"type": "object", "propertyNames": ITEM_NAME, "additionalProperties": {"enum": list(RESULTS)}}
+    states = {
+        "type": "object",
+        "minProperties": 1,
+        "propertyNames": ITEM_NAME,
+        "additionalProperties": {"$ref": f"{DEFINITIONS}state"},
+    }
+    keys: dict[str, Schema] = {
+        "start": ITEM_NAME,
+        "states": states,
+        "ends": ends,
+        "history": {"enum": list(HISTORIES), "default": HISTORIES[0]},
+    }
+    described = {key: {**keys[key], "description": _MACHINE[key]} for key in MACHINE_KEYS}
+    return {"type": "object", "properties": described, "required": ["start", "states"], "additionalProperties": False}
+
+
+def _state(anywhere: dict[str, Schema]) -> Schema:
+    """Return the schema of a state: its body, its transitions, and what any node may have."""
+    to = {"type": ["string", "object"], "minLength": 1, "minProperties": 1, "additionalProperties": ITEM_NAME}
+    own: dict[str, Schema] = {"do": {"allOf": [NODE]}, "machine": {"allOf": [MACHINE]}, "next": to}
+    described = {key: {**schema, "description": _STATE[key]} for key, schema in own.items()}
+    hooks = modifier_schema(ON_ENTER, modifiers()[ON_ENTER])
+    inside = {key: schema for key, schema in anywhere.items() if key != "name"}
+    return {"type": "object", "properties": {**described, **hooks, **inside}, "additionalProperties": False}
 
 
 def _skill(skill: Skill, about: str) -> Schema:

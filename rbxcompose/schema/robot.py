@@ -9,6 +9,7 @@ from typing import Any
 from rbxcompose.config import Config, Name
 from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.manifest.models import (
+    Body,
     Bus,
     Diagnostics,
     Header,
@@ -31,6 +32,7 @@ from rbxcompose.schema.settle import opened, schemas_of
 SECTION_TYPES: Mapping[str, Any] = {
     "args": dict[Name, ArgumentModel],
     "include": dict[Name, IncludeModel],
+    "body": Body,
     "bus": Bus,
     "muxes": dict[Name, Mux],
     "diagnostics": Diagnostics,

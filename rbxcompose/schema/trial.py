@@ -1,0 +1,48 @@
+"""Schema of the file of a test: its sections are models, its steps are names of the mission."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from rbxcompose.config import Name, Time
+from rbxcompose.manifest.trials import SECTIONS, TEST, TrialFile
+from rbxcompose.schema.robot import document, or_empty
+from rbxcompose.schema.scalars import Schema
+from rbxcompose.schema.settle import opened, schemas_of
+
+STEP = "step"
+WORDS: dict[str, Any] = {"robot": str, "mission": Name, "with": dict[Name, Any]}
+_ABOUT = {
+    STEP: "A skill, a named node or a state; behind a skill stands its main argument, or a map of its arguments.",
+    "ended": "How it ended: `success`, `failure`, `halted`, `skipped`, `running`, or an outcome of its own.",
+    "at": "When it began, counted from the start of the test.",
+}
+
+
+def trial_schema(types: Iterable[str]) -> Schema:
+    """Return the schema of a test; it is the same for all types of components."""
+    schemas, definitions = schemas_of({**WORDS, **SECTIONS, "at": Time})
+    sections = {key: or_empty(opened(schemas[key], definitions)) for key in (*WORDS, *SECTIONS)}
+    steps: Schema = {"type": "array", "items": {"$ref": f"#/definitions/{STEP}"}}
+    expect = sections["expect"]
+    about = {key: expect["properties"][key]["description"] for key in ("steps", "never")}
+    told = {key: {**steps, "description": text} for key, text in about.items()}
+    sections["expect"] = {**expect, "properties": {**expect["properties"], **told}}
+    made = {name: {**sections[name], "description": _description(name)} for name in sections}
+    whole = document(TEST, TrialFile, made, {**definitions, STEP: _step(schemas["at"])})
+    return {**whole, "required": [*whole["required"], "robot", "mission", "expect"]}
+
+
+def _description(name: str) -> str:
+    fields = TrialFile.model_fields
+    return next(field.description or "" for key, field in fields.items() if name in (key, field.alias))
+
+
+def _step(time: Schema) -> Schema:
+    properties = {
+        "ended": {"type": "string", "description": _ABOUT["ended"]},
+        "at": {**time, "description": _ABOUT["at"]},
+    }
+    mapping = {"properties": properties, "minProperties": 1, "maxProperties": 1 + len(properties)}
+    return {"type": ["string", "object"], "minLength": 1, **mapping, "description": _ABOUT[STEP]}

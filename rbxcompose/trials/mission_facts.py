@@ -1,0 +1,64 @@
+"""What a mission with all that it uses asks of the robot, and which steps it has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from rbxcompose.missions.messages import Message
+from rbxcompose.missions.moments import Moments
+from rbxcompose.missions.outcomes import Ending
+from rbxcompose.missions.program import Program, RobotNames, Skill
+from rbxcompose.missions.watching import POSE
+from rbxcompose.trials.model import FAILS, SUCCEEDS
+
+
+def missions_in(program: Program) -> Iterator[Program]:
+    """Yield a linked mission and each that it uses, as often as it does."""
+    yield program
+    yield from (node.inner for node in program.nodes if node.inner)
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a mission asks of the robot, and its steps by name, each with what its outcomes count as."""
+
+    skills: Mapping[str, Skill]
+    services: frozenset[str]
+    values: frozenset[str]
+    topics: frozenset[str]
+    steps: Mapping[str, Mapping[str, str]]
+    ends: Mapping[str, str]
+
+    @classmethod
+    def of(cls, program: Program, robot: RobotNames) -> Facts:
+        """Return what is known of a linked mission."""
+        named: dict[str, Mapping[str, str]] = {}
+        for node in program.nodes:
+            if node.name:
+                own = Ending(program, robot).of(node.number).named
+                named[node.name] = {**named.get(node.name, {}), **own}
+        skills = {node.skill: robot.skills[node.skill] for node in program.nodes if node.skill in robot.skills}
+        read = frozenset[str]().union(*(one.reads() for one in missions_in(program)))
+        return cls(
+            skills,
+            frozenset(_targets(program, "call")),
+            read & {*robot.values, POSE} - {*program.inputs, *program.data},
+            frozenset({*_targets(program, "publish"), *_published_by_hooks(program)}),
+            {**named, **{name: skill.outcomes for name, skill in skills.items()}},
+            {SUCCEEDS: SUCCEEDS, FAILS: FAILS, **Ending(program, robot).mission().named},
+        )
+
+
+def _targets(program: Program, kind: str) -> Iterator[str]:
+    """Yield the services that are called, or the topics on which is published, by nodes."""
+    for node in program.nodes:
+        if node.kind == kind and isinstance(node.options, Message):
+            yield node.options.target.text
+
+
+def _published_by_hooks(program: Program) -> Iterator[str]:
+    for node in program.nodes:
+        for moments in node.modifiers.values():
+            if isinstance(moments, Moments):
+                yield from (one.message.target.text for one in moments.deeds.values() if one.message)
