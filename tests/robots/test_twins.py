@@ -39,7 +39,7 @@ def test_it_has_no_findings(profiles: tuple[str, ...]) -> None:
 def test_it_hauls_to_the_end_and_charges_each_battery_when_that_is_low() -> None:
     run = ran()
     assert run.outcome == "success"
-    assert charged(run) == {"drive": 1, "lift": 1}
+    assert charged(run) == {"drive": 2, "lift": 1}
 
 
 def test_what_is_given_to_one_instance_does_not_change_the_other() -> None:
