@@ -35,7 +35,7 @@ def _in_process(path: Path) -> Row:
         peer=peer.median * 1e3,
         against="PyYAML CSafeLoader",
         most=150,
-        most_ratio=4,
+        most_ratio=3.5,
     )
 
 

@@ -17,6 +17,7 @@ from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping as Tree
 from rbxcompose.missions.engine import Engine
 from rbxcompose.missions.events import MissionEvent
+from rbxcompose.missions.mirror import Mirror
 from rbxcompose.missions.program import Program, RobotNames
 from rbxcompose.missions.reading import read_program
 from rbxcompose.missions.semantics import check_program
@@ -26,6 +27,10 @@ TICKS = 50  # per sample
 ROBOT = RobotNames({"battery": TYPES["ratio"]})
 NOT_INSTALLED = "; py_trees is not installed (extra `bench`)"
 HEAD = "rbx: 1\nkind: Mission\nname: many\ndo:\n  repeat: forever\n  every: 1 s\n  do:\n"
+BRANCHES, STEPS = 32, 30  # about as many nodes
+PARALLEL = HEAD + "    parallel:\n" + ("      - sequence:\n" + "          - check: true\n" * STEPS) * BRANCHES
+STATE = "{do: {check: true}, next: {success: finished, failure: failed}}"
+MACHINES = HEAD + f"    - machine: {{start: s, states: {{s: {STATE}}}}}\n" * (NODES // 3)
 
 
 class World:
@@ -52,6 +57,18 @@ class World:
     def halt(self, leaf: int, /) -> None:
         """Stop nothing."""
 
+    def pause(self, leaf: int, /) -> None:
+        """Hold nothing."""
+
+    def resume(self, leaf: int, /) -> None:
+        """Let nothing go on."""
+
+    def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
+        """Publish nothing."""
+
+    def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
+        """Call nothing."""
+
     def say(self, event: MissionEvent, /) -> None:
         """Count what is said."""
         self.said += 1
@@ -62,21 +79,43 @@ def rows() -> list[Row]:
     return [
         _ticks("check: true", "steps that do nothing", "py_trees, Success", _py_trees(_successes)),
         _ticks("check: $battery > 5 %", "conditions", "py_trees, CheckBlackboardVariableValue", _py_trees(_conditions)),
+        _row(_run(PARALLEL), "lists at the same time", "py_trees, Parallel", _py_trees(_lists, is_parallel=True)),
+        _row(_run(MACHINES), "machines, one after the other", "", None),
+        _watched(),
         _reading(),
     ]
 
 
 def _ticks(step: str, what: str, against: str, peer: Callable[[], object] | None) -> Row:
-    times = in_turns(_engine(step), *([peer] if peer else []), rounds=15)
+    return _row(_engine(step), what, against, peer)
+
+
+def _row(ours: Callable[[], object], what: str, against: str, peer: Callable[[], object] | None) -> Row:
+    times = in_turns(ours, *([peer] if peer else []), rounds=15)
     speeds = [NODES * TICKS / one.median for one in times]
     return Row(
         name=f"{NODES:,} mission nodes per tick: {what}",
         unit="M nodes/s",
-        how="a list, all of it done at each tick, statuses recorded" + ("" if peer else NOT_INSTALLED),
+        how="all of them done at each tick, statuses recorded" + ("" if peer or not against else NOT_INSTALLED),
         ours=speeds[0] / 1e6,
         peer=speeds[1] / 1e6 if peer else None,
         against=against if peer else "",
-        least_ratio=10,
+        least_ratio=10 if peer else None,
+    )
+
+
+def _watched() -> Row:
+    """Return what a viewer costs that looks after each tick."""
+    step = "check: $battery > 5 %"
+    watched, alone = in_turns(_engine(step, is_watched=True), _engine(step), rounds=15)
+    return Row(
+        name=f"{NODES:,} mission nodes per tick with a viewer",
+        unit="ms",
+        how="as above, conditions; all statuses and data are compared after each tick",
+        ours=watched.median / TICKS * 1e3,
+        peer=alone.median / TICKS * 1e3,
+        against="without a viewer",
+        most_ratio=1.25,
     )
 
 
@@ -109,23 +148,31 @@ def _program(text: str) -> Program:
     return program
 
 
-def _engine(step: str) -> Callable[[], object]:
-    engine = Engine(_program(HEAD + f"    - {step}\n" * (NODES - 2)), ROBOT, {}, World())
-    now = [0.0]
+def _engine(step: str, *, is_watched: bool = False) -> Callable[[], object]:
+    return _run(HEAD + f"    - {step}\n" * (NODES - 2), is_watched=is_watched)
+
+
+def _run(text: str, *, is_watched: bool = False) -> Callable[[], object]:
+    engine = Engine(_program(text), ROBOT, {}, World())
+    mirror, now, version = Mirror(engine), [0.0], [0]
 
     def run() -> None:
         for _ in range(TICKS):
             engine.tick(now[0])
             now[0] += 1.0
+            if is_watched:
+                version[0] = mirror.look(version[0])["version"]
 
     return run
 
 
-def _py_trees(leaves: Callable[[Any], list[Any]]) -> Callable[[], object] | None:
+def _py_trees(leaves: Callable[[Any], list[Any]], *, is_parallel: bool = False) -> Callable[[], object] | None:
     if not find_spec("py_trees"):
         return None
     py_trees: Any = importlib.import_module("py_trees")
     root = py_trees.composites.Sequence("all", memory=False)
+    if is_parallel:
+        root = py_trees.composites.Parallel("all", py_trees.common.ParallelPolicy.SuccessOnAll(synchronise=False))
     root.add_children(leaves(py_trees))
     tree = py_trees.trees.BehaviourTree(root)  # without visitors: each node keeps its status, as ours do
 
@@ -134,6 +181,14 @@ def _py_trees(leaves: Callable[[Any], list[Any]]) -> Callable[[], object] | None
             tree.tick()
 
     return run
+
+
+def _lists(py_trees: Any) -> list[Any]:
+    lists = []
+    for branch in range(BRANCHES):
+        lists.append(py_trees.composites.Sequence(f"list {branch}", memory=False))
+        lists[-1].add_children([py_trees.behaviours.Success(f"step {number}") for number in range(STEPS)])
+    return lists
 
 
 def _successes(py_trees: Any) -> list[Any]:

@@ -4,32 +4,40 @@ from __future__ import annotations
 
 import json
 import os
+import signal
+import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
-from benchmarks.measuring import BARE, COMMAND, ROOT, Row, Samples, in_turns, memory_of, program
+from benchmarks.measuring import BARE, COMMAND, ROOT, Row, Samples, in_turns, memory_of, program, tree
+from benchmarks.peers import ROS_PYTHON, Ros, free_port, missing
 from rbxcompose.compiler import compile_robot
+from rbxcompose.diagnostics.levels import Level
 from rbxcompose.testing import run_robot
 
 ROBOT = str(ROOT / "robots/turtlebot/robot.yaml")
-STARTS = 5
+STARTS = 3
+ANSWERS = 5  # of each command, at each start
+KILLED = "mission"  # a process that can come back
 
 
 def rows() -> list[Row]:
     """Return the figures of the running robot."""
-    times, memory = [], 0.0
+    times, memory, stale = [], 0.0, []
+    answers: dict[str, list[float]] = {}
     with TemporaryDirectory() as folder:
         environment = {"XDG_RUNTIME_DIR": folder}
         for _ in range(STARTS):
             started = time.perf_counter()
-            with _up(environment):
+            with up(ROBOT, environment):
                 times.append(time.perf_counter() - started)
-                ask = program([*COMMAND, "ps", "--json"], environment)
-                answers, bare = in_turns(ask, program(BARE), rounds=5, clock=time.perf_counter)
-                memory = max(memory, _memory(environment, Path(folder)))
+                _answers(environment, answers)
+                memory = max(memory, sum(map(memory_of, tree(supervisor(environment)))))
+                stale.append(_until_stale(environment))
     starts = Samples(tuple(times))
     return [
         Row(
@@ -47,41 +55,92 @@ def rows() -> list[Row]:
             most=150,
         ),
         Row(
-            name="`ps` of that robot",
+            name="a process that was killed is shown as STALE, with the cause",
             unit="ms",
-            how="from start to exit",
-            ours=answers.median * 1e3,
-            p99=answers.p99 * 1e3,
-            peer=bare.median * 1e3,
-            against="python -c pass",
+            how=f"`kill -9` of `{KILLED}`, until the report of `/diagnostics_agg` that tells it",
+            ours=Samples(tuple(stale)).median * 1e3,
+            p99=Samples(tuple(stale)).p99 * 1e3,
+            most=1000,
         ),
+        *_commands({name: Samples(tuple(found)) for name, found in answers.items()}),
         _stepped(),
     ]
 
 
 @contextmanager
-def _up(environment: dict[str, str]) -> Iterator[None]:
+def up(robot: str, environment: dict[str, str]) -> Iterator[None]:
+    """Have a robot up."""
     try:
-        program([*COMMAND, "up", "-d", ROBOT], environment)()
+        program([*COMMAND, "up", "-d", robot], environment)()
         yield
     finally:
         program([*COMMAND, "down"], environment)()
 
 
-def _memory(environment: dict[str, str], folder: Path) -> float:
-    answer = json.loads(str(program([*COMMAND, "ps", "--json"], environment)()))
-    root = answer["supervisor"]["pid"]
-    return sum(memory_of(pid) for pid in [root, *_below(root)])
+def supervisor(environment: dict[str, str]) -> int:
+    """Return the process that is above all others of the robot that is up."""
+    return int(_ps(environment)["supervisor"]["pid"])
 
 
-def _below(pid: int) -> list[int]:
-    """Return the processes that a process has started, and theirs."""
-    children = [
-        int(child)
-        for task in os.listdir(f"/proc/{pid}/task")
-        for child in Path(f"/proc/{pid}/task/{task}/children").read_text(encoding="utf-8").split()
+def _ps(environment: dict[str, str]) -> Any:
+    return json.loads(str(program([*COMMAND, "ps", "--json"], environment)()))
+
+
+def _answers(environment: dict[str, str], answers: dict[str, list[float]]) -> None:
+    jobs = {
+        "ps": program([*COMMAND, "ps", "--json"], environment),
+        "topic ls": program([*COMMAND, "topic", "ls"], environment),
+        BARE[0]: program(BARE),
+    }
+    with TemporaryDirectory() as folder:
+        ros = Ros(Path(folder), free_port())
+        if Ros.is_here():
+            jobs["rostopic list"] = program([ROS_PYTHON, "/usr/bin/rostopic", "list"], ros.environment)
+            with ros.master():
+                found = in_turns(*jobs.values(), rounds=ANSWERS, clock=time.perf_counter)
+        else:
+            found = in_turns(*jobs.values(), rounds=ANSWERS, clock=time.perf_counter)
+    for name, samples in zip(jobs, found, strict=True):
+        answers.setdefault(name, []).extend(samples.values)
+
+
+def _commands(answers: dict[str, Samples]) -> list[Row]:
+    bare, ros = answers[BARE[0]], answers.get("rostopic list")
+    against = [(bare, "python -c pass", None), *([(ros, "rostopic list", 1.0)] if ros is not None else [])]
+    return [
+        Row(
+            name=f"`{command}` of that robot",
+            unit="ms",
+            how=f"from start to exit{missing() if ros is None else ''}",
+            ours=answers[command].median * 1e3,
+            p99=answers[command].p99 * 1e3,
+            peer=peer.median * 1e3,
+            against=name,
+            most_ratio=most,
+        )
+        for command in ("ps", "topic ls")
+        for peer, name, most in against
     ]
-    return [found for child in children for found in [child, *_below(child)]]
+
+
+def _until_stale(environment: dict[str, str]) -> float:
+    """Kill a process and return the time until diagnostics have told of it [s], by the clocks of one machine."""
+    pid = next(one["pid"] for one in _ps(environment)["components"] if one["process"] == KILLED)
+    whole = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
+    command = [*COMMAND, "topic", "echo", "/diagnostics_agg", "--json"]
+    with subprocess.Popen(command, env=whole, cwd=ROOT, stdout=subprocess.PIPE, text=True) as echo:
+        reports = (json.loads(line) for line in echo.stdout or ())
+        next(reports)  # it listens
+        killed = time.time()
+        os.kill(pid, signal.SIGKILL)
+        report = next(one for one in reports if any(map(_is_told, one["status"])))
+        echo.kill()
+    stamp = report["header"]["stamp"]
+    return float(stamp["sec"] + stamp["nanosec"] * 1e-9 - killed)
+
+
+def _is_told(status: Any) -> bool:
+    return status["level"] == Level.STALE and status["name"].endswith(KILLED) and "SIGKILL" in status["message"]
 
 
 def _stepped() -> Row:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
-import resource
 import statistics
 import subprocess
 import sys
@@ -104,7 +104,9 @@ def program(command: Sequence[str], environment: dict[str, str] | None = None) -
     Raises:
         CalledProcessError: if it fails.
     """
-    whole = {**os.environ, **(environment or {}), "PYTHONPATH": str(ROOT)}
+    # Bytecode is kept, as it is where something is installed, whatever this shell says.
+    own = {"PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": ""}
+    whole = {**os.environ, **own, **(environment or {})}
 
     def run() -> object:
         done = subprocess.run(command, capture_output=True, text=True, env=whole, cwd=ROOT)
@@ -123,6 +125,21 @@ def memory_of(pid: int) -> int:
     return 0
 
 
-def resident() -> int:
-    """Return the most memory that this process has had [bytes]."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+def tree(pid: int) -> list[int]:
+    """Return a process, those that it has started, and theirs."""
+    children: list[int] = []
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        with contextlib.suppress(FileNotFoundError):  # a thread that has ended meanwhile
+            children += map(int, (task / "children").read_text(encoding="ascii").split())
+    return [pid, *(found for child in children for found in tree(child))]
+
+
+def processor_time(pid: int) -> float:
+    """Return the time that a process has had a processor, all of its threads together [s]."""
+    fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def memory_now() -> int:
+    """Return the memory that this process has at present [bytes]."""
+    return int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1]) * os.sysconf("SC_PAGE_SIZE")

@@ -29,7 +29,8 @@ hold where times do not: these differ from machine to machine by a factor of two
 
 {table}
 
-Measured on {machine}.
+Measured on {machine}; load of other work when it began: {load:.1f}. The rows of ROS 1 and dora are there where these
+are installed.
 """
 
 
@@ -69,7 +70,7 @@ def page(results: dict[str, Any]) -> str:
         ours = f"{_figure(row['ours'])} {row['unit']}".strip()
         cells = [row["name"], ours, _figure(row["p99"]), peer, ratio, row["bar"], met, row["how"]]
         lines.append(f"| {' | '.join(cells)} |")
-    return ABOUT.format(table="\n".join(lines), machine=results["machine"])
+    return ABOUT.format(table="\n".join(lines), machine=results["machine"], load=results["load"])
 
 
 def _figure(value: float | None) -> str:
@@ -84,6 +85,7 @@ def main(arguments: list[str]) -> None:
         module = importlib.import_module(f"benchmarks.{arguments[1]}")
         sys.stdout.write(json.dumps([as_data(row, arguments[1]) for row in module.rows()]))
         return
+    load = os.getloadavg()[0]
     known = json.loads(RESULTS.read_text(encoding="utf-8"))["rows"] if arguments and RESULTS.exists() else []
     rows = {name: [row for row in known if row["subject"] == name] for name in subjects()}
     for name in arguments or subjects():
@@ -91,7 +93,7 @@ def main(arguments: list[str]) -> None:
         for row in rows[name]:
             sys.stderr.write(f"{row['name']}: {_figure(row['ours'])} {row['unit']}  [{row['bar']}] met: {row['met']}\n")
     machine = f"{os.cpu_count()} cores, Python {platform.python_version()}, {platform.system()} {platform.machine()}"
-    results = {"machine": machine, "rows": [row for name in rows for row in rows[name]]}
+    results = {"machine": machine, "load": load, "rows": [row for name in rows for row in rows[name]]}
     RESULTS.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     PAGE.write_text(page(results), encoding="utf-8")
 
