@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from docs.generating import commands, components, expressions, findings, missions, robot
+from docs.generating import commands, components, expressions, findings, missions, robot, sdk
 
 DOCS = Path(__file__).parent
 FOLDERS = ("findings", "reference")  # in them is nothing else
@@ -21,6 +21,7 @@ def pages() -> dict[str, str]:
         "missions": missions.whole_page(),
         "expressions": expressions.whole_page(),
         "commands": commands.whole_page(),
+        "sdk": sdk.whole_page(),
     }
     return {
         **{f"findings/{name}": text for name, text in findings.pages().items()},

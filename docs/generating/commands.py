@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 
 from docs.generating.markdown import code, page, table
-from rbxcompose.cli.main import load, verbs
+from rbxcompose.cli.main import load, parser_of, verbs
 
 
 def whole_page() -> str:
@@ -17,10 +17,7 @@ def whole_page() -> str:
 def parsers() -> Iterator[argparse.ArgumentParser]:
     """Give the parser of each verb, as the command line makes it."""
     for name in verbs():
-        verb = load(name)
-        parser = argparse.ArgumentParser(f"rbxcompose {name}", description=verb.__doc__ or "", allow_abbrev=False)
-        verb.add_arguments(parser)
-        yield parser
+        yield parser_of(name, load(name))
 
 
 def of_command(parser: argparse.ArgumentParser, level: int, about: str = "") -> str:

@@ -8,6 +8,7 @@ from typing import Any
 from docs.generating.markdown import about, code, example, example_of, indented, page, table
 from docs.generating.shapes import keys_table
 from rbxcompose.config import Place
+from rbxcompose.manifest.models import ComponentOptions
 from rbxcompose.missions.goals import skill_of
 from rbxcompose.qos import Qos
 from rbxcompose.schema.components import examples_of
@@ -18,6 +19,7 @@ from rbxcompose.sdk.registry import PLUGINS, component_type
 MADE_OF_SECTIONS: Mapping[str, str] = {
     "diagnostics": "Every robot runs one; its groups are those of the section `diagnostics`.",
     "mission": "A robot with missions runs one.",
+    "robot_description": "A robot with a `body` runs one.",
     "mux": "There is one for each entry of the section `muxes`.",
     "transforms": "Every robot runs one.",
 }
@@ -81,7 +83,8 @@ def ports_of(name: str) -> dict[str, Port[Any]]:
     """Return the ports of a type, those that depend on the configuration as its example has them."""
     cls = component_type(name)
     [written] = examples_of(name)
-    settings = {key: value for key, value in dict(written).items() if key != "type"}  # type: ignore[call-overload]
+    options = {"type", *ComponentOptions.model_fields}
+    settings = {key: value for key, value in dict(written).items() if key not in options}  # type: ignore[call-overload]
     config = cls.config_type().model_validate(settings, context={"places": {"dock": Place("dock", 0, 0, 0)}})
     return cls.ports(config)
 

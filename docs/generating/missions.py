@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from docs.generating.components import ports_of
 from docs.generating.markdown import about, code, example, example_of, lowered, page, table
@@ -11,9 +11,12 @@ from rbxcompose.expressions.text import Template
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.manifest.arguments import ArgumentModel
+from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions.goals import skill_of
-from rbxcompose.missions.modifiers import MODIFIERS
-from rbxcompose.missions.program import Assignment
+from rbxcompose.missions.messages import Message
+from rbxcompose.missions.modifiers.registry import modifiers
+from rbxcompose.missions.moments import Moments
+from rbxcompose.missions.program import Asked, Assignment
 from rbxcompose.missions.reading import INTERRUPT_KEYS
 from rbxcompose.missions.registry import Kind, kinds
 from rbxcompose.schema.asking import Asking, first_line
@@ -42,15 +45,56 @@ class Told(Asking):
         super().__init__(key)
         self.words: dict[str, str] = {}
 
+    def scalar(self, key: str, what: str) -> Scalar | None:
+        """Note a word."""
+        self.words[key] = what
+        return super().scalar(key, what)
+
     def expression(self, key: str, wanted: Type, what: str) -> Expression:
         """Note what is asked for."""
         self.words[key] = "a value" if wanted == UNKNOWN else what
         return super().expression(key, wanted, what)
 
-    def count_or_forever(self, key: str) -> Expression | None:
-        """Note a number."""
-        self.words[key] = "a whole number or `forever`"
-        return super().count_or_forever(key)
+    def count_or(self, key: str, words: tuple[str, ...]) -> Expression | str:
+        """Note a number or words."""
+        self.words[key] = " or ".join(["a whole number", *map(code, words)])
+        return super().count_or(key, words)
+
+    def map_of(self, key: str, what: str) -> None:
+        """Note a map."""
+        self.words[key] = what
+        super().map_of(key, what)
+
+    def branch(self, key: str, branches: tuple[str, ...]) -> str:
+        """Note a name."""
+        self.words[key] = "the name of a branch"
+        return super().branch(key, branches)
+
+    def name(self, key: str, what: str) -> Scalar:
+        """Note a name."""
+        self.words[key] = what
+        return super().name(key, what)
+
+    def branches(self) -> tuple[str, ...]:
+        """Note nodes."""
+        self.words[self.key] = "a list of nodes, or a map from names to nodes"
+        return super().branches()
+
+    def cases(self, key: str) -> tuple[Asked, ...]:
+        """Note a map."""
+        self.words[key] = "a map from values to nodes"
+        return super().cases(key)
+
+    def message(self, target: str, body: str) -> Message:
+        """Note a name and what is sent."""
+        self.words[target], self.words[body] = "its name", "a map of fields, or the value of the only one"
+        return super().message(target, body)
+
+    def moments(self, keys: Iterable[str]) -> Moments:
+        """Note hooks."""
+        told = list(keys)
+        self.words.update(dict.fromkeys(told, "`set`, `log` or `publish`"))
+        return super().moments(told)
 
     def flag(self, key: str) -> bool:
         """Note a flag."""
@@ -87,10 +131,10 @@ class Told(Asking):
         self.words[key] = "a list, or an expression"
         return super().items(key)
 
-    def assignments(self) -> tuple[Assignment, ...]:
+    def assignments(self, key: str) -> tuple[Assignment, ...]:
         """Note a map."""
-        self.words[self.key] = "a map from data to values"
-        return super().assignments()
+        self.words[key] = "a map from data to values"
+        return super().assignments(key)
 
 
 def whole_page() -> str:
@@ -104,8 +148,9 @@ def whole_page() -> str:
         f"### An interrupt\n{described({key: interrupt[key] for key in INTERRUPT_KEYS}, ['when'])}",
         NODES,
         *(of_kind(kind) for kind in kinds().values()),
+        f"### States of a machine\n{described(schema['definitions']['state']['properties'], [])}",
         ORDER,
-        *(of_modifier(name) for name in MODIFIERS),
+        *(of_modifier(name) for name in modifiers()),
         SKILLS + table(("skill", "arguments", "component", "action"), skills()),
     )
 
@@ -137,15 +182,16 @@ def takes(told: Told, key: str) -> str:
 
 def of_modifier(name: str) -> str:
     """Return what is known of a modifier."""
-    told = Told(name)
-    MODIFIERS[name].read(told, name)
-    words = f"### {code(name)}\n{about(MODIFIERS[name])} It takes {told.words[name]}.\n"
-    return "\n".join([words, example(example_of(MODIFIERS[name]), "yaml mission")])
+    told, cls = Told(name), modifiers()[name]
+    cls.read(told, name)
+    words = f"### {code(name)}\n{about(cls)} It takes {told.words[name]}.\n"
+    others = [(code(key), told.words[key], meaning) for key, meaning in cls.keys.items()]
+    return "\n".join([words, *([table(_HEAD, others)] if others else []), example(example_of(cls), "yaml mission")])
 
 
 def skills() -> list[tuple[str, ...]]:
     """Return the row of each skill that ships."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name in sorted(PLUGINS.shipped):
         for port in ports_of(name).values():
             if isinstance(port, ServesAction) and port.interface:

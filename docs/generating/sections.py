@@ -26,6 +26,10 @@ include:
       set_battery_level: lift/set_battery_level
       recharge: recharge_lift
 """,
+    "body": """
+body:
+  urdf: robot.urdf                # beside this file, or a path from here
+""",
     "components": """
 components:
   base:

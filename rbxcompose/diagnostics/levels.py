@@ -15,6 +15,15 @@ class Level(IntEnum):
     STALE = 3
 
 
+LOG_LEVELS = {"info": Level.OK, "warn": Level.WARN, "error": Level.ERROR}
+"""Levels of lines of the log, by the words that people write for them."""
+
+
+def log_word(level: Level) -> str:
+    """Return the word that people write for a level of the log."""
+    return next((word for word, known in LOG_LEVELS.items() if known is level), level.name.lower())
+
+
 def level_of(number: int) -> Level:
     """Return the level of a number on the wire; a number that means no level is an ERROR."""
     return Level(number) if Level.OK <= number <= Level.STALE else Level.ERROR

@@ -14,12 +14,14 @@ ROBOT = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
 PATROL = (ROOT / "missions/patrol.yaml").read_text(encoding="utf-8")
 HEADER = "rbx: 1\nkind: Mission\nname: example\n"
 EXAMPLE = f"{HEADER}do: recharge\n"
+URDF = '<robot name="example"/>\n'
 
-WALKED_THROUGH = "tutorial.md"  # its manifests build on each other; a test of its own follows them
+WALKED_THROUGH = ("tutorial.md", "sdk.md")  # their manifests need each other, or a package; tests of their own follow
 
 _FENCE = re.compile(r"^```(?P<info>[^\n`]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 _SECTION = re.compile(r"^(?=[^\s#])", re.MULTILINE)
 _ENTRY = re.compile(r"^(?=  [^\s#])", re.MULTILINE)
+_WORK = re.compile(r"^(do|machine):", re.MULTILINE)
 _MISSION_FILE = re.compile(r"(?:\.\./)*missions/")  # however far above the robot's file a page sees it
 _NAMED_MISSION = re.compile(r"\.\./\.\./missions/\w+\.yaml")
 
@@ -51,13 +53,18 @@ def blocks_of(text: str, page: str) -> Iterator[Block]:
         yield Block(page, text.count("\n", 0, match.start()) + 1, tuple(match["info"].split()), match["text"])
 
 
-def page_blocks(language: str) -> list[Block]:
-    """Return the blocks of one language in all pages but those of findings."""
+def page_blocks(language: str, trials: bool = False) -> list[Block]:
+    """Return the blocks of one language in all pages but those of findings: tests of missions, or all others."""
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
     pages += sorted((ROOT / "docs/reference").glob("*.md"))
     found = (block for page in pages for block in blocks_of(page.read_text(encoding="utf-8"), page.name))
-    known = (block for block in found if (block.page, block.language) != (WALKED_THROUGH, "yaml"))
-    return [block for block in known if block.language == language]
+    known = (block for block in found if block.language != "yaml" or not is_walked_through(block))
+    return [block for block in known if block.language == language and ("test" in block.words) == trials]
+
+
+def is_walked_through(block: Block) -> bool:
+    """Tell whether a manifest is part of a walk: its page is one, or the block names the file that it goes into."""
+    return block.page in WALKED_THROUGH or any("/" in word for word in block.words[1:])
 
 
 def checked(block: Block, folder: Path) -> Checked:
@@ -93,7 +100,7 @@ def check_overlay(text: str, folder: Path) -> Checked:
 
 def check_mission(text: str, folder: Path) -> Checked:
     """Compile the patrol robot with one more mission; one that does not say what to do recharges."""
-    whole = text if "\ndo:" in text else f"{text}do: recharge\n"
+    whole = text if _WORK.search(text) else f"{text}do: recharge\n"
     robot = with_sections(ROBOT, "missions:\n  example: ../../missions/example.yaml\n")
     return check_robot(robot, folder, example=whole)
 
@@ -109,7 +116,7 @@ def check_robot(
 ) -> Checked:
     robot = _MISSION_FILE.sub("../../missions/", text)
     others = dict.fromkeys(_NAMED_MISSION.findall(robot), example)  # a page shows a robot before its mission
-    others |= {"../../missions/patrol.yaml": PATROL, "../../missions/example.yaml": example}
+    others |= {"robot.urdf": URDF, "../../missions/patrol.yaml": PATROL, "../../missions/example.yaml": example}
     home = folder / "robots" / "example"
     return check_text(robot, home, others=others, profiles=profiles, overlays=overlays, real=real, environment={})
 

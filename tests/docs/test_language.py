@@ -28,8 +28,9 @@ from rbxcompose.manifest.models import (
     Value,
 )
 from rbxcompose.missions.header import INPUT_KEYS
-from rbxcompose.missions.modifiers import MODIFIERS
-from rbxcompose.missions.reading import AFTERWARDS, INTERRUPT_KEYS, KEYS
+from rbxcompose.missions.modifiers.registry import modifiers
+from rbxcompose.missions.program import AFTERWARDS
+from rbxcompose.missions.reading import INTERRUPT_KEYS, KEYS
 from rbxcompose.missions.registry import kinds
 from rbxcompose.sdk.registry import PLUGINS, component_type
 from rbxcompose.units import UNITS
@@ -79,7 +80,7 @@ def test_it_has_every_kind_of_node_with_its_options(name: str) -> None:
 
 def test_it_has_the_modifiers_in_their_order() -> None:
     first = [cells[0].strip("`") for cells in ROWS]
-    places = [first.index(name) for name in MODIFIERS]
+    places = [first.index(name) for name in modifiers()]
     assert places == sorted(places)
 
 

@@ -23,6 +23,7 @@ BASE = {
     "plain",
     "plugins",
     "qos",
+    "replacing",
     "restarts",
     "scheduler",
 }
@@ -33,15 +34,26 @@ MAY_IMPORT: dict[str, set[str]] = {
     "missions": BASE | {"missions", "manifest.tree", "manifest.scalars", "diagnostics.levels"},
     "sim": BASE | {"sim", "diagnostics.levels"},
     "sdk": BASE | {"sdk", "diagnostics.levels"},
-    "components": BASE | CORES | {"sdk"},
+    "skills": BASE | {"sdk"},
+    "executive": BASE | CORES | {"executive", "sdk"},
+    "components": BASE | CORES | {"executive", "sdk"},
     "bus": BASE | {"bus", "sdk.bound"},
     "manifest": BASE | {"manifest", "sdk"},
-    "recording": BASE | {"recording", "bus.classes", "bus.names", "bus.tokens"},
+    "recording": BASE
+    | {
+        "recording",
+        "bus.attachment",
+        "bus.classes",
+        "bus.names",
+        "bus.tokens",
+        "bus.transport",
+        "bus.witness",
+    },
     "rendering": BASE | {"rendering"},
     "model": BASE | CORES | {"model", "manifest", "sdk"},
     "checking": BASE | {"model"},
     "checks": BASE | CORES | {"checks", "checking", "model", "manifest", "sdk"},
-    "plan": BASE | CORES | {"plan", "model", "manifest.tree", "sdk"},
+    "plan": BASE | CORES | {"plan", "model", "manifest.shapes", "manifest.tree", "manifest.validate", "sdk"},
     "scaffold": BASE | {"missions", "scaffold", "manifest.files", "sdk"},
     "seeing": BASE | CORES | {"seeing", "plan", "model", "manifest", "schema", "sdk", "bus.names", "bus.wire"},
     "schema": BASE | {"missions", "schema", "manifest", "sdk"},
@@ -81,7 +93,19 @@ def test_a_module_imports_only_from_the_layers_below_it(path: Path) -> None:
 
 
 def test_every_part_has_its_place() -> None:
-    upper = {"compiler", "pages", "runtime", "cli", "lsp", "testing", "__init__", "__main__"}
+    upper = {
+        "compiler",
+        "doctor",
+        "pages",
+        "rerun",
+        "runtime",
+        "cli",
+        "lsp",
+        "testing",
+        "trials",
+        "__init__",
+        "__main__",
+    }
     parts = {path.name.removesuffix(".py") for path in PACKAGE.iterdir() if path.suffix == ".py" or path.is_dir()}
     parts -= {"__pycache__", "py.typed"}
     assert parts - set(MAY_IMPORT) - upper == set()

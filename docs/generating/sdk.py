@@ -1,0 +1,45 @@
+"""The page of the SDK: all that the author of a component imports, with the first line of each docstring."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any
+
+from docs.generating.markdown import code, page, table
+from rbxcompose import sdk
+from rbxcompose.sdk import Component, Port
+
+HEAD = """All that the author of a component imports, from `rbxcompose.sdk`. How it is used is told in
+[a component of your own](../sdk.md).
+"""
+
+
+def whole_page() -> str:
+    """Return the page `sdk.md`."""
+    things: dict[str, Any] = {name: getattr(sdk, name) for name in sdk.__all__}
+    ports = {name: one for name, one in things.items() if isinstance(one, type) and issubclass(one, Port)}
+    methods = {name: one for name, one in vars(Component).items() if _is_method(name, one)}
+    others = {name: one for name, one in things.items() if name not in ports and _has_docstring(one)}
+    fields = ", ".join(code(name) for name in things if name not in ports and name not in others)
+    return page(
+        "The SDK",
+        HEAD,
+        _section("Ports", ports),
+        _section("Methods of a component", methods),
+        _section("The rest", others),
+        f"## Types of fields\n{fields}; besides them, all that pydantic knows.\n",
+    )
+
+
+def _has_docstring(thing: object) -> bool:
+    return inspect.isclass(thing) or inspect.isfunction(thing)  # the others are types with an annotation
+
+
+def _is_method(name: str, thing: object) -> bool:
+    return inspect.isfunction(thing) and not name.startswith("_")
+
+
+def _section(title: str, things: Mapping[str, object]) -> str:
+    rows = [(code(name), (inspect.getdoc(one) or "").partition("\n")[0]) for name, one in things.items()]
+    return f"## {title}\n{table(('name', 'what it is'), rows)}"
