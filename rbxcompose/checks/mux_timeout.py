@@ -16,7 +16,8 @@ def mux_timeout(robot: Robot) -> Iterator[Finding]:
     """A mux gives up an input between two of its messages
 
     An input is live until its `timeout` has passed since its last message. Where the source sends less often than that,
-    the mux lets go of it after each message: the robot jerks, or a source of a lower priority drives in between.
+    the mux lets go of it after each message: the robot jerks, or a source of a lower priority drives in between. With
+    less than two periods, one message that is late or lost is enough for that.
 
     Bad:
     ```yaml
@@ -43,10 +44,11 @@ def mux_timeout(robot: Robot) -> Iterator[Finding]:
         for name, source in entry.inputs.items():
             part = robot.parts.get((source.source or "").partition(".")[0])
             period = period_of(part) if part else None
-            if part and period is not None and source.timeout <= period:
+            if part and period is not None and source.timeout < 2 * period - 1e-9:
+                when = "before" if source.timeout <= period else "when one message is late before"
                 yield mux_timeout.at(
                     robot.value("muxes", mux, "inputs", name, "timeout"),
-                    f"input '{name}' of mux '{mux}' times out before '{part.name}' sends its next message",
+                    f"input '{name}' of mux '{mux}' times out {when} '{part.name}' sends its next message",
                     label=f"it sends every {format_quantity(period, TIME)}",
                     help=f"make it several times as long: '{format_quantity(10 * period, TIME)}'",
                     related=[Related(robot.part_span(part.name), "the source")],

@@ -73,7 +73,8 @@ def test_a_sentence_is_one_line_that_a_manifest_may_hold(text: str) -> None:
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
-    st.text(min_size=1, max_size=30) | st.sampled_from(["a: b", "$", "# x", "$x ${y}", "it's", '"', "true", "- a", "\\n"])
+    st.text(min_size=1, max_size=30)
+    | st.sampled_from(["a: b", "$", "# x", "$x ${y}", "it's", '"', "true", "- a", "\\n"])
 )
 def test_every_sentence_comes_out_of_the_robot_as_it_went_in(tmp_path: Path, text: str) -> None:
     try:
