@@ -82,6 +82,11 @@ def supervisor(environment: dict[str, str]) -> int:
     return int(_ps(environment)["supervisor"]["pid"])
 
 
+def process_of(component: str, environment: dict[str, str]) -> int:
+    """Return the process in which a component of the robot that is up runs."""
+    return next(int(one["pid"]) for one in _ps(environment)["components"] if one["name"] == component)
+
+
 def _ps(environment: dict[str, str]) -> Any:
     return json.loads(str(program([*COMMAND, "ps", "--json"], environment)()))
 

@@ -86,6 +86,7 @@ class ActionClient(Generic[G, R, F]):
         self._feedback = Subscription(
             topics, node, names.feedback, action.FeedbackMessage, Qos.STATE, self._on_feedback
         )
+        self._feedback.is_wanted = lambda: bool(self._listeners)  # many clients never ask for it
         self._send: Client[Any, Any] = Client(services, node, names.send_goal, action.SendGoal)
         self._cancel = Client(services, node, names.cancel_goal, CancelGoal)
         self._result: Client[Any, Any] = Client(services, node, names.get_result, action.GetResult)

@@ -103,6 +103,7 @@ class Subscription(Generic[M]):
         self.value: M | None = None
         self.source: Attachment | None = None  # of the newest message
         self.refusals = Refusals()
+        self.is_wanted: Callable[[], bool] = lambda: True  # else what arrives from other processes is left alone
         self._topics, self._process, self._owner, self._qos = topics, node.process, node.owner, qos
         self._message, self._handler = message, handler
         rate = max_rate or most_per_second(qos)
@@ -151,6 +152,8 @@ class Subscription(Generic[M]):
 
     def _arrive(self, arrival: Arrival) -> None:
         # In a thread of the transport: the age counts from here, however busy the scheduler is.
+        if not self.is_wanted():
+            return
         now = self._process.clock.now()
         if self._allowances is None or self._is_allowed(self._allowances, arrival, now):
             self._inbox.put((now, arrival), self._process.transport.wake)
