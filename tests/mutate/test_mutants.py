@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -34,13 +35,11 @@ def keep(found: Found) -> None:
 def test_a_mutant_is_refused_with_a_place_or_is_a_robot(soak: Soak) -> None:
     count = soak.examples(QUICK, MANY)
     found = Found()
-    if soak.is_on:
-        cores = os.cpu_count() or 1
-        with ProcessPoolExecutor(cores) as pool:
-            for part in pool.map(try_seeds, [range(first, count, cores) for first in range(cores)]):
-                found.add(part)
-    else:
-        found = try_seeds(range(count))
+    cores = os.cpu_count() or 1
+    # Processes that are made anew: this one may have threads, with which it must not fork.
+    with ProcessPoolExecutor(cores, mp_context=get_context("spawn")) as pool:
+        for part in pool.map(try_seeds, [range(first, count, cores) for first in range(cores)]):
+            found.add(part)
     keep(found)
     soak.tell(
         "mutants of manifests", found.examples, len(found.failures), f"{found.refused:,} refused, the rest robots"
