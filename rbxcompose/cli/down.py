@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 
 from rbxcompose.cli.common.robots import NO_ANSWER, NotDoneError, add_robot_option, find_robot, known_state
 from rbxcompose.cli.common.telling import refuse, tell
@@ -19,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file")
     add_robot_option(parser)
+    parser.add_argument("--json", action="store_true", help="answer in JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -28,6 +30,9 @@ def run(arguments: argparse.Namespace) -> int:
         told = _end(folder)
     except NotDoneError as error:
         return refuse(error.finding)
+    if arguments.json:
+        tell(json.dumps({"robot": folder.path.name, "told": told}))
+        return 0
     for text in told:
         tell(text)
     tell(f"{folder.path.name} is down")

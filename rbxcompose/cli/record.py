@@ -7,6 +7,7 @@ read them. A recorder that is killed loses at most half a second: its file is re
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import re
 from datetime import datetime
@@ -14,7 +15,7 @@ from pathlib import Path
 
 from rbxcompose.cli.common.bus_place import BusPlace, add_bus_options, find_place
 from rbxcompose.cli.common.guest import Guest
-from rbxcompose.cli.common.nouns import seconds
+from rbxcompose.cli.common.nouns import add_json_option, seconds
 from rbxcompose.cli.common.recording_bus import Tap
 from rbxcompose.cli.common.recordings import (
     add_selection_options,
@@ -39,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_bus_options(parser)
     add_selection_options(parser)
+    add_json_option(parser)
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="the file, else ROBOT-DATE-TIME.mcap")
     parser.add_argument("--for", type=seconds, dest="duration", metavar="30s", help="end after this time")
     parser.add_argument(
@@ -66,12 +68,13 @@ def _record(arguments: argparse.Namespace, place: BusPlace, path: Path) -> int:
         except OSError as error:
             return refuse(UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {_reason(error)}"))
         tap = Tap(guest, selection_of(arguments))
-        tell(f"recording to {recorder.paths[0]}; Ctrl-C ends it")
+        if not arguments.json:
+            tell(f"recording to {recorder.paths[0]}; Ctrl-C ends it")
         end = math.inf if arguments.duration is None else start + arguments.duration
-        return _write(recorder, tap, guest, end)
+        return _write(recorder, tap, guest, end, is_json=arguments.json)
 
 
-def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float) -> int:
+def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: bool) -> int:
     try:
         while not guest.is_interrupted and guest.clock.now() < end:
             guest.run(lambda: guest.is_interrupted, _PAUSE)
@@ -84,8 +87,19 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float) -> int:
         return refuse(UNWRITABLE.at(None, f"'{plain(str(recorder.paths[-1]))}' cannot be written: {_reason(error)}"))
     if tap.lost:
         warn(LOST.at(None, f"{tap.lost:,} messages came too fast to be recorded", help="choose fewer with '--topics'"))
+    counts = recorder.counts
+    if is_json:
+        tell(
+            json.dumps(
+                {
+                    "files": [str(path) for path in recorder.paths],
+                    "messages": {topic.name: number for topic, number in counts.items()},
+                }
+            )
+        )
+        return 0
     paths = ", ".join(map(str, recorder.paths))
-    tell(f"{count_table(recorder.counts)}\nrecorded {recorder.counts.total():,} messages to {paths}")
+    tell(f"{count_table(counts)}\nrecorded {counts.total():,} messages to {paths}")
     return 0
 
 

@@ -123,8 +123,8 @@ def test_up_ps_down(robot: Robot) -> None:
         ("first", "active", 0),
         ("second", "active", 0),
     ]
-    done = robot.do("down")
-    assert (done.returncode, done.stdout) == (0, f"{robot.name} is down\n")
+    done = robot.do("down", "--json")
+    assert (done.returncode, json.loads(done.stdout)) == (0, {"robot": robot.name, "told": []})
     assert robot.do("ps").returncode == 1
     assert robot.last_words("first") == ["braking", "deactivated"]
 
