@@ -5,6 +5,7 @@ time [s], velocities [m/s] and [rad/s].
 
 - Unwarranted motion: the base moves only by a live command. After the last one it may follow it for its timeout and two
   cycles, and then brakes: `v(t) <= v_max - a (t - deadline)`. A stop ends every command that was sent before a release.
+  The time in which the base's process hung meanwhile does not count.
 - Unheeded stop: between stop and release a mux lets nothing through but rest.
 - Second winner: a mux forwards what one of its inputs has just sent; while that input lives, none of lower priority.
 - Shared claim: of the goals that claim the same part of the robot, one at most is carried out.
@@ -150,7 +151,7 @@ def unwarranted_motion(base: Base, story: Story, slack: float) -> Iterator[Viola
     """Yield where a base moved faster than it can, at the latest, have braked to."""
     force = base.timeout + 2 * base.cycle + slack  # for how long it may follow what was sent
     deadline = commanded = -math.inf  # until when it may follow a command; when the last one was sent
-    is_stopped = False
+    is_stopped, told = False, math.inf  # when it told its motion last
     fastest: Velocity = (0.0, 0.0)
     for event in story:
         match event:
@@ -164,6 +165,9 @@ def unwarranted_motion(base: Base, story: Story, slack: float) -> Iterator[Viola
                 commanded = time
                 deadline = deadline if is_stopped else time + force
             case Sent(time, topic, velocity) if topic == base.motion:
+                if is_stopped:  # a simulated base whose process hung while it braked stood still in time
+                    deadline += min(slack, max(0.0, time - told - 2 * base.cycle))
+                told = time
                 fastest = (max(fastest[0], abs(velocity[0])), max(fastest[1], abs(velocity[1])))
                 late = max(0.0, time - deadline)
                 allowed = [max(0.0, most - rate * late) for most, rate in zip(fastest, base.deceleration, strict=True)]
