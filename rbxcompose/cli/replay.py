@@ -130,9 +130,13 @@ def _replay(arguments: argparse.Namespace, path: Path, summary: Summary) -> int:
     if not topics or arguments.start > summary.duration:
         why = "no topic that was chosen can be replayed" if not topics else f"it lasts {summary.duration:.1f} s"
         return refuse(NOTHING.at(None, f"nothing of '{plain(str(path))}' is replayed: {why}"))
-    with Guest(find_place(arguments), stays=True) as guest, guest.interruptible():
-        if not arguments.over and (finding := _sent_already(guest, topics)):
+    place = find_place(arguments)
+    if not arguments.over:
+        with Guest(place) as looking:  # its router knows all; who stays has to make its own links to them first
+            finding = _sent_already(looking, topics)
+        if finding:
             return refuse(finding)
+    with Guest(place, stays=True) as guest, guest.interruptible():
         player = Player(guest, topics)
         player.wait_for_subscribers()
         tell(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
