@@ -136,10 +136,6 @@ class Engine:
         """Ask for another tick at this instant."""
         self._again = by
 
-    def look_again(self) -> None:
-        """Ask for another tick at this instant, since data have changed."""
-        self._again = self._again or self.tasks[0]
-
     def is_past(self, time: float) -> bool:
         """Tell whether a time of this course [s] has come."""
         return time - self.time <= ROUNDING

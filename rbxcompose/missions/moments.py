@@ -35,7 +35,7 @@ class Deeds:
         if self.assignments:
             computed = {one.name: evaluate(one.asked.expression, task.scope) for one in self.assignments}
             task.run.data.update(computed)
-            task.engine.look_again()
+            task.engine.again(task)
         if self.text:
             task.engine.say(Logged(self.level, task.run.filled(self.text, task.scope)))
         if self.message:

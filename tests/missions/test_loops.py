@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from rbxcompose.findings import Report
 from rbxcompose.geometry import Pose2
+from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.semantics import check_program
 from rbxcompose.missions.world import Settings
-from tests.missions.simulated import Simulated, simulate
+from tests.missions.simulated import ROBOT, Simulated, simulate, tree
 from tests.missions.test_composites import fails, skills
 
 SAY = "do:\n  for: n\n  in: [1, 2, 3]\n{}  do:\n    say: $n\n  save: got\n"
@@ -207,3 +210,12 @@ def test_choose_asks_once() -> None:
     simulated = simulate(text)
     assert simulated.advance(5) == "success"
     assert skills(simulated) == ["0 a", "1 b"]
+
+
+@pytest.mark.parametrize(("given", "items"), [("data: {}", "[1, 2]"), ("inputs: {left: {type: list}}", "$left")])
+def test_what_is_not_in_the_data_cannot_leave_it(given: str, items: str) -> None:
+    report = Report()
+    program = read_program(tree(f"{given}\ndo:\n  for: x\n  in: {items}\n  remove_done: true\n  do: a"), report)
+    assert program is not None
+    report.extend(check_program(program, ROBOT))
+    assert [finding.message for finding in report] == ["'remove_done' needs an 'in' that names data"]
