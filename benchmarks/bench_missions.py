@@ -20,7 +20,7 @@ from rbxcompose.missions.events import MissionEvent
 from rbxcompose.missions.mirror import Mirror
 from rbxcompose.missions.program import Program, RobotNames
 from rbxcompose.missions.reading import read_program
-from rbxcompose.missions.semantics import check_program
+from rbxcompose.missions.checking import check_program
 
 NODES = 1000
 TICKS = 50  # per sample

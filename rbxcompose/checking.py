@@ -1,42 +1,29 @@
-"""Checks: rules about the whole robot, one file each in `checks/`, declared by one decorator.
-
-A check is a function from the robot to findings; its docstring is the docs page of its code.
-"""
+"""Checks: rules about the whole robot, one file each in `checks/`, declared by one decorator."""
 
 from __future__ import annotations
 
-import inspect
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
-from rbxcompose.findings import Finding, Kind, Report, Severity, register_kind
+from rbxcompose.findings import Finding, Report, Severity
+from rbxcompose.missions.checking import check_program
 from rbxcompose.model.robot import Robot
 from rbxcompose.plain import plain
 from rbxcompose.plugins import LEFT_OUT, BrokenPluginError, Plugins
+from rbxcompose.rules import Rule, declared
 
-Rule = Callable[[Robot], Iterable[Finding]]
+Check = Rule[Robot]
+Find = Callable[[Robot], Iterable[Finding]]
 
 PLUGINS = Plugins("check", "rbxcompose.checks")
 OWN = "RBX"  # begins the codes of this project
 _CODE = re.compile(r"[A-Z]+\d+")
 
 
-@dataclass(frozen=True, slots=True)
-class Check(Kind):
-    """A kind of finding together with the rule that finds it."""
-
-    rule: Rule = lambda robot: ()
-
-    def __call__(self, robot: Robot) -> Iterable[Finding]:
-        """Yield what is wrong with `robot`."""
-        return self.rule(robot)
-
-
 CHECKS: dict[str, Check] = {}  # every check that has been imported, by code
 
 
-def check(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False) -> Callable[[Rule], Check]:
+def check(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False) -> Callable[[Find], Check]:
     """Declare a rule under its code.
 
     Codes that begin with `RBX` are those of this project; somebody else's begin with a word of their own (`LAMP01`).
@@ -45,17 +32,13 @@ def check(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = 
         ValueError: if it has no docstring, or its code is taken, malformed or not for others.
     """
 
-    def declare(rule: Rule) -> Check:
+    def declare(find: Find) -> Check:
         if not _CODE.fullmatch(code):
             raise ValueError(f"'{code}' is no code: those are capital letters with digits behind them")
-        if _is_foreign(rule) and code.startswith(OWN):
+        if _is_foreign(find) and code.startswith(OWN):
             raise ValueError(f"the code {code} begins with {OWN}, as only those of this project do")
-        if not rule.__doc__:
-            raise ValueError(f"check {code} has no docstring, so it would have no docs page")
-        made = Check(code, inspect.cleandoc(rule.__doc__), severity, is_fixable, rule=rule)
-        register_kind(made)
-        CHECKS[code] = made
-        return made
+        CHECKS[code] = declared(find, code, severity, is_fixable)
+        return CHECKS[code]
 
     return declare
 
@@ -82,28 +65,35 @@ def _problem(name: str) -> str:
 
 
 def run_checks(robot: Robot, report: Report) -> None:
-    """Add what the checks find; warnings only about a robot without errors, from which they might follow."""
+    """Add what the checks of missions and of the robot find.
+
+    Warnings are only about a robot without errors, from which they might follow.
+    """
+    missions = [one for mission in robot.missions.values() for one in check_program(mission.program, robot.names)]
     for severity in (Severity.ERROR, Severity.WARNING):
+        if severity is Severity.WARNING and report.has_errors:
+            break
+        report.extend(finding for finding in missions if finding.severity is severity)
         for one in all_checks():
-            if one.severity is severity and not (severity is Severity.WARNING and report.has_errors):
+            if one.severity is severity:
                 report.extend(_found(one, robot))
     report.extend(broken_checks())
 
 
 def _found(one: Check, robot: Robot) -> list[Finding]:
     """Return what a check finds. One of another package that raises an error is no reason not to check the rest."""
-    if not _is_foreign(one.rule):
+    if not _is_foreign(one.find):
         return list(one(robot))
     try:
         return list(one(robot))
     except Exception as error:  # the code of others may raise anything
         reason = plain(f"{type(error).__name__}: {error}")
-        return [LEFT_OUT.at(None, f"the check {one.code} of '{_package(one.rule)}' has failed: {reason}")]
+        return [LEFT_OUT.at(None, f"the check {one.code} of '{_package(one.find)}' has failed: {reason}")]
 
 
-def _is_foreign(rule: Rule) -> bool:
-    return _package(rule) != __package__
+def _is_foreign(find: Find) -> bool:
+    return _package(find) != __package__
 
 
-def _package(rule: Rule) -> str:
-    return rule.__module__.partition(".")[0]
+def _package(find: Find) -> str:
+    return find.__module__.partition(".")[0]

@@ -17,7 +17,6 @@ from rbxcompose.manifest.overlay import SET
 from rbxcompose.manifest.reader import Texts
 from rbxcompose.manifest.robot_file import load_robot
 from rbxcompose.manifest.walk import TWICE
-from rbxcompose.missions.semantics import check_program
 from rbxcompose.model.build import build_robot
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.build import build_plan
@@ -69,8 +68,6 @@ def compile_robot(
             return out
         out.robot = build_robot(manifest, environment=environment, report=out.report, sources=out.sources)
         if not any(finding.code == TWICE.code for finding in out.report):  # else half of what was written is not there
-            for mission in out.robot.missions.values():
-                out.report.extend(check_program(mission.program, out.robot.names))
             run_checks(out.robot, out.report)
         out.report.findings = manifest.inclusions.told(out.report.findings)
         return out

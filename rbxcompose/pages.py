@@ -10,6 +10,7 @@ from pathlib import Path
 import rbxcompose
 from rbxcompose.checking import all_checks
 from rbxcompose.findings import KINDS, Kind
+from rbxcompose.missions.checking import mission_checks
 
 FAMILIES = {
     "10": "keys and values",
@@ -48,6 +49,7 @@ def all_kinds() -> dict[str, Kind]:
             if not module.ispkg and _DECLARES.search(path.read_text(encoding="utf-8")):
                 importlib.import_module(module.name)
     all_checks()
+    mission_checks()
     return dict(sorted(KINDS.items()))
 
 

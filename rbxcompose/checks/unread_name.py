@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Severity
+from rbxcompose.missions.deeds import saved_name
 from rbxcompose.model.robot import Robot
 
 
@@ -13,7 +14,8 @@ from rbxcompose.model.robot import Robot
 def unread_name(robot: Robot) -> Iterator[Finding]:
     """A mission never reads one of its inputs or data
 
-    Giving it another value would change nothing. It is left over, or a number stands where its name should.
+    Giving it another value would change nothing. It is left over, or a number stands where its name should. The same
+    holds for a result that is kept by `save` and never looked at.
 
     Bad:
     ```yaml
@@ -41,6 +43,12 @@ def unread_name(robot: Robot) -> Iterator[Finding]:
             continue  # the same file as another mission
         seen.add(program.file)
         read = program.reads()
+        for node in program.nodes:
+            kept = saved_name(node)
+            if kept and kept.text not in read:
+                message = f"the mission '{program.name}' never reads what it keeps as '{kept.text}'"
+                help_text = f"take 'save' out, or write '${kept.text}' where it belongs"
+                yield unread_name.at(kept.span, message, help=help_text)
         for what, names in (("input", program.inputs), ("datum", program.data)):
             for name in names:
                 if name not in read:

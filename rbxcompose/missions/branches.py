@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.expressions.types import choice_of
 from rbxcompose.expressions.values import NotArrived, Value
-from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions import codes
 from rbxcompose.missions.program import Asked
@@ -18,7 +16,6 @@ from rbxcompose.missions.statuses import FAILURE, NAMES, SKIPPED, SUCCESS
 
 if TYPE_CHECKING:
     from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.views import View
 
 OTHERWISE, HALTED = "otherwise", "halted"
 RESULTS = (NAMES[SUCCESS], NAMES[FAILURE], NAMES[SKIPPED], HALTED)
@@ -90,22 +87,3 @@ def read_outcomes(reader: NodeReader, branches: tuple[str, ...]) -> tuple[Outcom
         asked = None if is_otherwise else reader.asked_later(value, name)
         read.append(Outcome(name, asked.expression if asked else None, asked))
     return tuple(read)
-
-
-def check_outcomes(view: View, branches: tuple[str, ...], outcomes: tuple[Outcome, ...]) -> Iterator[Finding]:
-    """Yield what is wrong with the conditions over the branches."""
-    from rbxcompose.missions.outcomes import Ending  # it knows the kinds, of which this is a part
-    from rbxcompose.missions.views import findings_of
-
-    ending = Ending(view.program, view.robot)
-    names = dict(view.scope.names)
-    for branch, child in zip(branches, view.node.children, strict=False):
-        named = ending.of(child).named
-        names[branch] = choice_of(*RESULTS, *(word for word in named if word not in RESULTS))
-    scope = replace(view.scope, names=names)
-    for outcome in outcomes:
-        if outcome.asked:
-            asked = outcome.asked
-            found = list(findings_of(asked.expression, asked.wanted, asked.scalar, scope, codes.WRONG_TYPE))
-            unknown = [one for one in found if one.code == codes.UNKNOWN_NAME.code]
-            yield from unknown or found  # what a misspelt branch is compared with would be no place

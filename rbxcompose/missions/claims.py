@@ -3,37 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
 from typing import TYPE_CHECKING
 
-from rbxcompose.findings import Finding, Related, Span
-from rbxcompose.missions import deed_codes
+from rbxcompose.findings import Span
 from rbxcompose.missions.calling import UseOptions
 
 if TYPE_CHECKING:
     from rbxcompose.missions.program import Node, Program, RobotNames
-    from rbxcompose.missions.views import View
-
-
-def check_claims(view: View) -> Iterator[Finding]:
-    """Yield the branches of a parallel that claim what another one claims."""
-    claimed = [dict(_claims(view.program.below(child), view.robot)) for child in view.node.children]
-    for first, second in combinations(claimed, 2):
-        for resource in first.keys() & second.keys():
-            yield deed_codes.SAME_CLAIM.at(
-                second[resource],
-                f"two branches that run at the same time need the {resource}",
-                help="do one after the other",
-                related=[Related(first[resource], "the other one")],
-            )
 
 
 def claims_of(program: Program, robot: RobotNames, within: tuple[str, ...] = ()) -> frozenset[str]:
     """Return what a mission claims with all that it uses."""
-    return frozenset(name for name, _ in _claims(program.nodes, robot, within))
+    return frozenset(name for name, _ in claims_below(program.nodes, robot, within))
 
 
-def _claims(nodes: tuple[Node, ...], robot: RobotNames, within: tuple[str, ...] = ()) -> Iterator[tuple[str, Span]]:
+def claims_below(
+    nodes: tuple[Node, ...], robot: RobotNames, within: tuple[str, ...] = ()
+) -> Iterator[tuple[str, Span]]:
+    """Yield what nodes claim, each with its place; `within` are missions that are being looked at."""
     for node in nodes:
         skill = robot.skills.get(node.skill)
         if skill and skill.claims:

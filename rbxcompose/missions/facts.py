@@ -20,24 +20,18 @@ from rbxcompose.expressions.tree import Node as Tree
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.deeds import written
 from rbxcompose.missions.kinds.for_ import ForOptions
-from rbxcompose.missions.program import Assignment, Node, Program
+from rbxcompose.missions.program import Node, Program
 from rbxcompose.missions.spans import expression_of
 
 Constants = Mapping[str, Value]  # what `$names` stand for throughout
 
 
 def constants_of(program: Program, inputs: Constants) -> dict[str, Value]:
-    """Return the inputs, and the data that nothing sets."""
-    written = {one.name for node in program.nodes for one in assignments(node)}
-    data = {name: datum.value for name, datum in program.data.items() if name not in written}
-    return {**data, **inputs}
-
-
-def assignments(node: Node) -> tuple[Assignment, ...]:
-    """Return what a node sets."""
-    options = node.options if isinstance(node.options, tuple) else ()
-    return tuple(one for one in options if isinstance(one, Assignment))
+    """Return the inputs, and the data that nothing changes."""
+    changed = written(program)
+    return {**{name: datum.value for name, datum in program.data.items() if name not in changed}, **inputs}
 
 
 def number_of(expression: object, constants: Constants) -> float | None:
@@ -94,6 +88,15 @@ def starts_always(node: Node) -> bool:
     return "only_if" not in node.modifiers
 
 
+def never_skipped(program: Program, node: Node) -> bool:
+    """Tell whether a node is always done, so that its result is success or failure."""
+    if any(key in node.modifiers for key in ("only_if", "skip_if", "once", "cooldown")):
+        return False
+    if node.kind in _GROUPS:
+        return any(never_skipped(program, program.nodes[child]) for child in node.children)
+    return node.kind not in _MAY_DO_NOTHING
+
+
 def never_fails(node: Node) -> bool:
     """Tell whether a node can only succeed, its modifiers left aside."""
     rule = _NEVER_FAILS.get(node.kind)
@@ -110,6 +113,8 @@ def _is_simple(node: Node) -> bool:
     return not any(isinstance(part, Index | Field | Arithmetic) for tree in trees for part, _ in walk(tree))
 
 
+_GROUPS = ("sequence", "fallback", "parallel")  # skipped if all in them is
+_MAY_DO_NOTHING = ("if", "choose", "for", "repeat", "machine", "use", "run")
 _NEVER_FAILS: Mapping[str, Callable[[Node], bool]] = {
     "wait": lambda node: isinstance(node.options, Expression) and isinstance(node.options.tree, Number),
     "wait_for": _is_simple,

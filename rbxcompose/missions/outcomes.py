@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rbxcompose.expressions.tree import Arithmetic, Field, Index, walk
 from rbxcompose.missions.calling import UseOptions
@@ -76,6 +76,11 @@ class Ending:
             self._known[number] = _modified(node, self._inside(node))
         return self._known[number]
 
+    def without(self, node: Node, key: str) -> Outcomes:
+        """Return how a node may end that had one modifier less."""
+        fewer = {name: value for name, value in node.modifiers.items() if name != key}
+        return _modified(replace(node, modifiers=fewer), self._inside(node))
+
     def mission(self) -> Outcomes:
         """Return how the mission may end."""
         found = self.of(self.program.main)
@@ -87,6 +92,11 @@ class Ending:
             result = getattr(options, "result", FAILS)
             found = found.both(Outcomes(result == SUCCEEDS, result == FAILS))
         return found
+
+    def of_branches(self, node: Node) -> dict[str, Outcomes]:
+        """Return how each branch of a parallel may end, by its name."""
+        names = node.options.branches if isinstance(node.options, ParallelOptions) else ()
+        return {name: self.of(child) for name, child in zip(names, node.children, strict=False)}
 
     def _inside(self, node: Node) -> Outcomes:
         if node.skill:

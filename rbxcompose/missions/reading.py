@@ -9,7 +9,7 @@ from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Finding, Related, Report, Span
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
-from rbxcompose.missions import codes, machine_codes, program
+from rbxcompose.missions import codes, program
 from rbxcompose.missions.header import read_data, read_inputs, read_rate
 from rbxcompose.missions.held import ITEM, Pattern, matching, pattern_of, with_held
 from rbxcompose.missions.keys import find_key
@@ -279,11 +279,6 @@ class _Reader:
     def targets(self, named: Scalar) -> tuple[Target, ...]:
         """Return all nodes, states and loops over an item with a name."""
         nodes = [node for node in self.nodes if node]
-        found = [Target(node.number, node.item == named.text) for node in nodes if named.text in (node.name, node.item)]
-        if not found:
-            known = {name for node in nodes for name in (node.name, node.item) if name}
-            message = f"nothing in the mission is named '{named.text}'"
-            self.add(
-                machine_codes.UNKNOWN_TARGET.misspelt(named.span, message, named.text, known, "names of the mission")
-            )
-        return tuple(found)
+        return tuple(
+            Target(node.number, node.item == named.text) for node in nodes if named.text in (node.name, node.item)
+        )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
@@ -15,7 +15,6 @@ from rbxcompose.missions.task import Site, Task
 
 if TYPE_CHECKING:
     from rbxcompose.expressions.types import Type
-    from rbxcompose.findings import Finding
     from rbxcompose.missions.node_reader import NodeReader
     from rbxcompose.missions.program import Node
     from rbxcompose.missions.views import View
@@ -38,10 +37,6 @@ class KindTask(Protocol):
 
     def item_type(self, view: View, /) -> Type:
         """Return the type of the items of a loop."""
-        ...
-
-    def check(self, view: View, /) -> Iterable[Finding]:
-        """Return what is wrong with a node beyond its single expressions."""
         ...
 
 

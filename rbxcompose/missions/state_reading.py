@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Entry, Scalar
 from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.missions import codes, machine_codes
+from rbxcompose.missions import codes
 from rbxcompose.missions.history import WithHistory
 from rbxcompose.missions.machines import ENDS, MachineOptions, Next, StateOptions
 from rbxcompose.missions.node_reader import WORDS, NodeReader
@@ -39,11 +39,6 @@ def read_machine(reader: NodeReader) -> MachineOptions:
     start = inner.scalar("start", "the name of a state") if "start" in value else None
     if "start" not in value:
         reader.add(codes.MISSING.at(reader.span, "a machine needs 'start': the state in which it begins"))
-    elif start and names and start.text not in names:
-        message = f"there is no state '{start.text}'"
-        reader.add(
-            machine_codes.UNKNOWN_STATE.misspelt(start.span, message, start.text, names, "states of this machine")
-        )
     history = WithHistory.read_history(inner)
     return MachineOptions(start.text if start else "", names, ends, history, start.span if start else None)
 

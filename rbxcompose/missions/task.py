@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
@@ -11,7 +10,6 @@ from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.expressions.values import Value
-from rbxcompose.findings import Finding
 from rbxcompose.missions.statuses import FAILURE, IDLE, RUNNING
 
 if TYPE_CHECKING:
@@ -134,11 +132,6 @@ class Task(ABC):
     def item_type(view: View) -> Type:
         """Return the type of the items of a loop."""
         return UNKNOWN
-
-    @staticmethod
-    def check(view: View) -> Iterable[Finding]:
-        """Return what is wrong with a node beyond its single expressions."""
-        return ()
 
     @abstractmethod
     def begin(self) -> int:

@@ -48,14 +48,14 @@ def test_imports_point_downwards_in_the_map(part: str) -> None:
 
 
 def test_every_stage_is_a_function_of_the_file_that_is_named() -> None:
-    assert len(STAGES) == 8
+    assert len(STAGES) == 7
     assert [name for name, file in STAGES if name not in {one.name for one in functions(file)}] == []
 
 
 def test_the_compiler_calls_the_stages_in_this_order() -> None:
     names = [name for name, _ in STAGES]
     called = [name for name in calls_of("compiler.py", "compile_robot") if name in names]
-    assert called == names[:5]
+    assert called == names[:4]
 
 
 def test_up_compiles_and_then_runs_the_plan() -> None:

@@ -12,12 +12,12 @@ from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
 from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.missions.checking import check_program
 from rbxcompose.missions.engine import Engine
 from rbxcompose.missions.events import MissionEnded, MissionEvent
 from rbxcompose.missions.program import Program, RobotNames, Skill
 from rbxcompose.missions.reading import read_program
 from rbxcompose.missions.results import Result
-from rbxcompose.missions.semantics import check_program
 from rbxcompose.missions.statuses import IDLE, NAMES, RUNNING
 from rbxcompose.missions.story import Story
 from rbxcompose.missions.world import PLAIN, Settings

@@ -134,3 +134,10 @@ def test_each_use_has_data_of_its_own_and_begins_with_fresh_ones() -> None:
     simulated = simulate("do:\n  - repeat: 3\n    do:\n      use: one\n      save: x\n  - log: $x.n", {"one": used})
     simulated.advance(5)
     assert logged(simulated) == ["0 1"]
+
+
+def test_a_text_may_be_given_the_name_of_a_place() -> None:
+    text = "data: {room: dock}\ndo: [{set: {room: kitchen}}, {go_to: $room}, {choose: $room, cases: {kitchen: a}}]"
+    simulated = simulate(text)
+    assert simulated.advance(5) == "success"
+    assert simulated.calls == {"go_to": 1, "a": 1}

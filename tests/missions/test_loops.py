@@ -6,8 +6,8 @@ import pytest
 
 from rbxcompose.findings import Report
 from rbxcompose.geometry import Pose2
+from rbxcompose.missions.checking import check_program
 from rbxcompose.missions.reading import read_program
-from rbxcompose.missions.semantics import check_program
 from rbxcompose.missions.world import Settings
 from tests.missions.simulated import ROBOT, Simulated, simulate, tree
 from tests.missions.test_composites import fails, skills

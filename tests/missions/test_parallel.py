@@ -50,6 +50,41 @@ def test_what_decides_and_when(options: str, failing: str, outcome: str, at: flo
     assert simulated.running == {}
 
 
+def test_the_story_tells_how_each_named_branch_ended() -> None:
+    simulated = parallel("ends_with: two", fails={"a": fails(1)})
+    simulated.advance(10)
+    assert [line for line in simulated.told if "branch" in line] == [
+        "1 branch one: failure",
+        "2 branch two: success",
+        "2 branch three: halted",
+    ]
+
+
+def test_a_branch_without_a_skill_is_told_and_one_with_a_node_that_has_a_name_is_told_once() -> None:
+    text = """
+        do:
+          parallel:
+            watch:
+              wait_for: $door
+            drive:
+              a:
+              name: driving
+            talk:
+              log: On my way
+          ends_with: drive
+    """
+    simulated = simulate(text, takes={"a": 2.0})
+    simulated.set("door", False)
+    simulated.at(1.0, lambda: simulated.set("door", True))
+    simulated.advance(10)
+    assert [line for line in simulated.told if "branch" in line or "driving" in line] == [
+        "0 driving begins",
+        "0 branch talk: success",
+        "1 branch watch: success",
+        "2 driving: success",
+    ]
+
+
 def test_a_number_may_come_from_the_data() -> None:
     simulated = simulate("data: {few: 1}\ndo:\n  parallel: [a, b]\n  succeed_when: $few", takes={"b": 9.0})
     assert simulated.advance(20) == "success"
@@ -59,7 +94,7 @@ def test_a_number_may_come_from_the_data() -> None:
 def test_exactly_the_branches_that_run_are_halted() -> None:
     simulated = parallel("succeed_when: 2")
     simulated.advance(10)
-    assert [line for line in simulated.told if "halted" in line] == ["2 c: halted (2 s)"]
+    assert [line for line in simulated.told if "halted" in line] == ["2 c: halted (2 s)", "2 branch three: halted"]
 
 
 def test_failure_beats_success_of_the_same_instant() -> None:

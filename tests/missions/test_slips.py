@@ -8,10 +8,10 @@ from rbxcompose.edits import apply, safe_fixes
 from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping
+from rbxcompose.missions.checking import check_program
 from rbxcompose.missions.other_words import ENDLESS, FLAGS, SETTINGS
 from rbxcompose.missions.reading import read_program
 from rbxcompose.missions.registry import kinds
-from rbxcompose.missions.semantics import check_program
 from rbxcompose.missions.strays import STEPS
 from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden

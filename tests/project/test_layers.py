@@ -25,6 +25,7 @@ BASE = {
     "qos",
     "replacing",
     "restarts",
+    "rules",
     "scheduler",
 }
 CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}
@@ -51,7 +52,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     },
     "rendering": BASE | {"rendering"},
     "model": BASE | CORES | {"model", "manifest", "sdk"},
-    "checking": BASE | {"model"},
+    "checking": BASE | {"missions", "model"},
     "checks": BASE | CORES | {"checks", "checking", "model", "manifest", "sdk"},
     "plan": BASE | CORES | {"plan", "model", "manifest.shapes", "manifest.tree", "manifest.validate", "sdk"},
     "scaffold": BASE | {"missions", "scaffold", "manifest.files", "sdk"},

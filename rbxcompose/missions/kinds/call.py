@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rbxcompose.missions.deed_checks import check_called
 from rbxcompose.missions.leaf import Leaf
 from rbxcompose.missions.messages import Message
 from rbxcompose.missions.registry import kind
@@ -13,12 +12,8 @@ from rbxcompose.missions.task import Site
 from rbxcompose.msgs import registry
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rbxcompose.findings import Finding
     from rbxcompose.missions.node_reader import NodeReader
     from rbxcompose.missions.program import Node
-    from rbxcompose.missions.views import View
 
 
 @kind("call", {"request": "The fields of the request; a single value stands for the only field."})
@@ -47,12 +42,6 @@ class Call(Leaf):
     def waits(node: Node) -> bool:
         """It waits for the answer."""
         return True
-
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """The service exists, and the request fits its type."""
-        if isinstance(view.node.options, Message):
-            yield from check_called(view, view.node.options)
 
     def begin(self) -> int:
         """Ask."""

@@ -6,22 +6,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.tree import Expression, Flag, Number, Text, Word
+from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.expressions.values import is_same
-from rbxcompose.findings import Related
-from rbxcompose.missions import deed_codes
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import SKIPPED
 from rbxcompose.missions.task import Site, Task
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rbxcompose.findings import Finding
     from rbxcompose.missions.node_reader import NodeReader
     from rbxcompose.missions.program import Asked
-    from rbxcompose.missions.views import View
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,20 +63,6 @@ class Choose(Task):
             reader.child("else")
         return ChooseOptions(asked, cases, reader.has("else"))
 
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """Each case is of another value."""
-        options = view.node.options
-        seen: dict[object, Asked] = {}
-        for asked in options.cases if isinstance(options, ChooseOptions) else ():
-            value = _constant(asked.expression)
-            if value in seen:
-                related = [Related(seen[value].scalar.span, "the first one")]
-                message = f"the case '{asked.scalar.text}' is never taken: an earlier one is equal"
-                yield deed_codes.SAME_CASE.at(asked.scalar.span, message, related=related)
-            elif value is not None:
-                seen[value] = asked
-
     def begin(self) -> int:
         """Choose, and start what was chosen."""
         if not (self.engine.places.kept and self.engine.places.take_up(self)):
@@ -99,15 +79,3 @@ class Choose(Task):
             if is_same(evaluate(case.expression, self.scope), value):
                 return index
         return len(self.options.cases) if self.options.has_else else -1
-
-
-def _constant(expression: Expression) -> object:
-    """Return what a case is, if that is written out; a word and a text of the same letters are the same."""
-    match expression.tree:
-        case Number(value=value) | Text(value=value):
-            return value
-        case Flag(value=value):
-            return str(value)
-        case Word(name=name):
-            return name
-    return None

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rbxcompose.expressions.check import check
 from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.tree import Expression, Field, Index, Variable
+from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import TEXT, UNKNOWN, Type, TypeKind
 from rbxcompose.expressions.values import NOT_ARRIVED, Located, NotArrivedError, Value
-from rbxcompose.findings import Finding
-from rbxcompose.missions import codes
 from rbxcompose.missions.editing import without
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
@@ -113,20 +111,6 @@ class For(Task):
         found, _ = check(options.items, view.scope)
         return TEXT if found.kind is TypeKind.MAP else found.entry
 
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """What it goes through must be a list or a map."""
-        options = view.node.options
-        if isinstance(options, ForOptions) and not isinstance(options.items, tuple):
-            found, _ = check(options.items, view.scope)
-            if found.kind not in LISTED and view.node.asked:
-                yield codes.WRONG_TYPE.at(
-                    view.node.asked[0].scalar.span, f"'in' must be a list or a map; it is {found.phrase}"
-                )
-        if isinstance(options, ForOptions) and options.removes_done and not _names_data(options.items, view):
-            help_text = "write the list under 'data', and its name after 'in'"
-            yield codes.WRONG_SHAPE.at(view.node.span, "'remove_done' needs an 'in' that names data", help=help_text)
-
     def begin(self) -> int:
         """Read the list and begin with its first item, or with the one in which it was halted."""
         if self.engine.places.kept and self.engine.places.take_up(self):
@@ -217,13 +201,3 @@ class For(Task):
         if not isinstance(value, list | tuple | Mapping):
             raise NodeFailed(f"'in' must be a list or a map, not {self.run.show('', value)}")
         return list(value)
-
-
-def _names_data(items: Expression | tuple[Expression, ...], view: View) -> bool:
-    """Tell whether items stand in the mission's data, so that they can leave them."""
-    if isinstance(items, tuple):
-        return False
-    tree = items.tree
-    while isinstance(tree, Field | Index):
-        tree = tree.of
-    return isinstance(tree, Variable) and tree.name in view.program.data

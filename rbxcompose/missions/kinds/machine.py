@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from rbxcompose.findings import Finding
 from rbxcompose.missions.events import Transition
 from rbxcompose.missions.history import WithHistory
-from rbxcompose.missions.machine_checks import check_machine
 from rbxcompose.missions.machines import ENDS, STATE, MachineOptions, StateOptions
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.state_reading import read_machine, read_state
@@ -17,7 +14,6 @@ from rbxcompose.missions.task import NodeFailed, Site, Task
 
 if TYPE_CHECKING:
     from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.views import View
 
 
 @kind("machine")
@@ -60,11 +56,6 @@ class Machine(WithHistory):
     def read(reader: NodeReader) -> MachineOptions:
         """Read the states and what stands beside them."""
         return read_machine(reader)
-
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """Every state can be reached, every outcome leads somewhere, and nothing else does."""
-        return check_machine(view)
 
     def begin(self) -> int:
         """Enter the first state, or the one in which it was halted."""

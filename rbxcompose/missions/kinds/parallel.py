@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rbxcompose.expressions.evaluate import holds
-from rbxcompose.expressions.tree import Expression, Number
-from rbxcompose.findings import Finding
-from rbxcompose.missions import deed_codes
-from rbxcompose.missions.branches import BranchScope, Ended, Outcome, check_outcomes, read_outcomes
-from rbxcompose.missions.claims import check_claims
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.missions.branches import BranchScope, Ended, Outcome, read_outcomes
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
 from rbxcompose.missions.task import NodeFailed, Site, Task
 
 if TYPE_CHECKING:
     from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.program import Node, Target
-    from rbxcompose.missions.views import View
+    from rbxcompose.missions.program import Target
 
 ALL, ANY = "all", "any"
 
@@ -89,15 +84,6 @@ class Parallel(Task):
             reader.flag("wait_for_all") if reader.has("wait_for_all") else False,
             read_outcomes(reader, branches),
         )
-
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """The conditions of its outcomes see its branches."""
-        options = view.node.options
-        if isinstance(options, ParallelOptions):
-            yield from check_outcomes(view, options.branches, options.outcomes)
-            yield from _too_many(view.node, options)
-            yield from check_claims(view)
 
     def begin(self) -> int:
         """Start all branches; after a deep history those that had not ended."""
@@ -194,12 +180,3 @@ class Parallel(Task):
         if number < 1:
             raise NodeFailed(f"{what} must be at least 1")
         return number
-
-
-def _too_many(node: Node, options: ParallelOptions) -> Iterator[Finding]:
-    for key, wanted in (("succeed_when", options.succeed_when), ("fail_when", options.fail_when)):
-        tree = wanted.tree if isinstance(wanted, Expression) else None
-        if isinstance(tree, Number) and tree.value > len(node.children) > 0:
-            span = next(asked.scalar.span for asked in node.asked if asked.expression is wanted)
-            message = f"'{key}' counts {tree.value:.0f} branches; there are {len(node.children)}"
-            yield deed_codes.TOO_MANY.at(span, message)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rbxcompose.missions.deed_checks import check_published
 from rbxcompose.missions.messages import Message
 from rbxcompose.missions.moments import publish
 from rbxcompose.missions.registry import kind
@@ -12,11 +11,7 @@ from rbxcompose.missions.statuses import SUCCESS
 from rbxcompose.missions.task import Site, Task
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rbxcompose.findings import Finding
     from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.views import View
 
 
 @kind("publish", {"message": "The fields of the message; a single value stands for the only field."})
@@ -41,12 +36,6 @@ class Publish(Task):
     def read(reader: NodeReader) -> Message:
         """Read the topic and `message`."""
         return reader.message(reader.key, "message")
-
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """The topic exists, and the message fits its type."""
-        if isinstance(view.node.options, Message):
-            yield from check_published(view, view.node.options)
 
     def begin(self) -> int:
         """Publish it."""

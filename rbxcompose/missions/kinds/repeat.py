@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression, Number
-from rbxcompose.findings import Finding
-from rbxcompose.missions import codes
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
 from rbxcompose.missions.task import Site, Task
@@ -18,7 +15,6 @@ from rbxcompose.missions.task import Site, Task
 if TYPE_CHECKING:
     from rbxcompose.missions.node_reader import NodeReader
     from rbxcompose.missions.program import Node
-    from rbxcompose.missions.views import View
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +72,6 @@ class Repeat(Task):
         """It waits between its rounds if they have a period."""
         every = node.options.every if isinstance(node.options, RepeatOptions) else None
         return every is not None and not (isinstance(every.tree, Number) and every.tree.value == 0)
-
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """A loop for ever should wait somewhere."""
-        options = view.node.options
-        if isinstance(options, RepeatOptions) and options.rounds is None and not view.waits:
-            help_text = "give it 'every: 1 s', or a 'wait' in its body"
-            yield codes.NEVER_WAITS.at(view.node.span, "this loop never waits", help=help_text)
 
     def begin(self) -> int:
         """Start the first round, or the one in which it was halted."""

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.findings import Finding
-from rbxcompose.missions.deed_checks import check_assignments
 from rbxcompose.missions.program import Assignment
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import SUCCESS
@@ -15,7 +12,6 @@ from rbxcompose.missions.task import Site, Task
 
 if TYPE_CHECKING:
     from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.views import View
 
 
 @kind("set")
@@ -42,12 +38,6 @@ class Set(Task):
     def read(reader: NodeReader) -> tuple[Assignment, ...]:
         """Read the map from names to expressions."""
         return reader.assignments(reader.key)
-
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """Only data can be set, to values of their type."""
-        assignments = view.node.options if isinstance(view.node.options, tuple) else ()
-        yield from check_assignments(view, assignments)
 
     def begin(self) -> int:
         """Set, and let everyone look once more at what may depend on it."""

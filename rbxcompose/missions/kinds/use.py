@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.values import NotArrivedError, Value
-from rbxcompose.missions.calling import UseOptions, check_use, read_use
+from rbxcompose.missions.calling import UseOptions, read_use
 from rbxcompose.missions.history import HISTORY, WithHistory
 from rbxcompose.missions.places import LAST
 from rbxcompose.missions.registry import kind
@@ -15,12 +15,8 @@ from rbxcompose.missions.statuses import FAILURE, RUNNING
 from rbxcompose.missions.task import Site
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rbxcompose.findings import Finding
     from rbxcompose.missions.node_reader import NodeReader
     from rbxcompose.missions.program import Target
-    from rbxcompose.missions.views import View
 
 
 @kind("use", {"with": "Values for the inputs of the mission.", "history": HISTORY})
@@ -55,11 +51,6 @@ class Use(WithHistory):
     def read(reader: NodeReader) -> UseOptions:
         """Read the name, `with` and `history`."""
         return read_use(reader)
-
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """The mission exists, and its inputs get values that fit."""
-        return check_use(view)
 
     def begin(self) -> int:
         """Start the mission; with a deep history, with its data and at its place."""

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rbxcompose.missions.deed_checks import check_moments
 from rbxcompose.missions.modifiers.registry import Modifier, modifier
 from rbxcompose.missions.statuses import RUNNING
 from rbxcompose.missions.task import Site, Task
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rbxcompose.findings import Finding
     from rbxcompose.missions.moments import Moments
     from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.views import View
 
 ON_ENTER, ON_EXIT = "on_enter", "on_exit"
 
@@ -55,11 +50,6 @@ class Entering(Modifier):
     def read(reader: NodeReader, key: str) -> Moments:
         """Read what is there of the two."""
         return reader.moments((key, *Entering.keys))
-
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """What is set exists, and what is published fits."""
-        yield from check_moments(view, view.node.modifiers[ON_ENTER])
 
     def begin(self) -> int:
         """Do what belongs to entering."""

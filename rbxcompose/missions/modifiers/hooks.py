@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from rbxcompose.missions.deed_checks import check_moments
 from rbxcompose.missions.modifiers.registry import Modifier, modifier
 from rbxcompose.missions.statuses import FAILURE, SUCCESS
 from rbxcompose.missions.task import Site, Task
 
 if TYPE_CHECKING:
-    from rbxcompose.findings import Finding
     from rbxcompose.missions.moments import Moments
     from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.views import View
 
 ON_START, ON_SUCCESS, ON_FAILURE, ON_HALT = "on_start", "on_success", "on_failure", "on_halt"
 _ON: Mapping[int, str] = {SUCCESS: ON_SUCCESS, FAILURE: ON_FAILURE}
@@ -53,11 +50,6 @@ class Hooks(Modifier):
     def read(reader: NodeReader, key: str) -> Moments:
         """Read the hooks that are there."""
         return reader.moments((key, *Hooks.keys))
-
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """What is set exists, and what is published fits."""
-        yield from check_moments(view, view.node.modifiers[ON_START])
 
     def begin(self) -> int:
         """Do what belongs to the start."""

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rbxcompose.expressions.evaluate import holds
-from rbxcompose.expressions.tree import Expression, Number
-from rbxcompose.findings import Finding
+from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions import codes
 from rbxcompose.missions.modifiers.registry import Modifier, modifier
 from rbxcompose.missions.statuses import FAILURE, RUNNING
@@ -19,7 +17,6 @@ from rbxcompose.units import TIME, format_quantity
 
 if TYPE_CHECKING:
     from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.views import View
 
 
 @modifier("as_long_as")
@@ -144,14 +141,6 @@ class Attempts(Modifier):
             return Tries(None, timeout, pause)
         return Tries(reader.count_or_forever(key), timeout, pause)
 
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """What is tried for ever should wait somewhere."""
-        tries = view.node.modifiers["attempts"]
-        if isinstance(tries, Tries) and tries.most is None and not view.waits and not _takes_time(tries.pause):
-            help_text = "give it a number of attempts, or an 'attempt_pause'"
-            yield codes.NEVER_WAITS.at(view.node.span, "what is tried for ever never waits", help=help_text)
-
     def begin(self) -> int:
         """Try for the first time."""
         self.left = math.inf if self.tries.most is None else self.count_of(self.tries.most, "'attempts'")
@@ -185,7 +174,3 @@ class Attempts(Modifier):
 
     def _seconds(self, expression: Expression | None, what: str) -> float:
         return 0.0 if expression is None else self.number_of(expression, what)
-
-
-def _takes_time(pause: Expression | None) -> bool:
-    return pause is not None and not (isinstance(pause.tree, Number) and pause.tree.value == 0)

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions import codes
 from rbxcompose.missions.modifiers.registry import Modifier, modifier
 from rbxcompose.missions.statuses import RUNNING
 from rbxcompose.missions.task import Site, Task
 
 if TYPE_CHECKING:
     from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.views import View
 
 SAVED = ("call", "use", "for")  # kinds that have something to keep, beside skills
 
@@ -47,15 +43,6 @@ class Save(Modifier):
     def read(reader: NodeReader, key: str) -> Scalar:
         """Read the name."""
         return reader.name(key, "a name for the result")
-
-    @staticmethod
-    def check(view: View) -> Iterator[Finding]:
-        """Only some nodes have a result to keep."""
-        if view.node.kind and view.node.kind not in SAVED:
-            name = view.node.modifiers["save"]
-            span = name.span if isinstance(name, Scalar) else view.node.span
-            message = f"'{view.node.kind}' has no result to keep"
-            yield codes.UNKNOWN_KEY.at(span, message, help="skills, 'call', 'use' and 'for' have one")
 
     def begin(self) -> int:
         """Start the task inside."""

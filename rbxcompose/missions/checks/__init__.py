@@ -1,0 +1,1 @@
+"""Rules about missions: one file each, with its docs page."""

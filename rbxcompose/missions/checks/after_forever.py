@@ -1,0 +1,61 @@
+"""Steps that are never reached."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.facts import never_skipped
+from rbxcompose.missions.in_turn import RANDOM, InTurnOptions
+from rbxcompose.missions.outcomes import FAILS, SUCCEEDS, Ending
+from rbxcompose.missions.program import Node, Program
+
+
+@mission_check("RBX4125", Severity.WARNING)
+def after_forever(mission: Examined) -> Iterator[Finding]:
+    """A step is never reached
+
+    A sequence goes on after a step that succeeds, a fallback after one that fails. What is repeated for ever does not
+    succeed, and what cannot fail is never followed by a second choice.
+
+    Bad:
+    ```yaml
+    do:
+      - repeat: forever
+        do:
+          go_to: corner_1
+      - go_to: dock
+    ```
+    Good:
+    ```yaml
+    do:
+      - repeat: 3
+        do:
+          go_to: corner_1
+      - go_to: dock
+    ```
+    """
+    for node in mission.program.nodes:
+        if node.kind in ("sequence", "fallback") and (found := _barrier(mission.program, node, mission.ending)):
+            barrier, following, why = found
+            yield after_forever.at(
+                following.span,
+                f"this step is never reached: the one before it {why}",
+                related=[Related(barrier.span, "this one")],
+            )
+
+
+def _barrier(program: Program, node: Node, ending: Ending) -> tuple[Node, Node, str] | None:
+    """Return the first step that none can follow, the step behind it, and why."""
+    if isinstance(node.options, InTurnOptions) and node.options.order == RANDOM:
+        return None
+    steps = [program.nodes[child] for child in node.children]
+    for step, following in pairwise(steps):
+        if node.kind == "sequence" and not ending.of(step.number).counting_as(SUCCEEDS):
+            return step, following, "never ends in success"
+        if node.kind == "fallback" and not ending.of(step.number).counting_as(FAILS) and never_skipped(program, step):
+            return step, following, "never fails"
+    return None

@@ -1,0 +1,90 @@
+"""Results that a branch cannot have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.expressions.tree import Comparison, Node, Variable, Word, walk
+from rbxcompose.findings import Finding, Severity
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.kinds.parallel import ParallelOptions
+from rbxcompose.missions.outcomes import FAILS, SUCCEEDS, Outcomes
+from rbxcompose.missions.spans import inner_span
+
+
+@mission_check("RBX4135", Severity.WARNING)
+def impossible_result(mission: Examined) -> Iterator[Finding]:
+    """A branch is compared with a result that it cannot have
+
+    The conditions of `outcomes` ask how each branch has ended. A branch that only waits cannot fail, and one that is
+    repeated for ever cannot succeed; a condition that asks for it is never decided by that branch.
+
+    Bad:
+    ```yaml
+    machine:
+      start: watch
+      states:
+        watch:
+          do:
+            parallel:
+              work:
+                go_to: corner_1
+              monitor:
+                wait_for: $battery < 50 %
+            succeed_when: any
+            outcomes:
+              low: $monitor == failure
+              complete: otherwise
+          next:
+            low: failed
+            complete: finished
+    ```
+    Good:
+    ```yaml
+    machine:
+      start: watch
+      states:
+        watch:
+          do:
+            parallel:
+              work:
+                go_to: corner_1
+              monitor:
+                wait_for: $battery < 50 %
+            succeed_when: any
+            outcomes:
+              low: $monitor == success
+              complete: otherwise
+          next:
+            low: failed
+            complete: finished
+    ```
+    """
+    for node in mission.program.nodes:
+        options = node.options
+        ends = mission.ending.of_branches(node)
+        for outcome in options.outcomes if isinstance(options, ParallelOptions) else ():
+            for tree, _ in walk(outcome.condition.tree) if outcome.condition else ():
+                compared = _compared(tree)
+                if outcome.asked and compared and _is_impossible(ends.get(compared[0]), compared[1]):
+                    branch, result = compared
+                    yield impossible_result.at(
+                        inner_span(outcome.asked.scalar, tree.start, tree.end),
+                        f"the branch '{branch}' never ends with '{result}'",
+                        help=f"it ends with {' or '.join(ends[branch].words) or 'nothing: it goes on for ever'}",
+                    )
+
+
+def _compared(tree: Node) -> tuple[str, str] | None:
+    """Return the name and the word that a comparison is of."""
+    match tree:
+        case Comparison(operator="==", left=Variable(name=name), right=Word(name=word)):
+            return name, word
+        case Comparison(operator="==", left=Word(name=word), right=Variable(name=name)):
+            return name, word
+    return None
+
+
+def _is_impossible(ends: Outcomes | None, result: str) -> bool:
+    return ends is not None and result in (SUCCEEDS, FAILS) and not ends.counting_as(result)

@@ -1,0 +1,64 @@
+"""Names with two meanings, as far as the robot must be known for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding, Related
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.codes import NAME_CLASH
+from rbxcompose.missions.deeds import saved_name
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.kinds.parallel import ParallelOptions
+from rbxcompose.missions.machines import STATE
+from rbxcompose.missions.program import Node, Program, RobotNames
+from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.views import View
+from rbxcompose.missions.watching import POSE
+
+
+@mission_check(NAME_CLASH)
+def name_clash(mission: Examined) -> Iterator[Finding]:
+    """Yield the inputs, data, nodes, branches and items of loops whose name means something else as well."""
+    yield from _declared(mission.program, mission.robot)
+    for view in mission.views:
+        yield from _of_node(view.node, view.program, view.robot)
+        yield from _branches(view.node, view.program, view.robot)
+        yield from _item(view)
+
+
+def _declared(program: Program, robot: RobotNames) -> Iterator[Finding]:
+    for section, entries in (("input", program.inputs), ("datum", program.data)):
+        for name, entry in entries.items():
+            if name in robot.skills:
+                yield NAME_CLASH.at(entry.span, f"the {section} '{name}' is named like a skill")
+            elif name in robot.values or name == POSE:
+                yield NAME_CLASH.at(entry.span, f"the {section} '{name}' is named like a value of the robot")
+    for name in program.inputs.keys() & program.data.keys():
+        related = [Related(program.inputs[name].span, "the input")]
+        yield NAME_CLASH.at(program.data[name].span, f"'{name}' is an input and a datum", related=related)
+
+
+def _of_node(node: Node, program: Program, robot: RobotNames) -> Iterator[Finding]:
+    if node.name in robot.skills and node.kind != STATE:
+        yield NAME_CLASH.at(node.span, f"a node cannot be named like the skill '{node.name}'")
+    saved = saved_name(node)
+    if saved and (saved.text in robot.values or saved.text in program.inputs):
+        yield NAME_CLASH.at(saved.span, f"'{saved.text}' is taken: choose another name for what is kept")
+
+
+def _branches(node: Node, program: Program, robot: RobotNames) -> Iterator[Finding]:
+    options = node.options
+    names = options.branches if isinstance(options, ParallelOptions) else ()
+    for branch, child in zip(names, node.children, strict=False):
+        if branch in kinds() or branch in robot.skills:
+            message = f"the branch '{branch}' is named like a kind or a skill"
+            yield NAME_CLASH.at(program.nodes[child].span, message)
+
+
+def _item(view: View) -> Iterator[Finding]:
+    item, node = view.node.item, view.node
+    if item and item in view.scope.names:
+        yield NAME_CLASH.at(node.span, f"the item '{item}' has the name of something that the loop sees already")
+    elif item and (item in kinds() or item in view.robot.skills):
+        yield NAME_CLASH.at(node.span, f"the item '{item}' is named like a kind or a skill")

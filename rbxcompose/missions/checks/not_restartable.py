@@ -1,0 +1,46 @@
+"""Skills that an interrupt may start again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.program import END
+
+
+@mission_check("RBX4116", Severity.WARNING)
+def not_restartable(mission: Examined) -> Iterator[Finding]:
+    """An interrupt may start a skill again that cannot be restarted
+
+    `afterwards: continue` starts what was cut short again from its beginning. The skill says that this does it no good.
+
+    Bad:
+
+    ```yaml
+    interrupts:
+      battery_low:
+        when: $battery < 20 %
+        do: recharge
+        afterwards: continue
+    do: pour                # a skill that cannot be restarted
+    ```
+
+    Good:
+
+    ```yaml
+    do:
+      - if: $battery < 20 %
+        then: recharge
+      - pour
+    ```
+    """
+    cutting = [one for one in mission.program.interrupts if one.afterwards != END]
+    for node in mission.program.below(mission.program.main) if cutting else ():
+        skill = mission.robot.skills.get(node.skill)
+        if skill and not skill.restartable and not skill.pausable:
+            related = [Related(cutting[0].span, "this may cut it short")]
+            afterwards = cutting[0].afterwards
+            message = f"the skill '{skill.name}' cannot be restarted, but 'afterwards: {afterwards}' would do so"
+            yield not_restartable.at(node.span, message, related=related)

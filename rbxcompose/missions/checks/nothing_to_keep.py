@@ -1,0 +1,37 @@
+"""Results of nodes that have none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.deeds import saved_name
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.modifiers.saving import SAVED
+
+
+@mission_check("RBX4136")
+def nothing_to_keep(mission: Examined) -> Iterator[Finding]:
+    """A node has no result to keep
+
+    Skills, `call`, `use` and `for` have a result that `save` keeps in the data. Others only succeed or fail.
+
+    Bad:
+    ```yaml
+    do:
+      wait: 2 s
+      save: waited
+    ```
+    Good:
+    ```yaml
+    do:
+      go_to: corner_1
+      save: way
+    ```
+    """
+    for node in mission.program.nodes:
+        name = saved_name(node)
+        if name and node.kind and node.kind not in SAVED:
+            message = f"'{node.kind}' has no result to keep"
+            yield nothing_to_keep.at(name.span, message, help="skills, 'call', 'use' and 'for' have one")

@@ -1,0 +1,46 @@
+"""Lists that items cannot leave."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.deeds import shortened
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.kinds.for_ import ForOptions
+
+
+@mission_check("RBX4137")
+def nothing_to_shorten(mission: Examined) -> Iterator[Finding]:
+    """`remove_done` without a list in the data
+
+    An item that is done leaves the data that `in` names, so that the next run of the loop does only the rest. A list
+    that is written behind `in` itself, or comes from elsewhere, stays as it is.
+
+    Bad:
+    ```yaml
+    do:
+      for: corner
+      in: [corner_1, corner_2]
+      remove_done: true
+      do:
+        go_to: $corner
+    ```
+    Good:
+    ```yaml
+    data:
+      corners: [corner_1, corner_2]
+    do:
+      for: corner
+      in: $corners
+      remove_done: true
+      do:
+        go_to: $corner
+    ```
+    """
+    for node in mission.program.nodes:
+        removes = isinstance(node.options, ForOptions) and node.options.removes_done
+        if removes and not shortened(node) & mission.program.data.keys():
+            help_text = "write the list under 'data', and its name after 'in'"
+            yield nothing_to_shorten.at(node.span, "'remove_done' needs an 'in' that names data", help=help_text)

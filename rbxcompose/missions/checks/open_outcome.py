@@ -1,0 +1,70 @@
+"""Outcomes of states without a way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.machines import Next, StateOptions
+from rbxcompose.missions.outcomes import FAILS, Outcomes
+from rbxcompose.missions.program import Node
+
+ONE_WORD = "write 'next' as a map with 'success' and 'failure'"
+
+
+@mission_check("RBX4141")
+def open_outcome(mission: Examined) -> Iterator[Finding]:
+    """An outcome of a state leads nowhere
+
+    Every way in which the body of a state may end needs a transition. An outcome without one of its own takes that of
+    what it counts as, `success` or `failure`. One word after `next` is enough where the body cannot fail.
+
+    Bad:
+
+    ```yaml
+    machine:
+      start: away
+      states:
+        away:
+          do:
+            go_to: corner_1
+          next:
+            success: finished
+    ```
+
+    Good:
+
+    ```yaml
+    machine:
+      start: away
+      states:
+        away:
+          do:
+            go_to: corner_1
+          next:
+            success: finished
+            failure: failed
+    ```
+    """
+    for node in mission.program.nodes:
+        if isinstance(node.options, StateOptions):
+            yield from _open(node, node.options.next, mission.ending.of(node.number))
+
+
+def _open(state: Node, leads_to: Next | None, ends: Outcomes) -> Iterator[Finding]:
+    if leads_to is None:
+        if ends.words:
+            message = f"the state '{state.name}' needs 'next': where it leads to"
+            listed = " or ".join(f"'{word}'" for word in ends.words)
+            yield open_outcome.at(state.span, message, help=f"it can end with {listed}")
+    elif "" in leads_to.to:
+        if ends.counting_as(FAILS):
+            message = f"the state '{state.name}' can fail, so that one word after 'next' is not enough"
+            yield open_outcome.at(leads_to.spans[""], message, help=ONE_WORD)
+    else:
+        for word, counts_as in ends.words.items():
+            if word not in leads_to.to and counts_as not in leads_to.to:
+                message = f"the state '{state.name}' can end with '{word}', which leads nowhere"
+                yield open_outcome.at(state.span, message, help=f"write '{word}: ...' under 'next'")

@@ -1,0 +1,51 @@
+"""Branches that need the same part of the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.claims import claims_below
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.kinds.parallel import ParallelOptions
+
+
+@mission_check("RBX4152", Severity.WARNING)
+def same_claim(mission: Examined) -> Iterator[Finding]:
+    """Two branches of a parallel need the same part of the robot
+
+    A skill claims what it needs for itself, such as the base. Two that claim the same at the same time work against
+    each other: the robot would drive to two places at once.
+
+    Bad:
+
+    ```yaml
+    do:
+      parallel:
+        - go_to: corner_1
+        - go_to: corner_2
+    ```
+
+    Good:
+
+    ```yaml
+    do:
+      - go_to: corner_1
+      - go_to: corner_2
+    ```
+    """
+    program, robot = mission.program, mission.robot
+    for node in program.nodes:
+        if not isinstance(node.options, ParallelOptions):
+            continue
+        claimed = [dict(claims_below(program.below(child), robot)) for child in node.children]
+        for first, second in combinations(claimed, 2):
+            for resource in first.keys() & second.keys():
+                yield same_claim.at(
+                    second[resource],
+                    f"two branches that run at the same time need the {resource}",
+                    help="do one after the other",
+                    related=[Related(first[resource], "the other one")],
+                )

@@ -1,0 +1,48 @@
+"""More branches than there are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.expressions.tree import Expression, Number
+from rbxcompose.findings import Finding
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.kinds.parallel import ParallelOptions
+
+
+@mission_check("RBX4153")
+def too_many(mission: Examined) -> Iterator[Finding]:
+    """A parallel counts more branches than it has
+
+    `succeed_when: 3` of two branches can never come about.
+
+    Bad:
+
+    ```yaml
+    do:
+      parallel:
+        - wait: 1 s
+        - wait: 2 s
+      succeed_when: 3
+    ```
+
+    Good:
+
+    ```yaml
+    do:
+      parallel:
+        - wait: 1 s
+        - wait: 2 s
+      succeed_when: 2
+    ```
+    """
+    for node in mission.program.nodes:
+        if not isinstance(node.options, ParallelOptions):
+            continue
+        for key, wanted in (("succeed_when", node.options.succeed_when), ("fail_when", node.options.fail_when)):
+            tree = wanted.tree if isinstance(wanted, Expression) else None
+            if isinstance(tree, Number) and tree.value > len(node.children) > 0:
+                span = next(asked.scalar.span for asked in node.asked if asked.expression is wanted)
+                message = f"'{key}' counts {tree.value:.0f} branches; there are {len(node.children)}"
+                yield too_many.at(span, message)

@@ -1,0 +1,70 @@
+"""States without a way out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding, Severity
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.machines import StateOptions
+from rbxcompose.missions.program import Node
+from rbxcompose.missions.transitions import reached, transitions
+
+
+@mission_check("RBX4133", Severity.WARNING)
+def trapped_state(mission: Examined) -> Iterator[Finding]:
+    """A state from which no way leads to an end
+
+    The machine has an end that can be reached, but once it is in this state it goes round for ever. A state whose body
+    never ends by itself is meant so, and not told.
+
+    Bad:
+    ```yaml
+    machine:
+      start: look
+      states:
+        look:
+          do:
+            check: $battery > 20 %
+          next:
+            success: finished
+            failure: rest
+        rest:
+          do:
+            wait: 10 s
+          next: rest
+    ```
+    Good:
+    ```yaml
+    machine:
+      start: look
+      states:
+        look:
+          do:
+            check: $battery > 20 %
+          next:
+            success: finished
+            failure: rest
+        rest:
+          do:
+            wait: 10 s
+          next: look
+    ```
+    """
+    for machine, states, leads in transitions(mission.program):
+        used = reached(machine.start, leads)
+        goals = {*machine.ends, *(state.name for state in states if _is_endless(state))}
+        if not used & machine.ends.keys():
+            continue  # it is meant to go on for ever
+        for state in states:
+            if state.name in used and not reached(state.name, leads) & goals:
+                yield trapped_state.at(
+                    state.span,
+                    f"from the state '{state.name}' no way leads to an end",
+                    help="lead one of its outcomes, or of the states behind it, back or to an end",
+                )
+
+
+def _is_endless(state: Node) -> bool:
+    return isinstance(state.options, StateOptions) and state.options.next is None

@@ -1,0 +1,47 @@
+"""Topics and services that the robot does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from rbxcompose.findings import Finding
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.deeds import called, published
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.messages import Message
+
+
+@mission_check("RBX4150", is_fixable=True)
+def unknown_channel(mission: Examined) -> Iterator[Finding]:
+    """A mission publishes or calls what the robot does not have
+
+    `publish` takes a topic of the robot, `call` one of its services, both by the name that the components use.
+
+    Bad:
+
+    ```yaml
+    do:
+      publish: cmd_vel/telop
+    ```
+
+    Good:
+
+    ```yaml
+    do:
+      publish: cmd_vel/teleop
+    ```
+    """
+    if not mission.robot.is_complete:
+        return  # it may be of a part that could not be read
+    for node in mission.program.nodes:
+        for message in published(node):
+            yield from _nowhere(message, "topic", mission.robot.topics)
+        for message in called(node):
+            yield from _nowhere(message, "service", mission.robot.services)
+
+
+def _nowhere(message: Message, what: str, known: Mapping[str, str]) -> Iterator[Finding]:
+    name = message.target.text
+    if name and name not in known:
+        told = f"the robot has no {what} '{name}'"
+        yield unknown_channel.misspelt(message.target.span, told, name, known, f"{what}s of this robot")

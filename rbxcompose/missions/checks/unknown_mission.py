@@ -1,0 +1,38 @@
+"""Missions that the robot does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding
+from rbxcompose.missions.calling import UseOptions
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+
+
+@mission_check("RBX4144", is_fixable=True)
+def unknown_mission(mission: Examined) -> Iterator[Finding]:
+    """A mission uses one that the robot does not have
+
+    `use` takes a name under the robot's `missions:`.
+
+    Bad:
+
+    ```yaml
+    do:
+      use: patrl
+    ```
+
+    Good:
+
+    ```yaml
+    do:
+      use: patrol
+    ```
+    """
+    missions = mission.robot.missions
+    for node in mission.program.nodes:
+        name = node.options.mission if isinstance(node.options, UseOptions) else ""
+        if isinstance(node.options, UseOptions) and name and name not in missions and name not in mission.robot.unread:
+            message = f"the robot has no mission '{name}'"
+            yield unknown_mission.misspelt(node.options.span, message, name, missions, "missions of this robot")

@@ -1,0 +1,26 @@
+"""Names that are set and do not exist; those that are read are found where their expressions are checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding, correction, suggest
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.codes import UNKNOWN_NAME
+from rbxcompose.missions.deeds import assignments
+from rbxcompose.missions.examined import Examined
+
+
+@mission_check(UNKNOWN_NAME)
+def unknown_name(mission: Examined) -> Iterator[Finding]:
+    """Yield what is set although the mission has no such datum."""
+    data = mission.program.data
+    for node in mission.program.nodes:
+        set_here = list(assignments(node))
+        for assignment in set_here:
+            name = assignment.name
+            if name not in data:
+                message = f"only data can be set; the mission has no datum '{name}'"
+                help_text = suggest(name, data, "its data") or f"write '{name}: ...' under 'data'"
+                fix = correction(name, data, assignment.span, taken=[one.name for one in set_here])
+                yield UNKNOWN_NAME.at(assignment.span, message, help=help_text, fix=fix)

@@ -1,0 +1,54 @@
+"""Transitions that are never taken."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.machines import StateOptions
+
+
+@mission_check("RBX4142", is_fixable=True)
+def unknown_outcome(mission: Examined) -> Iterator[Finding]:
+    """A transition for an outcome that cannot occur
+
+    The body of the state never ends in that way: it may be misspelt, or left over from an earlier version.
+
+    Bad:
+
+    ```yaml
+    machine:
+      start: talk
+      states:
+        talk:
+          do:
+            log: hello
+          next:
+            succes: finished
+    ```
+
+    Good:
+
+    ```yaml
+    machine:
+      start: talk
+      states:
+        talk:
+          do:
+            log: hello
+          next: finished
+    ```
+    """
+    for node in mission.program.nodes:
+        leads_to = node.options.next if isinstance(node.options, StateOptions) else None
+        if leads_to is None or "" in leads_to.to:
+            continue
+        words, handled = mission.ending.of(node.number).words, leads_to.to
+        counted = {counts_as for word, counts_as in words.items() if word not in handled}
+        for outcome in handled:
+            if outcome not in words and outcome not in counted:
+                message = f"the state '{node.name}' never ends with '{outcome}'"
+                span = leads_to.keys.get(outcome, node.span)
+                yield unknown_outcome.misspelt(span, message, outcome, words, "its outcomes", taken=handled)

@@ -1,0 +1,69 @@
+"""Ways of a machine to what does not exist."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.machines import MachineOptions, StateOptions
+from rbxcompose.missions.program import Node
+
+
+@mission_check("RBX4140", is_fixable=True)
+def unknown_state(mission: Examined) -> Iterator[Finding]:
+    """A transition leads to a state that does not exist
+
+    States are declared under `states:`, ends under `ends:`; the ends `finished` and `failed` always exist.
+
+    Bad:
+
+    ```yaml
+    machine:
+      start: away
+      states:
+        away:
+          do:
+            go_to: corner_1
+          next:
+            success: finishd
+            failure: failed
+    ```
+
+    Good:
+
+    ```yaml
+    machine:
+      start: away
+      states:
+        away:
+          do:
+            go_to: corner_1
+          next:
+            success: finished
+            failure: failed
+    ```
+    """
+    for node in mission.program.nodes:
+        if isinstance(node.options, MachineOptions):
+            yield from _start(node.options)
+            for child in node.children:
+                yield from _targets(mission.program.nodes[child], node.options)
+
+
+def _start(machine: MachineOptions) -> Iterator[Finding]:
+    if machine.start_span and machine.states and machine.start not in machine.states:
+        message, what = f"there is no state '{machine.start}'", "states of this machine"
+        yield unknown_state.misspelt(machine.start_span, message, machine.start, machine.states, what)
+
+
+def _targets(state: Node, machine: MachineOptions) -> Iterator[Finding]:
+    leads_to = state.options.next if isinstance(state.options, StateOptions) else None
+    known = (*machine.states, *machine.ends)
+    if leads_to is None:
+        return
+    for outcome, to in leads_to.to.items():
+        if to not in known:
+            message = f"there is no state or end '{to}'"
+            yield unknown_state.misspelt(leads_to.spans[outcome], message, to, known, "states and ends")

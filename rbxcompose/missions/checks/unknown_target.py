@@ -1,0 +1,55 @@
+"""What interrupts restart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+
+
+@mission_check("RBX4145", is_fixable=True)
+def unknown_target(mission: Examined) -> Iterator[Finding]:
+    """An interrupt restarts what does not exist
+
+    `afterwards: {restart: NAME}` takes the `name` of a node, a state, or the item of a loop.
+
+    Bad:
+
+    ```yaml
+    interrupts:
+      battery_low:
+        when: $battery < 20 %
+        do: recharge
+        afterwards:
+          restart: rooom
+    do:
+      for: room
+      in: [corner_1, corner_2]
+      do:
+        go_to: $room
+    ```
+
+    Good:
+
+    ```yaml
+    interrupts:
+      battery_low:
+        when: $battery < 20 %
+        do: recharge
+        afterwards:
+          restart: room
+    do:
+      for: room
+      in: [corner_1, corner_2]
+      do:
+        go_to: $room
+    ```
+    """
+    known = {name for node in mission.program.nodes for name in (node.name, node.item) if name}
+    for interrupt in mission.program.interrupts:
+        named = interrupt.restarts
+        if named and not interrupt.targets:
+            message = f"nothing in the mission is named '{named.text}'"
+            yield unknown_target.misspelt(named.span, message, named.text, known, "names of the mission")

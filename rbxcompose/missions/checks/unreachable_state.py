@@ -1,0 +1,59 @@
+"""States that nothing leads to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding, Severity
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.transitions import reached, transitions
+
+
+@mission_check("RBX4143", Severity.WARNING)
+def unreachable_state(mission: Examined) -> Iterator[Finding]:
+    """A state that no way leads to
+
+    The machine begins in `start` and goes where `next` leads it; nothing leads to this state.
+
+    Bad:
+
+    ```yaml
+    machine:
+      start: talk
+      states:
+        talk:
+          do:
+            log: hello
+          next: finished
+        drive:
+          do:
+            go_to: dock
+          next:
+            success: finished
+            failure: failed
+    ```
+
+    Good:
+
+    ```yaml
+    machine:
+      start: talk
+      states:
+        talk:
+          do:
+            log: hello
+          next: drive
+        drive:
+          do:
+            go_to: dock
+          next:
+            success: finished
+            failure: failed
+    ```
+    """
+    for machine, states, leads in transitions(mission.program):
+        used = reached(machine.start, leads)
+        for state in states if machine.start in leads else ():
+            if state.name not in used:
+                yield unreachable_state.at(state.span, f"no way leads to the state '{state.name}'")

@@ -1,0 +1,52 @@
+"""Outputs that are always the same."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.deeds import written
+from rbxcompose.missions.examined import Examined
+
+
+@mission_check("RBX4134", Severity.WARNING)
+def unwritten_output(mission: Examined) -> Iterator[Finding]:
+    """An output that nothing writes
+
+    What the mission gives back is read from its data, and nothing in the mission changes those: the output is always
+    the value under `data`.
+
+    Bad:
+    ```yaml
+    data:
+      found: 0
+    outputs:
+      people: $found
+    do:
+      go_to: dock
+    ```
+    Good:
+    ```yaml
+    data:
+      found: 0
+    outputs:
+      people: $found
+    do:
+      - go_to: dock
+      - set:
+          found: $found + 1
+    ```
+    """
+    program = mission.program
+    constant = program.data.keys() - written(program)
+    for name, asked in program.outputs.items():
+        read = {one.name for one in asked.expression.names}
+        if read and read <= constant:
+            first = sorted(read)[0]
+            yield unwritten_output.at(
+                asked.scalar.span,
+                f"the output '{name}' is always the same: nothing sets '{first}'",
+                help=f"set '{first}' where it is found out, or keep a result by 'save: {first}'",
+                related=[Related(program.data[first].span, "its only value")],
+            )

@@ -1,0 +1,75 @@
+"""Arguments of skills."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.expressions.types import TypeKind
+from rbxcompose.findings import Finding
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.program import Argument, Skill
+from rbxcompose.missions.typing import check_written
+from rbxcompose.missions.views import View
+
+STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
+
+
+@mission_check("RBX4105", is_fixable=True)
+def wrong_argument(mission: Examined) -> Iterator[Finding]:
+    """Wrong, missing or unknown argument of a skill
+
+    A skill takes the fields of its action's goal as arguments; a single value is the main one.
+
+    Bad:
+
+    ```yaml
+    do:
+      go_to:
+        plce: dock
+    ```
+
+    Good:
+
+    ```yaml
+    do:
+      go_to:
+        pose: dock
+    ```
+    """
+    for view in mission.views:
+        skill = mission.robot.skills.get(view.node.skill)
+        if skill:
+            for argument in view.node.arguments:
+                yield from _argument(view, skill, argument)
+            yield from _missing(view, skill)
+
+
+def _missing(view: View, skill: Skill) -> Iterator[Finding]:
+    given = {argument.name or skill.main for argument in view.node.arguments}
+    if given - skill.arguments.keys():
+        return  # what seems to be missing may be what is misspelt
+    for name in sorted(skill.required - given):
+        message = f"the skill '{skill.name}' needs its argument '{name}'"
+        help_text = f"write '{skill.name}: ...'" if name == skill.main else f"write '{name}: ...' below it"
+        yield wrong_argument.at(view.node.span, message, help=help_text)
+
+
+def _argument(view: View, skill: Skill, argument: Argument) -> Iterator[Finding]:
+    name = argument.name or skill.main
+    if not name:
+        yield wrong_argument.at(argument.span, f"the skill '{skill.name}' takes no single value")
+    elif name not in skill.arguments:
+        message = f"the skill '{skill.name}' has no argument '{name}'"
+        taken = {one.name for one in view.node.arguments}
+        arguments = skill.arguments
+        yield wrong_argument.misspelt(argument.span, message, name, arguments, "its arguments", taken=taken)
+    elif isinstance(argument.value, Scalar):
+        if argument.value.plain and not argument.value.text:
+            yield wrong_argument.at(argument.span, f"the argument '{name}' of '{skill.name}' has no value")
+        else:
+            yield from check_written(view, argument.value, skill.arguments[name], wrong_argument)
+    elif skill.arguments[name].kind not in STRUCTURED:
+        message = f"the argument '{name}' of '{skill.name}' must be {skill.arguments[name].phrase}"
+        yield wrong_argument.at(argument.span, message)

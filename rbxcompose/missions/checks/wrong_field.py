@@ -1,0 +1,142 @@
+"""Fields of messages, and what is in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from rbxcompose.expressions.check import check
+from rbxcompose.expressions.types import TEXT, UNKNOWN, TypeKind
+from rbxcompose.findings import Finding, Span
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.deeds import called, published
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.messages import Message, Shape, Written
+from rbxcompose.missions.typing import check_written
+from rbxcompose.missions.views import View
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.definitions import Shape as Single
+from rbxcompose.msgs.definitions import parse_type
+from rbxcompose.msgs.types import Message as RosMessage
+
+FITTING = {  # the types of expressions that fit a field, by its ROS type; all others are numbers
+    "bool": (TypeKind.FLAG,),
+    "string": (TypeKind.TEXT, TypeKind.CHOICE, TypeKind.PLACE),
+}
+BYTES = ("uint8", "byte", "char")  # a text stands for a list of them
+NUMBERS = (TypeKind.QUANTITY, TypeKind.COUNT)
+
+
+@mission_check("RBX4151", is_fixable=True)
+def wrong_field(mission: Examined) -> Iterator[Finding]:
+    """A message of a mission does not fit its type
+
+    The fields of a message are those of its ROS type, and each has a type of its own. `rbxcompose msg show TYPE` lists
+    them.
+
+    Bad:
+
+    ```yaml
+    do:
+      publish: cmd_vel/teleop
+      message:
+        liner:
+          x: 0.1
+    ```
+
+    Good:
+
+    ```yaml
+    do:
+      publish: cmd_vel/teleop
+      message:
+        linear:
+          x: 0.1
+    ```
+    """
+    topics, services = mission.robot.topics, mission.robot.services
+    for view in mission.views:
+        for message in published(view.node):
+            if message.target.text in topics:
+                yield from _check_body(view, message, registry.message(topics[message.target.text]))
+        for message in called(view.node):
+            if message.target.text in services:
+                yield from _check_body(view, message, registry.service(services[message.target.text]).Request)
+
+
+def _check_body(view: View, message: Message, ros: type[RosMessage]) -> Iterator[Finding]:
+    body = message.body
+    if body is None:
+        return
+    if isinstance(body, Mapping):
+        yield from _check_fields(view, body, ros, message.keys)
+    elif len(ros.FIELDS) == 1:
+        yield from _check_value(view, body, next(iter(ros.FIELDS.values())), message.target.span)
+    else:
+        told = f"{ros.TYPE} has several fields: name them"
+        help_text = f"they are {', '.join(ros.FIELDS)}" if ros.FIELDS else "it has no fields at all"
+        yield wrong_field.at(_span_of(body) or message.target.span, told, help=help_text)
+
+
+def _check_fields(
+    view: View,
+    body: Mapping[str, Shape],
+    ros: type[RosMessage],
+    keys: Mapping[tuple[str, ...], Span],
+    path: tuple[str, ...] = (),
+) -> Iterator[Finding]:
+    for name, shape in body.items():
+        span = keys[(*path, name)]
+        if name not in ros.FIELDS:
+            told = f"{ros.TYPE} has no field '{name}'"
+            yield wrong_field.misspelt(span, told, name, ros.FIELDS, "its fields", taken=body)
+        elif isinstance(shape, Mapping) and "/" in parse_type(ros.FIELDS[name]).base:
+            inner = registry.message(parse_type(ros.FIELDS[name]).base)
+            yield from _check_fields(view, shape, inner, keys, (*path, name))
+        else:
+            yield from _check_value(view, shape, ros.FIELDS[name], span)
+
+
+def _check_value(view: View, shape: Shape, ros_type: str, span: Span) -> Iterator[Finding]:
+    field = parse_type(ros_type)
+    if isinstance(shape, Mapping):
+        yield wrong_field.at(span, f"a map does not fit the type {ros_type}")
+    elif isinstance(shape, Written) and (field.shape is Single.SINGLE or field.base in BYTES):
+        yield from _check_written(view, shape, field.base, ros_type)
+    elif isinstance(shape, Written):
+        yield from _check_list(view, shape, ros_type)
+    elif field.shape is Single.SINGLE:
+        yield wrong_field.at(_span_of(shape) or span, f"a list does not fit the type {ros_type}")
+    else:
+        for item in shape if not field.is_message else ():
+            yield from _check_value(view, item, field.base, span)
+
+
+def _check_list(view: View, shape: Written, ros_type: str) -> Iterator[Finding]:
+    """Yield a single value where a list must be; a name may stand for one."""
+    found = check(shape.expression, view.scope)[0].kind if shape.expression else TypeKind.TEXT
+    if found not in (TypeKind.LIST, TypeKind.UNKNOWN):
+        help_text = f"write '[{shape.scalar.text}]'"
+        yield wrong_field.at(shape.scalar.span, f"this must be a list, {ros_type}", help=help_text)
+
+
+def _check_written(view: View, shape: Written, base: str, ros_type: str) -> Iterator[Finding]:
+    if base == "string":
+        yield from check_written(view, shape.scalar, TEXT, wrong_field)
+    elif shape.expression is None:
+        yield wrong_field.at(shape.scalar.span, f"'{shape.scalar.text}' is no value of the type {ros_type}")
+    else:
+        found = list(view.typed(shape.expression, UNKNOWN, shape.scalar, wrong_field))
+        yield from found
+        given, _ = check(shape.expression, view.scope)
+        if not found and given.kind not in (*FITTING.get(base, NUMBERS), TypeKind.UNKNOWN) and "/" not in base:
+            yield wrong_field.at(shape.scalar.span, f"this must be of the type {ros_type}; it is {given.phrase}")
+
+
+def _span_of(shape: Shape) -> Span | None:
+    """Return the place of a value, or of the first one of a list."""
+    match shape:
+        case Written(scalar=scalar):
+            return scalar.span
+        case (first, *_):
+            return _span_of(first)
+    return None

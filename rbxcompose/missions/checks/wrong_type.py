@@ -1,0 +1,97 @@
+"""Types of conditions and values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from rbxcompose.expressions.check import check
+from rbxcompose.expressions.tree import Number
+from rbxcompose.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, TypeKind, choice_of, quantity_of
+from rbxcompose.findings import Finding
+from rbxcompose.missions.branches import RESULTS
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.codes import UNKNOWN_NAME, WRONG_TYPE
+from rbxcompose.missions.deeds import assignments
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.kinds.choose import ChooseOptions
+from rbxcompose.missions.kinds.for_ import ForOptions
+from rbxcompose.missions.kinds.parallel import ParallelOptions
+from rbxcompose.missions.outcomes import Ending
+from rbxcompose.missions.program import Assignment
+from rbxcompose.missions.views import View, findings_of
+from rbxcompose.units import NUMBER
+
+LISTED = (TypeKind.LIST, TypeKind.MAP, TypeKind.UNKNOWN)
+NUMBERS = (TypeKind.QUANTITY, TypeKind.COUNT)
+
+
+@mission_check(WRONG_TYPE)
+def wrong_type(mission: Examined) -> Iterator[Finding]:
+    """Yield the expressions that are of another type than their place asks for, or name what is not there."""
+    for view in mission.views:
+        for asked in view.node.asked:
+            if not asked.is_assigned:
+                yield from view.typed(asked.expression, asked.wanted, asked.scalar, WRONG_TYPE)
+        for assignment in assignments(view.node):
+            yield from _assigned(view, assignment)
+        yield from _not_listed(view)
+        yield from _other_cases(view)
+        yield from _outcomes(view, mission.ending)
+    whole = [*(interrupt.when for interrupt in mission.program.interrupts), *mission.program.outputs.values()]
+    for asked in whole:
+        yield from findings_of(asked.expression, asked.wanted, asked.scalar, mission.scope, WRONG_TYPE)
+
+
+def _assigned(view: View, assignment: Assignment) -> Iterator[Finding]:
+    """Yield a value that does not fit its datum.
+
+    A count may be given any number, which must then be a whole one, and a text may be given a place: `room: dock` under
+    `data` is a text as well as the name of a place.
+    """
+    asked, data = assignment.asked, view.program.data
+    wanted = data[assignment.name].type if assignment.name in data else UNKNOWN
+    if wanted == COUNT:
+        wanted = quantity_of(NUMBER)
+    elif wanted == TEXT and check(asked.expression, view.scope)[0] == PLACE:
+        wanted = PLACE
+    yield from view.typed(asked.expression, wanted, asked.scalar, WRONG_TYPE)
+
+
+def _not_listed(view: View) -> Iterator[Finding]:
+    """Yield what a loop goes through, if that is no list and no map."""
+    options = view.node.options
+    if isinstance(options, ForOptions) and not isinstance(options.items, tuple) and view.node.asked:
+        found, _ = check(options.items, view.scope)
+        if found.kind not in LISTED:
+            message = f"'in' must be a list or a map; it is {found.phrase}"
+            yield WRONG_TYPE.at(view.node.asked[0].scalar.span, message)
+
+
+def _other_cases(view: View) -> Iterator[Finding]:
+    """Yield the cases that are a quantity of another dimension than what is chosen by."""
+    options = view.node.options
+    if not isinstance(options, ChooseOptions):
+        return
+    chosen, _ = check(options.asked, view.scope)
+    for case in options.cases if chosen.kind in NUMBERS else ():
+        tree = case.expression.tree
+        if isinstance(tree, Number) and tree.dimension != chosen.measure:
+            message = f"the case is {tree.dimension.phrase}; '{options.asked.text}' is {chosen.phrase}"
+            yield WRONG_TYPE.at(case.scalar.span, message)
+
+
+def _outcomes(view: View, ending: Ending) -> Iterator[Finding]:
+    """Yield what is wrong with the conditions over the branches of a parallel."""
+    options = view.node.options
+    if not isinstance(options, ParallelOptions) or not options.outcomes:
+        return
+    names = dict(view.scope.names)
+    for branch, ends in ending.of_branches(view.node).items():
+        names[branch] = choice_of(*RESULTS, *(word for word in ends.named if word not in RESULTS))
+    scope = replace(view.scope, names=names)
+    for outcome in options.outcomes:
+        if asked := outcome.asked:
+            found = list(findings_of(asked.expression, asked.wanted, asked.scalar, scope, WRONG_TYPE))
+            unknown = [one for one in found if one.code == UNKNOWN_NAME.code]
+            yield from unknown or found  # what a misspelt branch is compared with would be no place

@@ -1,0 +1,26 @@
+"""Nodes within nodes within nodes."""
+
+from __future__ import annotations
+
+from rbxcompose.findings import kind
+
+TOO_DEEP = kind(
+    "RBX4115",
+    """Mission nodes are nested too deeply
+
+A mission has at most 40 levels of nodes: nobody could follow more. Give a part of it to a mission of its own.
+
+Bad:
+
+```yaml
+do:
+  - - - - - - recharge    # and so on, more than 40 levels
+```
+
+Good:
+
+```yaml
+do: recharge
+```
+""",
+)

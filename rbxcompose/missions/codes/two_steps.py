@@ -1,0 +1,30 @@
+"""Two steps where one can be."""
+
+from __future__ import annotations
+
+from rbxcompose.findings import kind
+
+TWO_STEPS = kind(
+    "RBX4108",
+    """Two steps in one mapping
+
+A node has exactly one kind or skill. Steps of a list begin with a dash each.
+
+Bad:
+
+```yaml
+do:
+  - go_to: dock
+    recharge:
+```
+
+Good:
+
+```yaml
+do:
+  - go_to: dock
+  - recharge
+```
+""",
+    is_fixable=True,
+)

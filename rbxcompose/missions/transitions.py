@@ -1,0 +1,33 @@
+"""Where the states of machines lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from rbxcompose.missions.machines import MachineOptions, StateOptions
+from rbxcompose.missions.program import Node, Program
+
+Leads = Mapping[str, frozenset[str]]  # the states and ends that each state leads to, by its name
+
+
+def transitions(program: Program) -> Iterator[tuple[MachineOptions, list[Node], Leads]]:
+    """Yield each machine, its states in the order of the text, and where each leads to."""
+    for node in program.nodes:
+        if isinstance(node.options, MachineOptions):
+            states = [program.nodes[child] for child in node.children]
+            yield node.options, states, {state.name: _targets(state) for state in states}
+
+
+def reached(start: str, leads: Leads) -> frozenset[str]:
+    """Return all states and ends to which a way leads from a state, itself included."""
+    found, open_ones = {start}, [start]
+    while open_ones:
+        new = leads.get(open_ones.pop(), frozenset()) - found
+        found.update(new)
+        open_ones.extend(new)
+    return frozenset(found)
+
+
+def _targets(state: Node) -> frozenset[str]:
+    leads_to = state.options.next if isinstance(state.options, StateOptions) else None
+    return frozenset(leads_to.to.values() if leads_to else ())

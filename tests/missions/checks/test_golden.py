@@ -1,0 +1,45 @@
+"""Each kind of finding about missions has a golden pair: a mission with its mistakes, and what `check` says of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.checking import all_checks
+from rbxcompose.compiler import compile_robot
+from rbxcompose.missions.checking import mission_checks
+from rbxcompose.pages import all_kinds
+from rbxcompose.rendering.text import render_text
+from rbxcompose.sdk import skill
+from rbxcompose.testing.golden import Golden
+
+HERE = Path(__file__).parent
+CODES = sorted(
+    {code for code in all_kinds() if code.startswith("RBX41")} - {check.code for check in all_checks()}
+)  # those of the robot's checks lie beside them
+
+
+@skill("pour", restartable=False)
+def pour() -> None:
+    """Pour; twice would be too much."""
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_what_is_said_of_a_mistake_is_its_golden_text(
+    code: str, golden: Golden, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(HERE)
+    out = compile_robot("robot.yaml", environment={"CODE": code})
+    assert {finding.code for finding in out.report} == {code}
+    golden.check(f"{code}.txt", render_text(out.report, out.sources))
+
+
+def test_every_golden_mission_belongs_to_a_kind_and_every_rule_has_one() -> None:
+    assert {path.stem for path in (HERE / "golden").glob("*.*")} == set(CODES)
+    assert {rule.code for rule in mission_checks()} <= set(CODES)
+
+
+def test_a_rule_is_named_like_its_file() -> None:
+    for rule in mission_checks():
+        assert rule.find.__module__ == f"rbxcompose.missions.checks.{rule.find.__name__}"

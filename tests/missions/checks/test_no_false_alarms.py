@@ -1,0 +1,76 @@
+"""What looks like a mistake and is none."""
+
+from __future__ import annotations
+
+import pytest
+
+from rbxcompose.findings import Report
+from rbxcompose.missions.checking import check_program
+from rbxcompose.missions.facts import constants_of
+from rbxcompose.missions.program import Program
+from rbxcompose.missions.reading import read_program
+from tests.missions.simulated import ROBOT, program_of, tree
+
+TOUR = program_of("name: tour\ninputs: {rounds: {type: count, default: 1}}\ndo: {repeat: $rounds, do: a}")
+MACHINE = "do: {{machine: {{start: one, states: {{one: {{do: a, next: {{success: {}, failure: two}}}}, two: {}}}}}}}"
+PARALLEL = (
+    "do: {{machine: {{start: one, states: {{one: {{do: {{parallel: {{work: {}, other: a}}, "
+    "outcomes: {{odd: $work == {}, rest: otherwise}}}}, next: {{odd: finished, rest: failed}}}}}}}}}}"
+)
+
+
+def codes(text: str) -> list[str]:
+    report = Report()
+    program = read_program(tree(text), report, ROBOT.skills)
+    assert isinstance(program, Program)
+    assert not list(report)
+    return [finding.code for finding in check_program(program, ROBOT)]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        MACHINE.format("two", "{do: b, next: {success: one, failure: two}}"),  # it has no end at all
+        MACHINE.format("finished", "{do: {repeat: forever, do: {go_to: dock, optional: true}}}"),  # meant to stay there
+        MACHINE.format("finished", "{do: b, next: {success: one, failure: two}}"),
+        PARALLEL.format("{wait: 1 s, timeout: 2 s}", "failure"),
+        PARALLEL.format("{look: {}}", "empty"),
+        PARALLEL.format("{repeat: 2, do: a}", "halted"),
+        "do: {repeat: 2, do: [{go_to: dock, once: true}, {go_to: kitchen, cooldown: 1 min}]}",
+        "do: [{sequence: [{go_to: dock, once: true}, b], attempts: 2}]",
+        "interrupts: {low: {when: $battery < 20 %, do: {go_to: dock, once: true}}}\ndo: b",
+        "interrupts: {low: {when: $battery < 20 %, afterwards: restart}}\ndo: {go_to: dock, once: true}",
+        "do: [{sequence: [{check: $door}, {go_to: dock, once: true}], reactive: true}]",
+        "do: [{wait: 1 s, timeout: 2 s, optional: true}, a]",
+        "do: [{wait_for: $door, as_long_as: $battery > 20 %, optional: true}, a]",
+        "do: [{wait: 3 s, attempts: 2, attempt_timeout: 1 s}, a]",
+        "do: [{wait: 1 s, invert: true, optional: true}, a]",
+        "do: {fallback: [{wait: 1 s, only_if: $door}, a]}",
+        "do: {fallback: [{if: $door, then: {wait: 1 s}}, a]}",
+        "do: {fallback: [[{wait: 1 s, skip_if: $door}], a]}",
+        "data: {n: 0}\noutputs: {n: $n}\ndo: {go_to: dock, on_success: {set: {n: $n + 1}}}",
+        "data: {n: 0}\noutputs: {n: $n}\ndo: {look: {}, save: n}",
+        "outputs: {level: $battery}\ndo: a",
+        "data: {room: dock}\ndo: [{choose: $room, cases: {dock: a, kitchen: b}}, {set: {room: kitchen}}]",
+        "do: {choose: $door, cases: {true: a, false: b}}",
+        "do: {choose: $battery < 20 %, cases: {true: a}}",
+        "do: {choose: $count_of_people, cases: {1: a, 2: b}}",
+        "data: {left: [dock, kitchen]}\ndo: {for: room, in: $left, remove_done: true, do: {go_to: $room}}",
+        "do: {publish: greetings, message: hello}",
+    ],
+)
+def test_nothing_is_said_of(text: str) -> None:
+    assert codes(text) == []
+
+
+def test_what_a_hook_sets_or_a_node_keeps_is_no_constant() -> None:
+    program = program_of(
+        """
+        data: {a_number: 0, kept: 0, left: [dock], fixed: 3}
+        do:
+          - {go_to: dock, on_failure: {set: {a_number: 1}}}
+          - {look: {}, save: kept}
+          - {for: room, in: $left, remove_done: true, do: {go_to: $room}}
+        """
+    )
+    assert constants_of(program, {}) == {"fixed": 3.0}
