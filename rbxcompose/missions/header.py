@@ -9,10 +9,10 @@ from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
 from rbxcompose.missions.literals import WrongValue, literal, typed
-from rbxcompose.missions.node_reader import NAME, NAME_HELP
 from rbxcompose.missions.program import RATE, Datum, Input
 from rbxcompose.missions.registry import kinds
 from rbxcompose.missions.showing import show
+from rbxcompose.missions.value_reader import NAME, NAME_HELP
 
 INPUT_KEYS = ("type", "default", "min", "max", "choices", "about")
 CHOICE = "choice"

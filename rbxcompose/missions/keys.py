@@ -10,10 +10,10 @@ from rbxcompose.findings import Edit, Fix, nearest, replacement
 from rbxcompose.manifest.tree import Mapping, Scalar
 from rbxcompose.missions import codes
 from rbxcompose.missions.modifiers.registry import modifier_keys
-from rbxcompose.missions.node_reader import Nodes
 from rbxcompose.missions.other_words import SETTINGS
 from rbxcompose.missions.registry import Kind, kinds
 from rbxcompose.missions.strays import is_setting, tight_dashes, unknown_setting
+from rbxcompose.missions.value_reader import Nodes
 
 DASH = "- "
 TIGHT_COLON = re.compile(r"[a-z][a-z0-9_]*:[^\s:/].*")

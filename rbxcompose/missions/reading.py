@@ -15,10 +15,11 @@ from rbxcompose.missions.held import ITEM, Pattern, matching, pattern_of, with_h
 from rbxcompose.missions.keys import find_key
 from rbxcompose.missions.machines import STATE
 from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
-from rbxcompose.missions.node_reader import NAME, NAME_HELP, NodeReader
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.program import AFTERWARDS, RESTART, Asked, Interrupt, Program, Target
 from rbxcompose.missions.registry import Kind, all_kinds, kinds
 from rbxcompose.missions.state_reading import STATE_KEYS, as_state
+from rbxcompose.missions.value_reader import NAME, NAME_HELP
 
 BODIES = ("do", "machine")
 KEYS = ("rbx", "kind", "name", "about", "inputs", "data", "outputs", "interrupts", "rate", *BODIES)

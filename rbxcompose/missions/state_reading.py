@@ -10,8 +10,9 @@ from rbxcompose.manifest.tree import Mapping as Tree
 from rbxcompose.missions import codes
 from rbxcompose.missions.history import WithHistory
 from rbxcompose.missions.machines import ENDS, MachineOptions, Next, StateOptions
-from rbxcompose.missions.node_reader import WORDS, NodeReader
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.statuses import FAILURE, NAMES, SUCCESS
+from rbxcompose.missions.value_reader import WORDS
 
 MACHINE_KEYS = ("start", "states", "ends", "history")
 BODIES = ("do", "machine")

@@ -12,9 +12,10 @@ from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
 from rbxcompose.missions.messages import Message
 from rbxcompose.missions.modifiers.registry import Modifier, modifiers
 from rbxcompose.missions.moments import Moments
-from rbxcompose.missions.node_reader import UNREADABLE, NodeReader
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.program import Asked, Assignment
 from rbxcompose.missions.registry import Kind
+from rbxcompose.missions.value_reader import UNREADABLE
 from rbxcompose.schema.scalars import Schema, computed
 from rbxcompose.schema.settle import DEFINITIONS
 
