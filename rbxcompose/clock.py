@@ -7,12 +7,14 @@ nothing else; wall-clock stamps are data for people and other programs, never a 
 from __future__ import annotations
 
 import time
+from collections import deque
 from enum import Enum, auto
 from typing import Protocol
 
 NANOSECONDS = 1_000_000_000
 PATIENCE = 0.5  # [s] of real time without an advance, after which outside time stands still
 LEAP = 10.0  # [s] of outside time; a larger advance at once is a jump to another time
+JUMPS, DISPUTE = 3, 2.0  # so many jumps within so much real time [s], and more than one source tells the time
 
 
 class Clock(Protocol):
@@ -73,13 +75,15 @@ class Turn(Enum):
     GOES = auto()
     STANDS = auto()
     JUMPED = auto()
+    DISPUTED = auto()
 
 
 class ExternalClock(SteppedClock):
     """Follows a time told from outside, such as a simulator's `/clock`: a stepped clock that may go up to `limit`.
 
     Robot time only goes forwards and by what the outside has advanced, wherever that begins to count; after a jump it
-    goes on from where it was. Real time [s] is an argument; it counts from when the clock begins to listen.
+    goes on from where it was. Where sources disagree, whatever they advance means nothing: it stands still until there
+    has been no jump for `DISPUTE`. Real time [s] is an argument; it counts from when the clock begins to listen.
     """
 
     def __init__(self) -> None:
@@ -90,6 +94,8 @@ class ExternalClock(SteppedClock):
         self._shift = 0  # [ns] of outside time at robot time 0
         self._moved_at = 0.0  # [s] of real time, of the last advance
         self._has_told = False  # that time stands still
+        self._jumps: deque[float] = deque(maxlen=JUMPS)  # [s] of real time, of the last ones
+        self._is_disputed = False
 
     def stamp(self) -> int:
         """Return outside time [ns] at this instant, as other programs that follow it write it."""
@@ -108,11 +114,16 @@ class ExternalClock(SteppedClock):
             return None
         if outside == before:
             return None
-        was_standing, self.is_standing = self.is_standing, False
         self._moved_at, self._has_told = real, False
         if not 0 < outside - before <= LEAP * NANOSECONDS:
             self._begin_here(outside)
-            return Turn.JUMPED
+            return self._jumped(real)
+        if self._is_disputed:
+            self._begin_here(outside)
+            self._is_disputed = real - self._jumps[-1] < DISPUTE
+            if self._is_disputed:
+                return None
+        was_standing, self.is_standing = self.is_standing, False
         self.limit = max(self.limit, (outside - self._shift) / NANOSECONDS)
         return Turn.GOES if was_standing else None
 
@@ -121,7 +132,18 @@ class ExternalClock(SteppedClock):
         if self._has_told or real - self._moved_at < PATIENCE:
             return None
         self._has_told = self.is_standing = True
+        self._is_disputed = False
         return Turn.STANDS
+
+    def _jumped(self, real: float) -> Turn | None:
+        """Return what a jump tells: many of them together are a dispute, which is news only once."""
+        was_disputed = self._is_disputed
+        self._jumps.append(real)
+        self._is_disputed |= len(self._jumps) == JUMPS and real - self._jumps[0] < DISPUTE
+        self.is_standing = self._is_disputed
+        if self._is_disputed:
+            return None if was_disputed else Turn.DISPUTED
+        return Turn.JUMPED
 
     def _begin_here(self, outside: int) -> None:
         """Let the present instant be `outside` [ns]; what was told and has not been reached is left out."""

@@ -43,4 +43,3 @@ def declared(find: Callable[[S], Iterable[Finding]], code: str, severity: Severi
 def belonging(find: Callable[[S], Iterable[Finding]], kind: Kind) -> Rule[S]:
     """Return a rule for a kind of finding that is declared elsewhere, since others than rules find it as well."""
     return Rule(kind.code, kind.doc, kind.severity, kind.is_fixable, find=find)
-

@@ -9,11 +9,11 @@ from docs.generating.markdown import about, code, example, example_of, indented,
 from docs.generating.shapes import keys_table
 from rbxcompose.config import Place
 from rbxcompose.manifest.models import ComponentOptions
-from rbxcompose.missions.goals import skill_of
+from rbxcompose.missions.goals import typed_fields
 from rbxcompose.qos import Qos
 from rbxcompose.schema.components import examples_of
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import In, Looks, Out, Port, ServesAction
+from rbxcompose.sdk.ports import In, Looks, Out, Port, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import PLUGINS, component_type
 
 MADE_OF_SECTIONS: Mapping[str, str] = {
@@ -31,6 +31,7 @@ DIRECTIONS = {
     "serves": "serves",
     "calls": "calls",
     "serves_action": "skill",
+    "serves_topic": "skill",
     "calls_action": "uses",
     "looks": "looks up",
 }
@@ -42,9 +43,10 @@ QOS = {
     Qos.BULK: "large, with the lowest priority",
 }
 PORTS = """## Ports
-**writes** and **reads** are messages on a topic, **serves** and **calls** a service, **skill** an action that missions
-may use, **uses** an action of somebody else, **looks up** a pose among the frames. Ports of one topic and type are
-connected; `connect` gives a port another topic. A skill that *claims* something has it for itself while it runs.
+**writes** and **reads** are messages on a topic, **serves** and **calls** a service, **skill** an action or a topic of
+orders that missions may use, **uses** an action of somebody else, **looks up** a pose among the frames. Ports of one
+topic and type are connected; `connect` gives a port another topic. A skill that *claims* something has it for itself
+while it runs.
 
 The class of a topic (QoS) says what counts:
 
@@ -101,9 +103,9 @@ def port_row(port: Port[Any]) -> tuple[str, ...]:
 
 def remarks(port: Port[Any]) -> str:
     """Return what else is to be known of a port."""
-    if isinstance(port, In) and port.is_open:
+    if isinstance(port, In) and port.is_open and not isinstance(port, ServesTopic):
         return "may be fed from outside the robot"
-    if not isinstance(port, ServesAction):
+    if not isinstance(port, ServesAction | ServesTopic):
         return ""
     words = [f"takes {', '.join(map(code, arguments))}"] if (arguments := arguments_of(port)) else []
     words += [f"claims the {port.claims}"] if port.claims else []
@@ -111,6 +113,7 @@ def remarks(port: Port[Any]) -> str:
     return "; ".join(words)
 
 
-def arguments_of(port: ServesAction[Any, Any, Any]) -> list[str]:
+def arguments_of(port: ServesAction[Any, Any, Any] | ServesTopic[Any]) -> list[str]:
     """Return the arguments that a skill takes, the first one first."""
-    return list(skill_of(port.interface, port.topic).arguments) if port.interface else []
+    message = port.interface.Goal if isinstance(port, ServesAction) and port.interface else port.interface
+    return list(typed_fields(message)) if message else []

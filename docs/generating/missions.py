@@ -12,7 +12,7 @@ from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions.goals import skill_of
+from rbxcompose.missions.goals import skill_of, topic_skill
 from rbxcompose.missions.messages import Message
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.moments import Moments
@@ -22,7 +22,7 @@ from rbxcompose.missions.registry import Kind, kinds
 from rbxcompose.schema.asking import Asking, first_line
 from rbxcompose.schema.mission import mission_schema
 from rbxcompose.schema.scalars import Schema
-from rbxcompose.sdk.ports import ServesAction
+from rbxcompose.sdk.ports import ServesAction, ServesTopic
 from rbxcompose.sdk.registry import PLUGINS, component_type
 
 NODES = """## Nodes
@@ -151,7 +151,7 @@ def whole_page() -> str:
         f"### States of a machine\n{described(schema['definitions']['state']['properties'], [])}",
         ORDER,
         *(of_modifier(name) for name in modifiers()),
-        SKILLS + table(("skill", "arguments", "component", "action"), skills()),
+        SKILLS + table(("skill", "arguments", "component", "action or topic"), skills()),
     )
 
 
@@ -194,8 +194,9 @@ def skills() -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for name in sorted(PLUGINS.shipped):
         for port in ports_of(name).values():
-            if isinstance(port, ServesAction) and port.interface:
-                skill = skill_of(port.interface, port.topic.rpartition("/")[2])
+            if isinstance(port, ServesAction | ServesTopic) and port.interface:
+                make = skill_of if isinstance(port, ServesAction) else topic_skill
+                skill = make(port.interface, port.topic.rpartition("/")[2])
                 arguments = [f"{code(key)}: {one.phrase}" for key, one in skill.arguments.items()]
                 what = f"{code(name)}: {lowered(first_line(component_type(name).__doc__))}"
                 rows.append((code(skill.name), ", ".join(arguments) or "none", what, code(port.interface.TYPE)))

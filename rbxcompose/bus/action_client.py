@@ -84,7 +84,7 @@ class ActionClient(Generic[G, R, F]):
         self._ids = count(1)
         self._listeners: dict[bytes, Callable[[F], None]] = {}  # for feedback, by goal
         self._feedback = Subscription(
-            topics, node, names.feedback, action.FeedbackMessage, Qos.STATE, self._on_feedback
+            topics, node, names.feedback, action.FeedbackMessage, Qos.STATE, self._on_feedback, listens=False
         )
         self._feedback.is_wanted = lambda: bool(self._listeners)  # many clients never ask for it
         self._send: Client[Any, Any] = Client(services, node, names.send_goal, action.SendGoal)
@@ -109,6 +109,7 @@ class ActionClient(Generic[G, R, F]):
         sent: SentGoal[R] = SentGoal(self, id_, then)
         if feedback is not None:
             self._listeners[id_] = feedback
+            self._feedback.listen()
         self._send(self._action.SendGoal.Request(goal_id=UUID(id_), goal=goal), sent.answered)
         return sent
 

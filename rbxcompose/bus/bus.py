@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, TypeVar
 
 from rbxcompose.bus.action_client import ActionClient
 from rbxcompose.bus.action_server import ActionServer
 from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.local import Node, Process
+from rbxcompose.bus.orders import OrderPublisher
 from rbxcompose.bus.services import Client, Request, Server, Services
 from rbxcompose.bus.tokens import publishers_pattern
 from rbxcompose.bus.topics import Publisher, Subscription, Topics
@@ -66,6 +67,11 @@ class Bus:
         node = self._node(owner)
         return _kept(node, Publisher(self._topics, node, topic, message, qos))
 
+    def orders(self, owner: str, topic: str, message: type[M], qos: Qos, servers: Collection[str]) -> OrderPublisher[M]:
+        """Declare a publisher that knows whether the components `servers` listen."""
+        node = self._node(owner)
+        return _kept(node, OrderPublisher(self._topics, node, topic, message, qos, servers))
+
     def subscribe(
         self,
         owner: str,
@@ -75,14 +81,17 @@ class Bus:
         handler: Callable[[M], None],
         *,
         max_rate: float | None = None,
+        waits: bool = False,
+        is_patient: bool = False,
     ) -> Subscription[M]:
-        """Have `handler` called with each message of a topic.
+        """Have `handler` called with each message of a topic, with `waits` not before `open`.
 
-        At most `max_rate` [Hz] are taken from each publisher of another process; None stands for what the class
-        allows.
+        At most `max_rate` [Hz] are taken from each publisher of another process, if it is infinite all of them;
+        None stands for what the class allows. A patient subscription is for what is told often and asked for rarely.
         """
         node = self._node(owner)
-        return _kept(node, Subscription(self._topics, node, topic, message, qos, handler, max_rate))
+        kinds = {"waits": waits, "is_patient": is_patient}
+        return _kept(node, Subscription(self._topics, node, topic, message, qos, handler, max_rate, **kinds))
 
     def serve(self, owner: str, name: str, service: type[Service[Q, R]], handler: Callable[[Q], R]) -> None:
         """Answer requests with what `handler` returns; if it raises, the caller gets the error instead.

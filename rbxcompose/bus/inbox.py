@@ -23,13 +23,20 @@ class Inbox(Generic[T]):
         self._arrived = 0
         self._taken = 0
 
-    def put(self, item: T, post: Post) -> None:
-        """Leave an item. `post` must suit the thread that calls."""
+    def put(self, item: T, post: Post, *, at: int = 1) -> None:
+        """Leave an item. `post` must suit the thread that calls; it is called once `at` items wait."""
         self._items.append(item)
         self._arrived = next(self._arrivals)
-        if not self._is_posted:  # one wake-up suffices, however much comes until it is heeded
+        # One wake-up suffices, however much comes until it is heeded.
+        if not self._is_posted and len(self._items) >= at:
             self._is_posted = True
             post(self._owner, self._take)
+
+    def take_all(self) -> None:
+        """Handle at once what waits."""
+        while self._items:
+            self._taken += 1
+            self._handle(self._items.popleft())
 
     def hold(self) -> None:
         """Let what comes wait until `go_on`."""

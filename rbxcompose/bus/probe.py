@@ -35,6 +35,11 @@ class Probe:
         self._misses = 0
         self._bound = MISSES
 
+    @property
+    def is_in_doubt(self) -> bool:
+        """Tell whether the last probe was missed, so that the next one goes to all; else whoever is near will do."""
+        return self._misses > 0
+
     def judge(self, heard: Heard, *, is_router_up: bool) -> bool:
         """Take what became of a probe; return whether the session is stuck, to be opened anew.
 

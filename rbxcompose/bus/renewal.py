@@ -66,9 +66,15 @@ class RenewableTransport:
         """Receive the requests of other processes."""
         return self._keep(_Entry(self._entries, lambda transport: transport.serve(key, asked)))
 
-    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Closable:
+    def ask(
+        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+    ) -> Closable:
         """Send a request. It is never sent twice: with its session gone, it ends with an error."""
-        request = _Request(self._entries, lambda transport: transport.ask(key, payload, attachment, answered), answered)
+
+        def declare(transport: Transport) -> Closable:
+            return transport.ask(key, payload, attachment, answered, of_all=of_all)
+
+        request = _Request(self._entries, declare, answered)
         if self._transport is None:
             request.detach()
         return self._keep(request)

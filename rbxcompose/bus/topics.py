@@ -15,7 +15,7 @@ from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.local import Node, Registry
 from rbxcompose.bus.refusals import Refusal, Refusals
 from rbxcompose.bus.tokens import EntityKind
-from rbxcompose.bus.transport import Arrival
+from rbxcompose.bus.transport import Arrival, Closable
 from rbxcompose.bus.writers import Reader
 from rbxcompose.msgs.cdr import CdrError, CdrLengthError, decode, encode
 from rbxcompose.msgs.finite import NotFiniteError, require_finite
@@ -74,6 +74,9 @@ class Publisher(Generic[M]):
         if self._remote.has_match:
             self._remote.put(encode(message), source.encode())
 
+    def look_again(self) -> None:
+        """Hear that subscriptions of this process have changed; most publishers need not know."""
+
     def close(self) -> None:
         """Withdraw the publisher and what it kept."""
         self._topics.publishers.remove(self.route, self)
@@ -97,25 +100,42 @@ class Subscription(Generic[M]):
         qos: Qos,
         handler: Callable[[M], None],
         max_rate: float | None = None,
+        *,
+        waits: bool = False,
+        listens: bool = True,
+        is_patient: bool = False,
     ) -> None:
+        """With `waits`, messages wait until the node is open; unless it `listens`, other processes are not heard.
+
+        A patient one takes what comes from them when half of its queue is full, or at `catch_up`: the process is not
+        woken for each message.
+        """
         endpoint = node.endpoint(EntityKind.SUBSCRIPTION, topic, message, ros_qos(qos))
-        self.route = endpoint.route
+        self.route, self.gid, self.owner = endpoint.route, endpoint.gid, node.owner
         self.value: M | None = None
         self.source: Attachment | None = None  # of the newest message
         self.refusals = Refusals()
         self.is_wanted: Callable[[], bool] = lambda: True  # else what arrives from other processes is left alone
-        self._topics, self._process, self._owner, self._qos = topics, node.process, node.owner, qos
+        self._topics, self._process, self._qos = topics, node.process, qos
         self._message, self._handler = message, handler
         rate = max_rate or most_per_second(qos)
-        self._allowances = Allowances(rate) if rate is not None else None
+        self._allowances = None if rate is None or math.isinf(rate) else Allowances(rate)
         self._arrived = -math.inf  # [s] of robot time
+        self._patience = queue_depth(qos) // 2 if is_patient else 1  # messages that may wait for each other
         self._has_complained = False  # in the log; diagnostics go on counting
         self._inbox: Inbox[tuple[float, Delivery[M] | Arrival]] = Inbox(
             node.owner, queue_depth(qos), self._take, node.process.scheduler.post
         )
-        self._remote = node.process.transport.subscribe(endpoint.key, qos, self._arrive)
+        if waits:
+            self._inbox.hold()
+            node.when_open(self._inbox.go_on)
+        self._key = endpoint.key
+        self._remote: Closable | None = None
+        if listens:
+            self.listen()
         self._token = node.announce(endpoint)
         topics.subscriptions.add(self.route, self)
+        self._tell_publishers()
         if qos is Qos.LATCHED:
             for publisher in topics.publishers.at(self.route):
                 if publisher.kept is not None:
@@ -134,10 +154,25 @@ class Subscription(Generic[M]):
     @property
     def reader(self) -> Reader:
         """Return what is asked of who publishes the topic elsewhere."""
+        self.catch_up()
         type_hash = self._process.wire.hash_of(self._message)
         is_part_of_an_action = "/_" in self.route[0]  # nobody speaks there as long as there is no goal
         speaks = expects_speech(self._qos) and not is_part_of_an_action
-        return Reader(self._owner, self.route, type_hash, self._arrived, speaks)
+        return Reader(self.owner, self.route, type_hash, self._arrived, speaks)
+
+    def listen(self) -> None:
+        """Receive from now on what other processes send."""
+        if self._remote is None:
+            self._remote = self._process.transport.subscribe(self._key, self._qos, self._arrive)
+
+    def catch_up(self) -> None:
+        """Handle now what a patient subscription has left until more comes."""
+        if self._patience > 1:
+            self._inbox.take_all()
+
+    def hurry(self) -> None:
+        """Be patient no longer."""
+        self._patience = 1
 
     def deliver(self, delivery: Delivery[M]) -> None:
         """Queue a message of this process; it is handled at the same instant."""
@@ -147,8 +182,14 @@ class Subscription(Generic[M]):
         """Withdraw the subscription; messages that wait are forgotten."""
         self._topics.subscriptions.remove(self.route, self)
         self._token.close()
-        self._remote.close()
+        if self._remote is not None:
+            self._remote.close()
         self._inbox.close()
+        self._tell_publishers()
+
+    def _tell_publishers(self) -> None:
+        for publisher in self._topics.publishers.at(self.route):
+            publisher.look_again()
 
     def _arrive(self, arrival: Arrival) -> None:
         # In a thread of the transport: the age counts from here, however busy the scheduler is.
@@ -156,7 +197,7 @@ class Subscription(Generic[M]):
             return
         now = self._process.clock.now()
         if self._allowances is None or self._is_allowed(self._allowances, arrival, now):
-            self._inbox.put((now, arrival), self._process.transport.wake)
+            self._inbox.put((now, arrival), self._process.transport.wake, at=self._patience)
 
     def _is_allowed(self, allowances: Allowances, arrival: Arrival, now: float) -> bool:
         # What is refused here is said by diagnostics: it displaces nothing, and the scheduler is not even woken.
@@ -194,7 +235,7 @@ class Subscription(Generic[M]):
         self.refusals.add(reason)
         if not self._has_complained:
             self._has_complained = True
-            self._process.log(self._owner, f"dropped a message on {self.route[0]}: {detail}")
+            self._process.log(self.owner, f"dropped a message on {self.route[0]}: {detail}")
 
 
 _REASONS: dict[type[ValueError], Refusal] = {

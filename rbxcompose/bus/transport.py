@@ -88,8 +88,13 @@ class Transport(Protocol):
         """Receive the requests of other processes."""
         ...
 
-    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Closable:
-        """Send a request. An answer or an error comes once the server has one or is gone; closing forgets it."""
+    def ask(
+        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+    ) -> Closable:
+        """Send a request. An answer or an error comes once the server has one or is gone; closing forgets it.
+
+        Unless it is asked `of_all` servers, the nearest gets it.
+        """
         ...
 
     def announce(self, token: str) -> Closable:
@@ -127,7 +132,9 @@ class Nowhere:
         """Receive no requests."""
         return self
 
-    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Nowhere:
+    def ask(
+        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+    ) -> Nowhere:
         """Refuse: no token of a server was ever seen."""
         raise RuntimeError(f"no server of {key} can be reached")
 

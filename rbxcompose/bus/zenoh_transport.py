@@ -70,7 +70,9 @@ class ZenohTransport:
             self._session.declare_queryable(key, handler, complete=True, allowed_origin=zenoh.Locality.REMOTE)
         )
 
-    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Closable:
+    def ask(
+        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+    ) -> Closable:
         """Send a request. An answer or an error comes once the server has one or is gone; closing forgets it."""
         token = zenoh.CancellationToken()
         # The query ends with `drop`: after an answer that is nothing new, without one the server is gone.
@@ -80,7 +82,7 @@ class ZenohTransport:
             handler,
             payload=payload,
             attachment=attachment,
-            target=zenoh.QueryTarget.ALL_COMPLETE,
+            target=zenoh.QueryTarget.ALL_COMPLETE if of_all else zenoh.QueryTarget.BEST_MATCHING,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=FOREVER,
             cancellation_token=token,

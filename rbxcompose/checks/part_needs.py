@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.manifest.models import About, IncludedPart
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wiring import End, resolve
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Serves, ServesAction
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Serves, ServesAction
 
-ANSWERS = {Out: In, In: Out, Calls: Serves, Serves: Calls, CallsAction: ServesAction, ServesAction: CallsAction}
-"""What stands at the other end of a wire, by the class of a port."""
+WIRES: tuple[tuple[type[Port[Any]], type[Port[Any]]], ...] = ((Out, In), (Calls, Serves), (CallsAction, ServesAction))
+"""The classes of the two ends of a wire."""
 
 
 @check("RBX3021")
@@ -44,7 +45,7 @@ def part_needs(robot: Robot) -> Iterator[Finding]:
             others = [end for end in _at(robot, need.name) if end.instance not in own_instances(part)]
             fitting = [end for end in others if is_type(end, need.type)]
             answers = _answers(end for end in _at(robot, need.name) if end.instance in own_instances(part))
-            if any(not answers or type(end.port) in answers for end in fitting):
+            if any(not answers or isinstance(end.port, answers) for end in fitting):
                 continue
             wrong = next((end for end in others if end.type_name and end not in fitting), None)
             have = f"; '{wrong.instance}' has it as {short(wrong.type_name)}" if wrong else ""
@@ -77,5 +78,7 @@ def _at(robot: Robot, topic: str) -> list[End]:
     return [end for end in robot.ends if end.topic == absolute]
 
 
-def _answers(own: Iterable[End]) -> set[type]:
-    return {ANSWERS[type(end.port)] for end in own if type(end.port) in ANSWERS}
+def _answers(own: Iterable[End]) -> tuple[type[Port[Any]], ...]:
+    """Return what may stand at the other ends of the wires of these."""
+    pairs = [*WIRES, *(wire[::-1] for wire in WIRES)]
+    return tuple({other for end in own for one, other in pairs if isinstance(end.port, one)})

@@ -11,7 +11,7 @@ from rbxcompose.manifest.models import About, Claim
 from rbxcompose.manifest.tree import at
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wiring import End, resolve
-from rbxcompose.sdk.ports import ServesAction
+from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 
 
 @check("RBX3022")
@@ -52,14 +52,17 @@ def part_provides(robot: Robot) -> Iterator[Finding]:
                 yield part_provides.at(part.span, message, related=[Related(claim.span, "promised here")])
 
 
+def _serves(end: End, skill: str) -> bool:
+    is_serving = isinstance(end.port, Serves | ServesAction | ServesTopic)
+    return is_serving and end.topic.rpartition("/")[-1] == skill
+
+
 def _lacking(robot: Robot, claim: Claim, ends: list[End]) -> str:
     """Return what a part promises and does not have, in words; nothing if it keeps its promise."""
     match claim.about:
         case About.VALUE if at(robot.manifest.root, ("values", claim.name)) is None:
             return f"the value '{claim.name}'"
-        case About.SKILL if not any(
-            isinstance(end.port, ServesAction) and end.topic.endswith(f"/{claim.name}") for end in ends
-        ):
+        case About.SKILL if claim.name not in robot.skills or not any(_serves(end, claim.name) for end in ends):
             return f"the skill '{claim.name}'"
         case About.PORT:
             topic = resolve(claim.name, robot.manifest.bus.namespace or "")

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.sdk.ports import Serves, ServesAction
+from rbxcompose.model.wiring import End
+from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 
 
 @check("RBX3008")
@@ -42,7 +43,7 @@ def two_servers(robot: Robot) -> Iterator[Finding]:
     """
     first: dict[str, str] = {}
     for end in robot.ends:
-        if not isinstance(end.port, Serves | ServesAction):
+        if not _answers(end):
             continue
         other = first.setdefault(end.topic, end.instance)
         if other != end.instance:
@@ -53,3 +54,8 @@ def two_servers(robot: Robot) -> Iterator[Finding]:
                 help=f"give one of them another name: 'connect: {{{end.name}: ...}}'",
                 related=[Related(robot.part_span(other), "and this one")],
             )
+
+
+def _answers(end: End) -> bool:
+    """Tell whether who asks there waits for an answer; an order of which nobody tells the end may go to several."""
+    return isinstance(end.port, Serves | ServesAction) or (isinstance(end.port, ServesTopic) and bool(end.port.ends))

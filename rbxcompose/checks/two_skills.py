@@ -1,4 +1,4 @@
-"""Two actions that would be the same skill."""
+"""Two actions or topics that would be the same skill."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wiring import End
-from rbxcompose.sdk.ports import ServesAction
+from rbxcompose.sdk.ports import ServesAction, ServesTopic
 
 
 @check("RBX3024")
 def two_skills(robot: Robot) -> Iterator[Finding]:
     """Two actions are the same skill
 
-    A skill of missions is named like the last word of its action's topic. Missions could not tell which one is meant.
+    A skill of missions is named like the last word of the topic of its action, or of the topic that takes its orders.
+    Missions could not tell which one is meant.
 
     Bad:
     ```yaml
@@ -38,7 +39,7 @@ def two_skills(robot: Robot) -> Iterator[Finding]:
     """
     first: dict[str, End] = {}
     for end in robot.ends:
-        if not isinstance(end.port, ServesAction):
+        if not isinstance(end.port, ServesAction | ServesTopic):
             continue
         skill = end.topic.rpartition("/")[-1]
         other = first.setdefault(skill, end)

@@ -10,12 +10,11 @@ import argparse
 import json
 import sys
 
+from rbxcompose.cli.common.answering import misused
 from rbxcompose.cli.common.applying import Proposal
 from rbxcompose.cli.common.robot_options import add_layer_options, compiled
 from rbxcompose.cli.common.robots import REFUSED, NotDoneError
 from rbxcompose.cli.common.telling import refuse, tell, tell_report
-
-USAGE = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,8 +48,7 @@ def _carry_out(proposal: Proposal, arguments: argparse.Namespace) -> int:
         return 0
     if not arguments.yes:
         if arguments.json or not sys.stdin.isatty():
-            sys.stderr.write("rbxcompose apply: nobody can be asked here: give --yes, or --dry-run to look only\n")
-            return USAGE
+            return misused("apply", "nobody can be asked here: give --yes, or --dry-run to look only")
         if not _is_wanted(name):
             tell("nothing was changed")
             return 0

@@ -81,13 +81,13 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> Checked:
 def _check_tests(tests: list[str], checked: Checked) -> None:
     from rbxcompose.trials.reading import Reading  # only tests need it
 
-    reading = Reading(os.environ)
+    reading, found = Reading(os.environ), Report()
     for path in tests:
         trial, report = reading.read(Path(path).resolve())
-        checked.report.extend(report)
+        found.extend(report)
         if trial is not None:
             checked.tests.append(trial.name)
-    checked.report.extend(reading.report)
+    checked.report.extend([*reading.report, *reading.summed_up(found)])
     checked.sources.update(reading.sources)
 
 

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 
+from rbxcompose.cli.common.answering import misused
 from rbxcompose.cli.common.telling import tell
 from rbxcompose.findings import Kind, suggest
 from rbxcompose.pages import all_kinds, body_of, family_of, text_of, title_of
 
-USAGE = 2
 _PREFIX = "RBX"
 
 
@@ -34,8 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     if code not in kinds:
         family = [one for one in kinds if one.startswith(code[: len(_PREFIX) + 2])]
         hint = suggest(code, family or kinds, "codes")
-        sys.stderr.write(f"rbxcompose explain: there is no code {arguments.code!r}; {hint}\n")
-        return USAGE
+        return misused("explain", f"there is no code {arguments.code!r}; {hint}")
     tell(_as_json(kinds[code]) if arguments.json else text_of(kinds[code]).rstrip("\n"))
     return 0
 

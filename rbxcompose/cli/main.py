@@ -51,9 +51,9 @@ def load(verb: str) -> Verb:
 
 def parser_of(name: str, verb: Verb) -> argparse.ArgumentParser:
     """Return the parser of a verb."""
-    import argparse  # help can do without
+    from rbxcompose.cli.common.answering import Parser  # help can do without
 
-    parser = argparse.ArgumentParser(f"rbxcompose {name}", description=verb.__doc__ or "", allow_abbrev=False)
+    parser = Parser(f"rbxcompose {name}", description=verb.__doc__ or "", allow_abbrev=False)
     verb.add_arguments(parser)
     return parser
 
@@ -89,9 +89,12 @@ def _interrupted(number: int, frame: FrameType | None) -> NoReturn:
 
 def _run(name: str, words: Sequence[str]) -> int:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # pydantic would search all that is installed for some
+    from rbxcompose.cli.common.answering import answered
+
     try:
         verb = load(name)
-        return verb.run(parser_of(name, verb).parse_args(words))
+        with answered(in_json="--json" in words):
+            return verb.run(parser_of(name, verb).parse_args(words))
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # so that the flush at exit has somewhere to go
         return 1

@@ -14,6 +14,10 @@ from rbxcompose.runtime.processes import Process
 
 _COLUMNS = ("name", "type", "state", "process", "pid", "restarts")
 _ANSWER = 0.4  # [s] for a supervisor to answer; what it has written is as new as that, but for what died since
+_NO_SUPERVISOR = (
+    "its supervisor has died, without which it brakes and ends; 'rbxcompose down {}', or the next 'up', clears away "
+    "what it has left"
+)
 _BLOCKED = "blocked"  # the state of what runs and cannot do its work
 
 
@@ -99,7 +103,8 @@ def _table(shown: Mapping[str, Any]) -> str:
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     blocked = [one for one in shown["components"] if "waits_for" in one]
     waiting = [f"{one['name']} waits for {one['waits_for']}, which failed" for one in blocked]
-    return "\n".join([head, *lines, *waiting])
+    left = [] if pid else [_NO_SUPERVISOR.format(shown["robot"])]
+    return "\n".join([head, *lines, *waiting, *left])
 
 
 def _cell(value: object) -> str:

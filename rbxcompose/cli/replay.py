@@ -13,11 +13,11 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from rbxcompose.cli.common.answering import misused
 from rbxcompose.cli.common.bus_place import add_bus_options, find_place
 from rbxcompose.cli.common.guest import Guest
 from rbxcompose.cli.common.nouns import seconds
@@ -44,7 +44,6 @@ from rbxcompose.recording.schedule import playlist
 from rbxcompose.recording.summary import Summary, summary_of
 from rbxcompose.recording.topics import Selection, Topic, by_name, is_replayable
 
-USAGE = 2
 _PAUSE = 0.05  # [s] before a recording begins anew
 
 
@@ -73,8 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read the file once to know what is in it, then replay it."""
     if problem := _misused(arguments):
-        sys.stderr.write(f"rbxcompose replay: {problem}\n")
-        return USAGE
+        return misused("replay", problem)
     path = arguments.path
     if path.parent.is_dir():
         recover_in(path.parent)
@@ -98,6 +96,8 @@ def _misused(arguments: argparse.Namespace) -> str:
     layers = arguments.profile or arguments.overlays or arguments.sets or arguments.real
     if layers and not (arguments.into and arguments.robot):
         return "what is laid over a robot's file needs --into and --robot PATH"
+    if arguments.json and not (arguments.info or arguments.into):
+        return "--json needs --info or --into"
     return "--write needs --into" if arguments.write and not arguments.into else ""
 
 

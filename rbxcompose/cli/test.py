@@ -14,17 +14,17 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from rbxcompose.cli.common.answering import misused
 from rbxcompose.cli.common.telling import FINDINGS, has_colour, tell, tell_report
 from rbxcompose.findings import Report
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.trials.coverage import Coverage
 from rbxcompose.trials.finding_files import tests_of
 from rbxcompose.trials.junit import junit
-from rbxcompose.trials.reading import Reading
+from rbxcompose.trials.reading import Reading, Written
 from rbxcompose.trials.running import run_trial
 from rbxcompose.trials.telling import Outcome, Teller, as_json, coverage_text
 
-USAGE = 2
 HERE = Path("missions")
 
 
@@ -44,43 +44,39 @@ def run(arguments: argparse.Namespace) -> int:
     """Read, run and judge the tests, and tell what came out."""
     for path in arguments.paths:
         if not path.exists():
-            sys.stderr.write(f"rbxcompose test: there is no '{path}'\n")
-            return USAGE
+            return misused("test", f"there is no '{path}'")
     files = tests_of(arguments.paths)
     if not files:
-        sys.stderr.write(f"rbxcompose test: no tests ('kind: Test') in {', '.join(map(str, arguments.paths))}\n")
-        return USAGE
+        return misused("test", f"no tests ('kind: Test') in {', '.join(map(str, arguments.paths))}")
     reading, coverage, teller = Reading(os.environ), Coverage(), Teller(has_colour(sys.stdout))
     outcomes: list[Outcome] = []
+    unreadable = Report()
     for file in files:
-        outcome = _outcome(file, reading, arguments.filter)
-        if outcome is None:
+        began = time.perf_counter()
+        written = reading.open(file)
+        if arguments.filter not in written.name:
+            unreadable.extend(() if written.root else written.report)
             continue
+        outcome = _outcome(written, reading, began)
         outcomes.append(outcome)
         if outcome.verdict:
             coverage.add(outcome.verdict.trial.linked, outcome.verdict.trial.names, outcome.verdict.seen.keys)
         if not arguments.json:
             _tell(outcome, teller, arguments.verbose)
-    tell_report(_findings(reading, outcomes), reading.sources)
+    tell_report(_findings(reading, outcomes) if outcomes else unreadable, reading.sources)
     if not outcomes:
-        sys.stderr.write(f"rbxcompose test: no test has '{arguments.filter}' in its name\n")
-        return USAGE
+        return misused("test", f"no test has '{arguments.filter}' in its name")
     _finish(outcomes, coverage, teller, arguments)
     return 0 if all(one.passed for one in outcomes) else FINDINGS
 
 
-def _outcome(file: Path, reading: Reading, wanted: str) -> Outcome | None:
-    """Return what became of a test, None for one that is not wanted."""
-    began = time.perf_counter()
-    trial, report = reading.read(file)
-    name = trial.name if trial else file.name
-    if wanted not in name:
-        return None
+def _outcome(written: Written, reading: Reading, began: float) -> Outcome:
+    trial = reading.understand(written)
     compiled = time.perf_counter()
+    shown, findings = shown_name(written.path), tuple(written.report)
     if trial is None:
-        return Outcome(shown_name(file), name, tuple(report), took=compiled - began)
-    verdict = run_trial(trial)
-    return Outcome(shown_name(file), name, tuple(report), verdict, time.perf_counter() - compiled)
+        return Outcome(shown, written.name, findings, took=compiled - began)
+    return Outcome(shown, written.name, findings, run_trial(trial), time.perf_counter() - compiled)
 
 
 def _tell(outcome: Outcome, teller: Teller, verbose: bool) -> None:
@@ -90,7 +86,7 @@ def _tell(outcome: Outcome, teller: Teller, verbose: bool) -> None:
 
 
 def _findings(reading: Reading, outcomes: Sequence[Outcome]) -> Report:
-    return Report([*reading.report, *(finding for one in outcomes for finding in one.findings)])
+    return Report([*reading.report, *reading.summed_up(finding for one in outcomes for finding in one.findings)])
 
 
 def _finish(outcomes: Sequence[Outcome], coverage: Coverage, teller: Teller, arguments: argparse.Namespace) -> None:

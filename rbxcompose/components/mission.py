@@ -13,31 +13,25 @@ from rbxcompose.executive import broadcast
 from rbxcompose.executive.arrivals import Arrivals
 from rbxcompose.executive.missions import Missions
 from rbxcompose.executive.running import PATIENCE, Running
-from rbxcompose.executive.shell import CALLS, PAUSES, PUBLISHES, SKILL, VALUE, port_name
+from rbxcompose.executive.shell import ENDS, PUBLISHES, VALUE, port_name
+from rbxcompose.executive.topic_skills import Desks
+from rbxcompose.executive.wiring import EVENTS, ports_for
 from rbxcompose.executive.words import words_of
 from rbxcompose.executive.world import RobotWorld
 from rbxcompose.missions.events import MissionEnded, MissionEvent
 from rbxcompose.missions.logbook import INPUTS, Record
 from rbxcompose.missions.program import Program, RobotNames
 from rbxcompose.missions.results import Result
-from rbxcompose.missions.sources import PAUSE, SkillSource, TopicSource, ValueSource, Way
+from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource
 from rbxcompose.missions.statuses import IDLE
 from rbxcompose.missions.using import Using
 from rbxcompose.missions.watching import POSE
 from rbxcompose.missions.world import World
-from rbxcompose.msgs import registry
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.msgs.std_srvs import SetBool
-from rbxcompose.qos import Qos
 from rbxcompose.sdk import (
-    Calls,
-    CallsAction,
     Component,
     Config,
-    In,
     Level,
-    Looks,
-    Out,
     Place,
     Port,
     Refused,
@@ -45,7 +39,6 @@ from rbxcompose.sdk import (
 )
 
 LOOK_AGAIN = 0.1  # [s] between two looks for a pose that has not come yet
-EVENTS = "mission/events"
 
 
 T = TypeVar("T")
@@ -112,26 +105,7 @@ class Mission(Component[MissionConfig]):
     @classmethod
     def ports(cls, config: MissionConfig) -> dict[str, Port[Any]]:
         """Return an end for each value, skill, topic and service that is used, and for the pose if it is read."""
-        ports: dict[str, Port[Any]] = {}
-        for name in sorted(config.reads & config.values.keys()):
-            source = config.values[name]
-            ports[VALUE + name] = In(registry.message(source.message), source.topic)
-        for name, skill in config.used.items():
-            if skill.way is Way.SERVICE:
-                ports[SKILL + name] = Calls(registry.service(skill.action), skill.topic)
-            elif skill.way is Way.ACTION:
-                ports[SKILL + name] = CallsAction(registry.action(skill.action), skill.topic)
-                if skill.skill.pausable:
-                    ports[PAUSES + name] = Calls(SetBool, f"{skill.topic}/{PAUSE}")
-        for topic, target in config.topics.items():
-            ports[port_name(PUBLISHES, topic)] = Out(registry.message(target.message), topic, qos=target.qos)
-        for name, service in config.services.items():
-            ports[port_name(CALLS, name)] = Calls(registry.service(service), name)
-        if POSE in config.reads:
-            ports[POSE] = Looks(source="base_footprint", target="map")
-        if config.programs:
-            ports[port_name(PUBLISHES, EVENTS)] = Out(String, EVENTS, qos=Qos.EVENT)
-        return {name: port.named(name) for name, port in ports.items()}
+        return ports_for(config)
 
     @property
     def equipment(self) -> MissionConfig:
@@ -140,7 +114,7 @@ class Mission(Component[MissionConfig]):
 
     def configure(self) -> None:
         """Nothing has arrived and nothing runs."""
-        self.arrivals = Arrivals(self.config.values)
+        self.arrivals, self.desks = Arrivals(self.config.values), Desks(self)
         self.missions = Missions(self.config, self.world, self.story, self.publish)
         self.broadcast = broadcast.Broadcast(self.config.programs, self.context.window)
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
@@ -153,7 +127,7 @@ class Mission(Component[MissionConfig]):
         self, ended: Callable[[int, Result], None], say: Callable[[MissionEvent], None]
     ) -> tuple[World, RobotWorld]:
         """Return the world of a mission, and the part of it that is the robot; tests put another one around it."""
-        robot = RobotWorld(self, self.arrivals, ended, say)
+        robot = RobotWorld(self, self.arrivals, self.desks, ended, say)
         return robot, robot
 
     def start(self) -> None:
@@ -189,7 +163,10 @@ class Mission(Component[MissionConfig]):
         self.tell(f"mission {one.name} is held until it is resumed")
 
     def received(self, port: str, message: Any) -> None:
-        """Take a value, and look at the missions that wait for it."""
+        """Take a value, and look at the missions that wait for it; or the end of an order."""
+        if port.startswith(ENDS):
+            self.desks.told(port, message)
+            return
         name = port.removeprefix(VALUE)
         wrong = self.arrivals.take(name, message, self.now)
         if wrong and name not in self.misfits:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from rbxcompose.executive.shell import PAUSES, SKILL, Shell
 from rbxcompose.expressions.values import Value
@@ -66,6 +66,8 @@ class Errand:
 class Waiting(Errand):
     """An errand that needs a server: it waits for one for a while."""
 
+    nobody: ClassVar[str] = "nobody serves"  # what is told of a server that is not there
+
     def __init__(self, shell: Shell, done: Done, name: str) -> None:
         super().__init__(shell, done)
         self.name = name
@@ -81,7 +83,7 @@ class Waiting(Errand):
     def begin(self) -> None:
         """Send it, or wait for a server."""
         if not self.send():
-            self.wait(f"nobody serves {self.name}", f"nobody serves {self.name}")
+            self.wait(f"{self.nobody} {self.name}", f"{self.nobody} {self.name}")
 
     def wait(self, told: str, why: str) -> None:
         """Wait for a server; after the time it fails, with this reason."""
@@ -194,11 +196,12 @@ def _result(skill: Skill, ended: Ended[Any]) -> Result:
     values = values_of(ended.result)
     is_good = ended.outcome is Outcome.SUCCEEDED
     told = values.get(OUTCOME) if skill.outcomes else ""
-    reason = ended.message or _text(values) or ("" if is_good else str(ended.outcome))
+    reason = ended.message or text_in(values) or ("" if is_good else str(ended.outcome))
     return Result(is_good, reason, told if isinstance(told, str) else "", values)
 
 
-def _text(values: Mapping[str, Value]) -> str:
+def text_in(values: Mapping[str, Value]) -> str:
+    """Return the reason in the fields of a result, an answer or an end; empty if there is none."""
     told = values.get(MESSAGE, "")
     return told if isinstance(told, str) else ""
 
@@ -224,4 +227,4 @@ class CallErrand(Waiting):
             self.end(Result(False, reply.error))
             return
         values = values_of(reply.response)
-        self.end(Result(values.get(SUCCESS) is not False, _text(values), values=values))
+        self.end(Result(values.get(SUCCESS) is not False, text_in(values), values=values))

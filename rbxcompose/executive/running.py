@@ -55,6 +55,7 @@ class Running:
         world, self.robot = make(self._ended, self._said)
         self.log = Logged(world, lambda record: write({"time": self._now, "mission": name, **record}))
         self.engine = Engine(program, names, inputs, self.log, settings)
+        self.claims = claims_of(self.engine.program, self.engine.robot.skills)  # parts of the robot, for itself alone
         self.mirror = Mirror(self.engine)
         self._known = frozenset(names.values) | {POSE}
         self._inputs, self._settings = inputs, settings
@@ -63,11 +64,6 @@ class Running:
     def is_over(self) -> bool:
         """Tell whether it has ended, by itself or not."""
         return self.end is not None
-
-    @property
-    def claims(self) -> frozenset[str]:
-        """Return the parts of the robot that its skills need for themselves."""
-        return claims_of(self.engine.program, self.engine.robot.skills)
 
     @property
     def state(self) -> str:

@@ -8,7 +8,9 @@ from typing import Any, Protocol
 from rbxcompose.missions.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource
 
-VALUE, SKILL, PAUSES, PUBLISHES, CALLS = "value_", "skill_", "pauses_", "publishes_", "calls_"  # begin names of ports
+# What the names of ports begin with.
+VALUE, PUBLISHES, CALLS = "value_", "publishes_", "calls_"
+SKILL, PAUSES, ENDS, HALTS = "skill_", "pauses_", "ends_", "halts_"  # of a skill: asked, held, its ends, given up
 
 
 class Equipment(Protocol):
@@ -42,6 +44,16 @@ class Equipment(Protocol):
     @property
     def services(self) -> Mapping[str, str]:
         """Return the services that missions call, with their ROS types."""
+        ...
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Return the names that any mission reads."""
+        ...
+
+    @property
+    def used(self) -> Mapping[str, SkillSource]:
+        """Return the skills that any mission uses."""
         ...
 
     @property

@@ -9,6 +9,7 @@ from rbxcompose.executive.arrivals import Arrivals
 from rbxcompose.executive.errands import CallErrand, Done, Errand, GoalErrand
 from rbxcompose.executive.python_skills import PythonErrand
 from rbxcompose.executive.shell import CALLS, PUBLISHES, SKILL, Shell, port_name
+from rbxcompose.executive.topic_skills import Desks, TopicErrand
 from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
 from rbxcompose.missions.events import MissionEvent
 from rbxcompose.missions.goals import filled, goal_of, message_of
@@ -26,10 +27,11 @@ class RobotWorld:
         self,
         shell: Shell,
         arrivals: Arrivals,
+        desks: Desks,
         ended: Callable[[int, Result], None],
         say: Callable[[MissionEvent], None],
     ) -> None:
-        self._shell, self._arrivals, self._told, self._say = shell, arrivals, ended, say
+        self._shell, self._arrivals, self._desks, self._told, self._say = shell, arrivals, desks, ended, say
         self._errands: dict[int, Errand] = {}
 
     # Values
@@ -54,7 +56,7 @@ class RobotWorld:
     # What a mission does
 
     def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
-        """Begin a skill: a goal is sent, a service is called, or Python runs."""
+        """Begin a skill: a goal or an order is sent, a service is called, or Python runs."""
         self._begin(leaf, self._errand(self._done(leaf), skill, arguments))
 
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
@@ -105,6 +107,9 @@ class RobotWorld:
             case Way.SERVICE:
                 request = filled(registry.service(source.action).Request, arguments)
                 return CallErrand(self._shell, done, skill, SKILL + skill, request)
+            case Way.TOPIC:
+                order = filled(registry.message(source.action), arguments)
+                return TopicErrand(self._shell, done, self._desks.of(source), source, order)
             case Way.PYTHON:
                 return PythonErrand(self._shell, done, skill_type(skill), arguments)
 

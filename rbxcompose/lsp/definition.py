@@ -13,6 +13,7 @@ from rbxcompose.manifest.tree import Path, at, key_span
 
 _FRONT = re.compile(r"(\$\{?\s*)?[A-Za-z0-9_.]*$")
 _BACK = re.compile(r"[A-Za-z0-9_.]*")
+_SERVING = ("serves_action", "serves", "serves_topic")  # kinds of ports that are skills
 _FILES = ("file", "part")  # keys whose values are paths
 
 
@@ -87,5 +88,5 @@ def _skill(spot: Spot, word: str) -> Span | None:
     source = robot.skills.get(word) if robot else None
     if robot is None or source is None:
         return None
-    ends = (end for end in robot.ends if end.port.kind == "serves_action" and end.topic == source.topic)
+    ends = (end for end in robot.ends if end.port.kind in _SERVING and end.topic == source.topic)
     return next((robot.part_span(end.instance) for end in ends), None)

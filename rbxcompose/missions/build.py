@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from rbxcompose.missions.kinds.parallel import ParallelOptions
 from rbxcompose.missions.leaf import Leaf
 from rbxcompose.missions.modifiers.registry import modifiers
-from rbxcompose.missions.observing import Named, Observed, Since
+from rbxcompose.missions.observing import Branch, Named, Observed, Since
 from rbxcompose.missions.program import Node, Program, RobotNames
 from rbxcompose.missions.registry import all_kinds
 from rbxcompose.missions.run import Run
@@ -39,8 +41,8 @@ class Builder:
                 reaction.root = self.build(interrupt.root, run, run.scope)
         return run
 
-    def build(self, number: int, run: Run, scope: MissionScope) -> Task:
-        """Return the outermost task of a node, with all below it.
+    def build(self, number: int, run: Run, scope: MissionScope, branch: str = "") -> Task:
+        """Return the outermost task of a node, with all below it; `branch` is what a parallel above calls it.
 
         Raises:
             KeyError: if the robot has no such skill; `check_program` finds that before.
@@ -51,13 +53,18 @@ class Builder:
         own: MissionScope = since or scope
         item = ItemScope(own, node.item) if node.item else None
         inner = self.run(node.inner) if node.inner else None
-        children = () if node.inner else tuple(self.build(child, run, item or own) for child in node.children)
+        children = () if node.inner else tuple(self._below(node, run, item or own))
         site = Site(self.engine, run, node, own, children, item, inner)
         task = self._kept(self._inside(site, node))
         for name in reversed(tuple(modifiers())):
             if name in node.modifiers:
                 task = self._kept(modifiers()[name](site, node.modifiers[name], task))
-        return self._around(site, node, since, task)
+        return self._around(site, since, task, branch)
+
+    def _below(self, node: Node, run: Run, scope: MissionScope) -> Iterator[Task]:
+        branches = node.options.branches if isinstance(node.options, ParallelOptions) else ()
+        for child, branch in zip(node.children, branches or ("",) * len(node.children), strict=True):
+            yield self.build(child, run, scope, branch)
 
     def _inside(self, site: Site, node: Node) -> Task:
         kind = all_kinds().get(node.kind)
@@ -66,12 +73,15 @@ class Builder:
             self.leaves[node.number] = task
         return task
 
-    def _around(self, site: Site, node: Node, since: SinceScope | None, task: Task) -> Task:
+    def _around(self, site: Site, since: SinceScope | None, task: Task, branch: str) -> Task:
         """Return the task with those around it that belong to no modifier."""
+        node = site.node
         if since:
             task = self._kept(Since(site, since, task))
         if node.name:
             task = self._kept(Named(site, node.name, task))
+        elif branch:
+            task = self._kept(Branch(site, branch, task))
         if self.engine.settings.observer:
             task = self._kept(Observed(site, self.engine.settings.observer, task))
         return task

@@ -9,6 +9,7 @@ from rbxcompose.expressions.values import Value
 from rbxcompose.missions.build import Builder
 from rbxcompose.missions.course import Reaction
 from rbxcompose.missions.events import MissionEnded, MissionEvent, Reported
+from rbxcompose.missions.kinds.parallel import ParallelOptions
 from rbxcompose.missions.linking import link
 from rbxcompose.missions.places import Places
 from rbxcompose.missions.program import Program, RobotNames, Target
@@ -43,6 +44,7 @@ class Engine:
         self.outcome = ""  # with which the node that ended last did so; empty for the plain one
         self.now = 0.0  # [s] of robot time
         self.time = 0.0  # [s] of the course that is being ticked: timers use it
+        self.lost = 0.0  # [s] for which the mission was paused; while it is, less the time at which that began
         self.because = ""  # why leaves are being halted
         self.cut_short: list[int] = []  # leaves that were halted by the latest suspension
         self.restarting: tuple[Target, ...] = ()  # what begins anew after the suspension that is going on
@@ -112,12 +114,14 @@ class Engine:
             self.now = now
             self._take_results()
             self.is_paused = True
+            self.lost -= now
             self.main.stack[-1].suspend(now, anew=False)
 
     def resume(self, now: float) -> None:
         """Go on; the skills that were halted are asked again at the next tick."""
         if self.is_paused:
             self.is_paused = False
+            self.lost += now
             self.main.stack[-1].resume(now)
 
     def abort(self, now: float) -> None:
@@ -132,6 +136,11 @@ class Engine:
 
     # What tasks call.
 
+    @property
+    def unpaused(self) -> float:
+        """Return robot time without the pauses of the mission [s]; unlike `time` it goes on during interrupts."""
+        return self.now - self.lost
+
     def again(self, by: Task | Reaction) -> None:
         """Ask for another tick at this instant."""
         self._again = by
@@ -139,6 +148,10 @@ class Engine:
     def is_past(self, time: float) -> bool:
         """Tell whether a time of this course [s] has come."""
         return time - self.time <= ROUNDING
+
+    def has_gone_by(self, seconds: float, since: float) -> bool:
+        """Tell whether so much time has gone by since a time without the pauses of the mission."""
+        return seconds - (self.unpaused - since) <= ROUNDING
 
     def chance(self) -> Random:
         """Return a source of chance for one draw: the same for the same seed and the same draws before."""
@@ -213,7 +226,7 @@ class Engine:
         course = self.main.failed
         number = course.root.number if course and course.root else self.program.main
         while number not in self.reasons:
-            failed = [child for child in self.program.nodes[number].children if self.statuses[child] == FAILURE]
+            failed = [child for child in self._deciding(number) if self.statuses[child] == FAILURE]
             if not failed:
                 break
             number = failed[-1]
@@ -223,6 +236,13 @@ class Engine:
             return f"the reaction of '{course.name}' failed: {told}"
         says_it_all = self.outcome and not reason and number == self.program.main
         return "" if says_it_all else told
+
+    def _deciding(self, number: int) -> tuple[int, ...]:
+        """Return the children whose failure may be that of a node."""
+        node = self.program.nodes[number]
+        if isinstance(node.options, ParallelOptions) and node.options.ends_with:
+            return (node.children[node.options.branches.index(node.options.ends_with)],)
+        return node.children
 
     def _wake_at(self, at: float) -> None:
         if self.wake is None or at < self.wake:

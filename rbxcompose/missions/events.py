@@ -48,6 +48,15 @@ class NodeEnded:
 
 
 @dataclass(frozen=True, slots=True)
+class BranchEnded:
+    """A branch of a parallel ended, or was halted with it; `node` has no name of its own, `name` is the branch's."""
+
+    node: int
+    name: str
+    result: str
+
+
+@dataclass(frozen=True, slots=True)
 class Transition:
     """A machine goes from a state to another one, or to one of its ends, because of an outcome."""
 
@@ -121,6 +130,7 @@ MissionEvent = (
     | SkillEnded
     | NodeStarted
     | NodeEnded
+    | BranchEnded
     | Transition
     | Published
     | InterruptStarted

@@ -107,7 +107,8 @@ def _says_text(node: Node) -> bool:
     return not any(asked.expression.names for asked in node.asked)
 
 
-def _is_simple(node: Node) -> bool:
+def is_simple(node: Node) -> bool:
+    """Tell whether the conditions of a node can always be asked."""
     # An item that is not there, or a division by zero, would be a failure.
     trees = (asked.expression.tree for asked in node.asked)
     return not any(isinstance(part, Index | Field | Arithmetic) for tree in trees for part, _ in walk(tree))
@@ -117,7 +118,7 @@ _GROUPS = ("sequence", "fallback", "parallel")  # skipped if all in them is
 _MAY_DO_NOTHING = ("if", "choose", "for", "repeat", "machine", "use", "run")
 _NEVER_FAILS: Mapping[str, Callable[[Node], bool]] = {
     "wait": lambda node: isinstance(node.options, Expression) and isinstance(node.options.tree, Number),
-    "wait_for": _is_simple,
+    "wait_for": is_simple,
     "log": _says_text,
 }
 

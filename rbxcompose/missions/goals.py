@@ -1,4 +1,4 @@
-"""Actions and services as skills: which arguments they have, the goal that arguments make, what a result tells."""
+"""Actions, services and topics as skills: arguments, the goal that they make, what a result tells."""
 
 from __future__ import annotations
 
@@ -53,10 +53,25 @@ def skill_of(
     A field of another type than a pose, time, text, flag or number is no argument and keeps its zero value. A pose or
     a time that is the main argument has to be given.
     """
-    arguments, results = typed_fields(action.Goal), typed_fields(action.Result)
-    main = next(iter(arguments), "")
-    needed = frozenset({main} if main and action.Goal.FIELDS[main] in (STAMPED, POSED, LASTING) else ())
-    return Skill(name, arguments, main, needed, claims, restartable, pausable, dict(outcomes), results)
+    results = typed_fields(action.Result)
+    return Skill(name, *_asked(action.Goal), claims, restartable, pausable, dict(outcomes), results)
+
+
+def topic_skill(
+    order: type[Message],
+    name: str,
+    end: type[Message] | None = None,
+    claims: str = "",
+    restartable: bool = True,
+    *,
+    outcomes: Mapping[str, str] = MappingProxyType({}),
+) -> Skill:
+    """Return the skill that orders on a topic are, whose ends are messages `end`: its arguments are as for an action.
+
+    Where no ends are told, it has no results.
+    """
+    results = typed_fields(end) if end is not None else {}
+    return Skill(name, *_asked(order), claims, restartable, outcomes=dict(outcomes), results=results)
 
 
 def service_skill(service: type[Service[Any, Any]], name: str) -> Skill | None:
@@ -65,6 +80,14 @@ def service_skill(service: type[Service[Any, Any]], name: str) -> Skill | None:
         return None
     arguments, results = typed_fields(service.Request), typed_fields(service.Response)
     return Skill(name, arguments, next(iter(arguments), ""), results=results)
+
+
+def _asked(message: type[Message]) -> tuple[dict[str, Type], str, frozenset[str]]:
+    """Return the arguments that a message has room for, the main one, and those that have to be given."""
+    arguments = typed_fields(message)
+    main = next(iter(arguments), "")
+    needed = frozenset({main} if main and message.FIELDS[main] in (STAMPED, POSED, LASTING) else ())
+    return arguments, main, needed
 
 
 def typed_fields(message: type[Message]) -> dict[str, Type]:

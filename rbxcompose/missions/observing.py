@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rbxcompose.missions.events import NodeEnded, NodeStarted
+from rbxcompose.missions.events import BranchEnded, NodeEnded, NodeStarted
 from rbxcompose.missions.machines import STATE
 from rbxcompose.missions.modifiers.registry import Modifier
 from rbxcompose.missions.scopes import SinceScope
@@ -77,6 +77,10 @@ class Around(Modifier):
         """Hear that the node ended, or was halted (IDLE)."""
         raise NotImplementedError
 
+    def how(self, status: int) -> str:
+        """Return the word for a status with which the node ends: an outcome of its own, if it has one."""
+        return "halted" if status == IDLE else self.engine.outcome or NAMES[status]
+
 
 class Named(Around):
     """Says when a node with a name, or a state, starts and ends."""
@@ -94,8 +98,24 @@ class Named(Around):
 
     def ended(self, status: int) -> None:
         """Say it."""
-        how = "halted" if status == IDLE else self.engine.outcome or NAMES[status]
-        self.engine.say(NodeEnded(self.number, self.name, how, self.is_state))
+        self.engine.say(NodeEnded(self.number, self.name, self.how(status), self.is_state))
+
+
+class Branch(Around):
+    """Says when a branch of a parallel ends; that all of them start is told by what they do first."""
+
+    __slots__ = ("name",)
+
+    def __init__(self, site: Site, options: str, inner: Task) -> None:
+        super().__init__(site, options, inner)
+        self.name = options
+
+    def started(self) -> None:
+        """Say nothing."""
+
+    def ended(self, status: int) -> None:
+        """Say it."""
+        self.engine.say(BranchEnded(self.number, self.name, self.how(status)))
 
 
 class Observed(Around):

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
-from rbxcompose.expressions.tree import Arithmetic, Field, Index, walk
+from rbxcompose.expressions.tree import Arithmetic, Field, Index, Number, Variable, walk
 from rbxcompose.missions.calling import UseOptions
-from rbxcompose.missions.facts import never_fails
+from rbxcompose.missions.facts import constants_of, is_simple, never_fails
+from rbxcompose.missions.kinds.for_ import NEAREST, ForOptions
 from rbxcompose.missions.kinds.parallel import ParallelOptions
 from rbxcompose.missions.kinds.repeat import RepeatOptions
 from rbxcompose.missions.machines import ENDS, MachineOptions, StateOptions
 from rbxcompose.missions.modifiers.limits import Tries
+from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program import Node, Program, RobotNames
 from rbxcompose.missions.statuses import FAILURE, NAMES, SUCCESS
 
@@ -76,10 +78,11 @@ class Ending:
             self._known[number] = _modified(node, self._inside(node))
         return self._known[number]
 
-    def without(self, node: Node, key: str) -> Outcomes:
-        """Return how a node may end that had one modifier less."""
-        fewer = {name: value for name, value in node.modifiers.items() if name != key}
-        return _modified(replace(node, modifiers=fewer), self._inside(node))
+    def inside_of(self, node: Node, key: str) -> Outcomes:
+        """Return how that may end which is inside of a modifier of a node: what the modifier works on."""
+        order = list(modifiers())
+        inner = {name: one for name, one in node.modifiers.items() if order.index(name) > order.index(key)}
+        return _modified(replace(node, modifiers=inner), self._inside(node))
 
     def mission(self) -> Outcomes:
         """Return how the mission may end."""
@@ -147,11 +150,21 @@ class Ending:
         found = ALWAYS_SUCCEEDS
         for child in self._children(node):
             found = found.both(child)
-        return found if never_fails(node) or not node.asked else found.both(Outcomes(succeeds=False))
+        is_sure = not node.asked or (node.kind == "if" and is_simple(node))
+        return found if is_sure else found.both(Outcomes(succeeds=False))
 
     def loop(self, node: Node) -> Outcomes:
         """A loop fails with its body, and may fail to read its list."""
-        return ANY
+        options = node.options
+        if not isinstance(options, ForOptions) or options.order == NEAREST or options.removes_done or not node.children:
+            return ANY
+        items = options.items
+        if isinstance(items, tuple):
+            is_read = not any(item.names for item in items)
+        else:
+            written = items.tree.name if isinstance(items.tree, Variable) else ""
+            is_read = isinstance(constants_of(self.program, {}).get(written), list | tuple | Mapping)
+        return Outcomes(fails=self.of(node.children[0]).plain.fails) if is_read else ANY
 
     def repeat(self, node: Node) -> Outcomes:
         """A loop for ever ends with a failure only."""
@@ -159,7 +172,16 @@ class Ending:
         options = node.options
         if isinstance(options, RepeatOptions) and options.rounds is None and options.until is None:
             return Outcomes(succeeds=False, fails=body.fails)
-        return ANY if node.asked and any(one.expression.names for one in node.asked) else Outcomes(fails=body.fails)
+        return Outcomes(fails=body.fails) if self._is_counted(node) else ANY
+
+    @staticmethod
+    def _is_counted(node: Node) -> bool:
+        """Tell whether the number of rounds and the time of one are written out, and `until` can always be asked."""
+        if not any(asked.expression.names for asked in node.asked):
+            return True
+        options = node.options
+        numbers = (options.rounds, options.every) if isinstance(options, RepeatOptions) else ()
+        return is_simple(node) and all(one is None or isinstance(one.tree, Number) for one in numbers)
 
     def parallel(self, node: Node) -> Outcomes:
         """Outcomes by conditions, else those of the branch it ends with, else the plain ones."""

@@ -240,8 +240,9 @@ class _Reader:
         if not isinstance(node, Mapping):
             self.add(codes.WRONG_SHAPE.at(node.span, "'interrupts' needs a map from names to interrupts"))
             return ()
-        read = (self.interrupt(name, entry) for name, entry in node.entries.items())
-        return tuple(interrupt for interrupt in read if interrupt)
+        read = [self.interrupt(name, entry) for name, entry in node.entries.items()]
+        # A restart may name what stands in the reaction of a later interrupt, which it may cut: all are read by now.
+        return tuple(replace(one, targets=self.targets(one.restarts)) for one in read if one)
 
     def interrupt(self, name: str, entry: Entry) -> Interrupt | None:
         """Read `when`, `do` and `afterwards`."""
@@ -266,8 +267,7 @@ class _Reader:
         root = None if reaction is None else self.child(reaction, f"interrupts.{name}", None)
         if not reader.asked:
             return None
-        targets = self.targets(restarts) if restarts else ()
-        return Interrupt(name, reader.asked[0], root, afterwards, entry.key.span, restarts, targets)
+        return Interrupt(name, reader.asked[0], root, afterwards, entry.key.span, restarts)
 
     def afterwards(self, reader: NodeReader) -> tuple[str, Scalar | None]:
         """Read what comes after a reaction: a word, or `restart` with the name of what begins anew."""
@@ -277,8 +277,10 @@ class _Reader:
         inner = reader.inside(value, (RESTART,), "'afterwards'")
         return RESTART, inner.scalar(RESTART, "the name of a node, a state or a loop's item")
 
-    def targets(self, named: Scalar) -> tuple[Target, ...]:
-        """Return all nodes, states and loops over an item with a name."""
+    def targets(self, named: Scalar | None) -> tuple[Target, ...]:
+        """Return all nodes, states and loops over an item with a name; nothing if none is named."""
+        if named is None:
+            return ()
         nodes = [node for node in self.nodes if node]
         return tuple(
             Target(node.number, node.item == named.text) for node in nodes if named.text in (node.name, node.item)

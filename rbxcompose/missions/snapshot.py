@@ -21,13 +21,14 @@ from rbxcompose.missions.results import Result
 from rbxcompose.missions.run import Run
 from rbxcompose.missions.task import Task
 
-VERSION = 1
+VERSION = 2
 _CLASSES: Mapping[str, type[Any]] = {cls.__name__: cls for cls in (Place, Pose2, HeldNode, Result)}
 _ENGINE = (
     "status",
     "outcome",
     "now",
     "time",
+    "lost",
     "is_paused",
     "draws",
     "held_until",

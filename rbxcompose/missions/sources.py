@@ -33,17 +33,44 @@ class Way(StrEnum):
 
     ACTION = "action"
     SERVICE = "service"
+    TOPIC = "topic"
     PYTHON = "python"
 
 
 @dataclass(frozen=True, slots=True)
+class OrderTopic:
+    """A topic that belongs to orders: its name, the ROS name of its type, the class of its quality."""
+
+    topic: str
+    message: str
+    qos: str
+
+
+@dataclass(frozen=True, slots=True)
+class Orders:
+    """How orders on a topic are carried out: the class of its quality, and the components that do it.
+
+    `ends` is where it is told how an order ended, `halts` where one is given up.
+    """
+
+    qos: str
+    servers: tuple[str, ...]
+    ends: OrderTopic | None = None
+    halts: OrderTopic | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class SkillSource:
-    """A skill, the ROS name of the type of its action or service, and the name of that; both empty for Python."""
+    """A skill, the ROS name of the type of its action, service or topic, and the name of that; empty for Python.
+
+    `orders` belongs to topics only.
+    """
 
     skill: Skill
     action: str
     topic: str
     way: Way = Way.ACTION
+    orders: Orders = Orders("event", ())
 
 
 @dataclass(frozen=True, slots=True)

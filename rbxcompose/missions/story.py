@@ -9,6 +9,7 @@ from typing import assert_never
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.expressions.values import Place, Value
 from rbxcompose.missions.events import (
+    BranchEnded,
     InterruptEnded,
     InterruptStarted,
     Logged,
@@ -59,6 +60,8 @@ class Story:
                 return Level.OK, f"state {name}" if is_state else f"{name} begins"
             case NodeEnded(name=name, result=result, is_state=is_state):
                 return Level.OK, "" if is_state else f"{name}: {result}"
+            case BranchEnded(name=name, result=result):
+                return Level.OK, f"branch {name}: {result}"
             case Transition(state=state, outcome=outcome, to=to):
                 return Level.OK, f"{state}: {outcome}, on to {to}"
             case Published(topic=topic, fields=fields):

@@ -3,32 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 from rbxcompose.manifest.models import RobotManifest
-from rbxcompose.missions.goals import service_skill, skill_of
+from rbxcompose.missions.goals import service_skill, skill_of, topic_skill
 from rbxcompose.missions.program import Program, Skill
-from rbxcompose.missions.sources import SkillSource, TopicSource, Way
+from rbxcompose.missions.sources import Orders, OrderTopic, SkillSource, TopicSource, Way
 from rbxcompose.model.robot import Part
 from rbxcompose.model.wiring import End
 from rbxcompose.plugins import BrokenPluginError
 from rbxcompose.qos import Qos
-from rbxcompose.sdk.ports import In, Out, Serves, ServesAction
+from rbxcompose.sdk.ports import In, Out, Serves, ServesAction, ServesTopic
 from rbxcompose.sdk.skills import SkillType, skill_names, skill_type
 
 
 def skills_of(parts: Mapping[str, Part], programs: Iterable[Program]) -> dict[str, SkillSource]:
-    """Return the skills of the robot: its actions, then its services, then those in Python that a mission names."""
+    """Return the skills of the robot: actions, services, topics, and those in Python that a mission names."""
     asked = {node.skill for program in programs for node in program.nodes if node.skill}
     found: dict[str, SkillSource] = {}
-    for source in [*_actions(parts), *_services(parts), *python_skills(asked)]:
+    for source in [*_served(parts), *python_skills(asked)]:
         found.setdefault(source.skill.name, source)
     return found
 
 
 def names_of_skills(parts: Mapping[str, Part]) -> frozenset[str]:
     """Return the names of all skills that a mission of the robot may use."""
-    served = (source.skill.name for source in (*_actions(parts), *_services(parts)))
-    return frozenset((*served, *skill_names()))
+    return frozenset((*(source.skill.name for source in _served(parts)), *skill_names()))
+
+
+def _served(parts: Mapping[str, Part]) -> Iterable[SkillSource]:
+    return (*_actions(parts), *_services(parts), *_topics(parts))
 
 
 def _actions(parts: Mapping[str, Part]) -> Iterable[SkillSource]:
@@ -53,6 +57,36 @@ def _services(parts: Mapping[str, Part]) -> Iterable[SkillSource]:
             skill = service_skill(end.port.interface, end.topic.rsplit("/", 1)[-1])
             if skill is not None:
                 yield SkillSource(skill, end.type_name, end.topic, Way.SERVICE)
+
+
+def _topics(parts: Mapping[str, Part]) -> Iterable[SkillSource]:
+    for end in _ends(parts):
+        port = end.port
+        if not isinstance(port, ServesTopic) or port.interface is None:
+            continue
+        told = port.ends.interface if port.ends is not None else None
+        name = end.topic.rsplit("/", 1)[-1]
+        skill = topic_skill(port.interface, name, told, port.claims, port.restartable, outcomes=port.outcomes)
+        yield SkillSource(skill, end.type_name, end.topic, Way.TOPIC, _orders(parts, end, port))
+
+
+def _orders(parts: Mapping[str, Part], end: End, port: ServesTopic[Any]) -> Orders:
+    """Return who carries orders out, and where the ports stand that belong to them."""
+    servers = [one for one in _ends(parts) if isinstance(one.port, ServesTopic) and one.topic == end.topic]
+    own = parts[end.instance].ends
+    return Orders(
+        str(port.qos),
+        tuple(dict.fromkeys(one.instance for one in servers)),
+        _beside(own, port.ends) if port.ends is not None else None,
+        _beside(own, port.halts) if port.halts is not None else None,
+    )
+
+
+def _beside(own: Iterable[End], port: In[Any] | Out[Any]) -> OrderTopic:
+    found = next((one for one in own if one.port is port), None)
+    if found is None:
+        raise ValueError(f"the port '{port.name}' of '{port.topic}' belongs to orders of a component that lacks it")
+    return OrderTopic(found.topic, found.type_name, str(port.qos))
 
 
 def python_skills(names: Iterable[str]) -> list[SkillSource]:

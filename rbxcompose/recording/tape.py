@@ -106,8 +106,10 @@ class _Taped:
     def serve(self, key: str, asked: Callable[[Question], None]) -> Closable:
         return self._inner.serve(key, asked)
 
-    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Closable:
-        return self._inner.ask(key, payload, attachment, answered)
+    def ask(
+        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+    ) -> Closable:
+        return self._inner.ask(key, payload, attachment, answered, of_all=of_all)
 
     def announce(self, token: str) -> Closable:
         self._tape.announced(token)

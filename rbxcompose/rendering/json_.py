@@ -12,10 +12,11 @@ from rbxcompose.formats import output_format
 @output_format("json")
 def render_json(report: Report, sources: Sources, colour: bool = False) -> str:
     """Return all findings as a JSON list, sorted by place."""
-    return json.dumps([_as_data(finding, sources) for finding in report], indent=2, ensure_ascii=False) + "\n"
+    return json.dumps([as_data(finding, sources) for finding in report], indent=2, ensure_ascii=False) + "\n"
 
 
-def _as_data(finding: Finding, sources: Sources) -> dict[str, object]:
+def as_data(finding: Finding, sources: Sources) -> dict[str, object]:
+    """Return all that is known of a finding."""
     fix = exact(finding.fix, sources)
     return {
         "code": finding.code,

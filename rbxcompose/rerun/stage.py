@@ -59,7 +59,9 @@ class Stage(Nowhere):
         self.servers[key] = asked
         return self
 
-    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Nowhere:
+    def ask(
+        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+    ) -> Nowhere:
         """Wait for the reply that was recorded."""
         source = decode_attachment(attachment)
         self.waiting[key, source.gid, source.sequence] = answered

@@ -6,19 +6,30 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol, cast
 
-from rbxcompose.body.transforms import TransformTree
 from rbxcompose.bus.action_server import ActionServer
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.classes import queue_depth
 from rbxcompose.bus.services import Request
+from rbxcompose.diagnostics.levels import Level
 from rbxcompose.missions.sources import PAUSE
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.plan.model import Instance
-from rbxcompose.runtime.frames import Lookup
+from rbxcompose.runtime.frames import Frames, Lookup
 from rbxcompose.runtime.worker import Call, Worker
 from rbxcompose.sdk.bound import Refused
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction
+from rbxcompose.sdk.ports import (
+    Calls,
+    CallsAction,
+    In,
+    Looks,
+    Out,
+    Port,
+    SendsOrders,
+    Serves,
+    ServesAction,
+    ServesTopic,
+)
 
 
 class Handling(Protocol):
@@ -37,11 +48,15 @@ class Handling(Protocol):
         """Have `call` run by whichever thread the component belongs to."""
         ...
 
+    def log(self, level: Level, text: str) -> None:
+        """Write one event of the robot's story."""
+        ...
 
-def bind(component: Component[Any], instance: Instance, bus: Bus, tree: TransformTree, handling: Handling) -> None:
+
+def bind(component: Component[Any], instance: Instance, bus: Bus, frames: Frames | None, handling: Handling) -> None:
     """Fill `component.bound`; what arrives goes to its handlers unless there is a reason to refuse it."""
     for name, port in type(component).ports(component.config).items():
-        component.bound[name] = _end(component, instance, name, port, bus, tree, handling)
+        component.bound[name] = _end(component, instance, name, port, bus, frames, handling)
 
 
 def _end(
@@ -50,18 +65,21 @@ def _end(
     name: str,
     port: Port[Any],
     bus: Bus,
-    tree: TransformTree,
+    frames: Frames | None,
     handling: Handling,
 ) -> object:
     owner, interface = instance.name, cast(Any, port.interface)
     match port:
         case Looks():
-            return Lookup(tree, port.target, port.source)
+            return _lookup(port, frames, handling)
+        case SendsOrders():
+            return bus.orders(owner, instance.topic(name), interface, port.qos, port.servers)
         case Out():
             return bus.publisher(owner, instance.topic(name), interface, port.qos)
         case In():
-            handler = _on_message(component, name, port, handling)
-            return bus.subscribe(owner, instance.topic(name), interface, port.qos, handler, max_rate=port.max_rate)
+            topic, handler = instance.topic(name), _on_message(component, name, port, handling)
+            waits = isinstance(port, ServesTopic)  # as goals do: who sends an order once somebody listens counts on it
+            return bus.subscribe(owner, topic, interface, port.qos, handler, max_rate=port.max_rate, waits=waits)
         case Serves():
             serve = _on_request(component, name, port, handling)
             bus.serve_later(owner, instance.topic(name), interface, serve, waits=True)
@@ -79,6 +97,14 @@ def _end(
             return bus.action_client(owner, instance.topic(name), interface)
         case _:
             raise TypeError(f"'{instance.type}' has a port of an unknown kind: {port!r}")
+
+
+def _lookup(port: Looks, frames: Frames | None, handling: Handling) -> Lookup:
+    if frames is None:
+        raise RuntimeError("a process with components that look keeps frames")
+    if handling.worker is not None:
+        frames.hurry()
+    return Lookup(frames, port.target, port.source)
 
 
 def _pause(
@@ -100,8 +126,11 @@ def _on_message(component: Component[Any], name: str, port: In[Any], handling: H
     label, depth = f"on_{name}", queue_depth(port.qos)
 
     def take(message: Any) -> None:
-        if not handling.refusal(port):  # if there is a reason, it stays the newest value, for who asks
+        reason = handling.refusal(port)
+        if not reason:  # else it stays the newest value, for who asks
             handling.do(label, partial(handler, message), depth=depth)
+        elif isinstance(port, ServesTopic):
+            handling.log(Level.WARN, f"an order to {name} is not carried out: {reason}")
 
     return take
 

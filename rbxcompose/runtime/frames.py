@@ -17,30 +17,47 @@ from rbxcompose.qos import Qos
 class Lookup:
     """The newest pose of frame `source` in frame `target`."""
 
-    tree: TransformTree
+    frames: Frames
     target: str
     source: str
 
     def now(self) -> Pose2 | None:
         """Return the pose [m, m, rad], or None while the frames are not connected."""
-        found = self.tree.lookup(self.target, self.source)
+        found = self.frames.lookup(self.target, self.source)
         return found.to_pose2() if found else None
 
 
 class Frames:
-    """Feeds a transform tree from `/tf` and `/tf_static`."""
+    """Feeds a transform tree from `/tf` and `/tf_static`.
 
-    def __init__(self, owner: str, bus: Bus, clock: Clock) -> None:
+    Poses are told often and asked for rarely. In real time no process is woken for each of them: they are taken when
+    somebody looks. On any other clock they are, so that all that happens at an instant has the same order in each run.
+    """
+
+    def __init__(self, owner: str, bus: Bus, clock: Clock, *, is_patient: bool) -> None:
         self.tree = TransformTree()
         self._clock = clock
-        bus.subscribe(owner, "/tf", TFMessage, Qos.STATE, lambda message: self._take(message, static=False))
-        bus.subscribe(owner, "/tf_static", TFMessage, Qos.LATCHED, lambda message: self._take(message, static=True))
+        self._moving = bus.subscribe(owner, "/tf", TFMessage, Qos.STATE, self._move, is_patient=is_patient)
+        bus.subscribe(owner, "/tf_static", TFMessage, Qos.LATCHED, self._fix)
 
-    def _take(self, message: TFMessage, *, static: bool) -> None:
+    def lookup(self, target: str, source: str) -> Transform3 | None:
+        """Return the newest pose of frame `source` in frame `target`, or None while they are not connected."""
+        self._moving.catch_up()
+        return self.tree.lookup(target, source)
+
+    def hurry(self) -> None:
+        """Take each pose when it comes, since another thread looks, which must not take it."""
+        self._moving.hurry()
+
+    def _fix(self, message: TFMessage) -> None:
+        self._take(message, self._clock.now(), static=True)
+
+    def _move(self, message: TFMessage) -> None:
+        self._take(message, self._clock.now() - self._moving.age, static=False)
+
+    def _take(self, message: TFMessage, stamp: float, *, static: bool) -> None:
         for one in message.transforms:
-            self.tree.set(
-                one.header.frame_id, one.child_frame_id, _transform(one), stamp=self._clock.now(), static=static
-            )
+            self.tree.set(one.header.frame_id, one.child_frame_id, _transform(one), stamp=stamp, static=static)
 
 
 def _transform(message: TransformStamped) -> Transform3:

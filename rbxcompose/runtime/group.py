@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import faulthandler
 import gc
+import math
 import os
 import signal
 import threading
@@ -12,7 +13,7 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from rbxcompose.bus.bus import Bus
-from rbxcompose.clock import ExternalClock, MonotonicClock, SteppedClock, Turn
+from rbxcompose.clock import DISPUTE, ExternalClock, MonotonicClock, SteppedClock, Turn
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.msgs.rosgraph_msgs import Clock as ClockMessage
 from rbxcompose.msgs.stamps import to_nanoseconds
@@ -46,6 +47,11 @@ _TOLD = {
     Turn.GOES: (Level.OK, f"{CLOCK_TOPIC} goes: robot time goes with it, and each deadline counts anew"),
     Turn.STANDS: (Level.STALE, f"{CLOCK_TOPIC} does not go on: robot time stands still, only rest is commanded"),
     Turn.JUMPED: (Level.WARN, f"{CLOCK_TOPIC} has jumped: robot time goes on from here, each deadline counts anew"),
+    Turn.DISPUTED: (
+        Level.ERROR,
+        f"{CLOCK_TOPIC} jumps back and forth: more than one source must be telling it; robot time stands still, only "
+        f"rest is commanded, until there has been no jump for {DISPUTE:g} s",
+    ),
 }
 
 
@@ -283,6 +289,7 @@ class Group:
             ClockMessage,
             Qos.COMMAND,
             lambda message: driver.hear(to_nanoseconds(message.clock)),
+            max_rate=math.inf,  # it is counted in robot time, which might stand still until this brings it on
         )
         driver.follow(MonotonicClock())
 
@@ -292,7 +299,7 @@ class Group:
             return
         if turn is not Turn.GOES:
             self._host.hold()
-        if turn is not Turn.STANDS:
+        if turn not in (Turn.STANDS, Turn.DISPUTED):
             self._host.go_on()
         if self._name == self._plan.groups[0]:
             level, text = _TOLD[turn]

@@ -72,7 +72,7 @@ class Host:
         self._deliveries = Deliveries(self.owner, bus, scheduler, clock, self.statuses)
         self.parameters = Parameters(self.owner, bus, clock, plan.bus.namespace)
         self._rosout = Rosout(self.owner, bus, clock)
-        self.tree = self._frames(instances)
+        self.frames = self._frames(instances)
         self.hosted = {one.name: Hosted(self, one) for one in instances}
         self._policies = {one.name: RestartPolicy(one.restart) for one in instances}
         self._retired: dict[str, Component[Any]] = {}  # whose place another one may take
@@ -82,7 +82,9 @@ class Host:
 
     def _frames(self, instances: Sequence[Instance]) -> Frames | None:
         looking = (port for one in instances for port in component_type(one.type).ports(one.config).values())
-        return Frames(self.owner, self.bus, self.clock) if any(isinstance(p, Looks) for p in looking) else None
+        if not any(isinstance(port, Looks) for port in looking):
+            return None
+        return Frames(self.owner, self.bus, self.clock, is_patient=self._post is not None)
 
     # Lifecycle of the whole process
 
@@ -199,7 +201,7 @@ class Host:
     def prepare(self, instances: Sequence[Instance]) -> None:
         """Configure components beside those that run, or in their place."""
         self.retire([one.name for one in instances])
-        self.tree = self.tree or self._frames(instances)
+        self.frames = self.frames or self._frames(instances)
         for one in instances:
             self.hosted[one.name] = Hosted(self, one)
             self._policies[one.name] = RestartPolicy(one.restart)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from enum import StrEnum
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from rbxcompose.body.transforms import TransformTree
 from rbxcompose.bus.names import admin_key
 from rbxcompose.clock import Clock
 from rbxcompose.config import Config
@@ -19,7 +18,7 @@ from rbxcompose.runtime.handover import HandedOver, handed_over
 from rbxcompose.runtime.worker import Worker
 from rbxcompose.sdk.bound import Refused, Window
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import Port, ServesAction
+from rbxcompose.sdk.ports import Port, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
 
 if TYPE_CHECKING:
@@ -48,6 +47,7 @@ class Hosted:
         self.component: Component[Any] | None = None
         self.worker: Worker | None = None  # the thread of a component that may block
         self._ends: dict[str, Any] = {}  # of the ports, on the bus
+        self._claiming: list[Any] = []  # those of them that serve an action which claims a part of the robot
         self._commands: list[str] = []  # what it is told again after it was restarted in its place
         self._wakes: set[float] = set()  # robot times [s] at which the component is to be woken
 
@@ -63,12 +63,14 @@ class Hosted:
         cls = component_type(self.instance.type)
         self.worker = self.host.worker(self.instance.name) if cls.blocking else None
         made = cls(self.instance.name, self.config, self if self.worker is None else HandedOver(self, self.worker))
-        tree = self.host.tree.tree if self.host.tree else TransformTree()
         self.component = made
-        bind(made, self.instance, self.host.bus, tree, self)
+        bind(made, self.instance, self.host.bus, self.host.frames, self)
         self._ends = dict(made.bound)
+        ports = cls.ports(self.config)
+        self._claiming = [
+            end for name, end in made.bound.items() if isinstance(port := ports[name], ServesAction) and port.claims
+        ]
         if self.worker is not None:
-            ports = cls.ports(self.config)
             made.bound = {name: handed_over(end, ports[name], self.worker) for name, end in self._ends.items()}
         self.host.parameters.serve(self)
         self.do("configure", made.configure, then=self._configured)
@@ -134,6 +136,7 @@ class Hosted:
         if self.worker is not None:
             self.worker.close(0.0)
         self.component = self.worker = None
+        self._claiming = []
         self._wakes.clear()
         self.state = State.UNCONFIGURED
 
@@ -177,30 +180,23 @@ class Hosted:
             return ""
         if not component.is_at_rest:
             return f"'{self.instance.name}' moves"
-        if any(server.current is not None for server in self._claiming()):
+        if any(server.current is not None for server in self._claiming):
             return f"'{self.instance.name}' carries out a goal"
         return component.occupation if component.claims else ""
 
     def cancel_claimed(self) -> None:
         """Ask the goals that claim a part of the robot to end."""
-        for server in self._claiming():
+        for server in self._claiming:
             server.cancel_all()
-
-    def _claiming(self) -> Iterator[Any]:
-        """Yield the servers of actions that claim a part of the robot."""
-        if self.component is None:
-            return
-        for name, port in type(self.component).ports(self.instance.config).items():
-            if isinstance(port, ServesAction) and port.claims and name in self._ends:
-                yield self._ends[name]
 
     def refusal(self, port: Port[Any]) -> str:
         """Return why a message, request or goal cannot be taken now; empty if it can."""
         if self.state is not State.ACTIVE:
             return f"'{self.instance.name}' is not active"
-        if isinstance(port, ServesAction) and port.claims and self.host.is_braking:
+        is_claiming = isinstance(port, ServesAction | ServesTopic) and bool(port.claims)
+        if is_claiming and self.host.is_braking:
             return "the robot is going down"
-        if isinstance(port, ServesAction) and port.claims and self.host.is_stopped:
+        if is_claiming and self.host.is_stopped:
             return "the robot is stopped"
         if isinstance(port, ServesAction) and self.is_busy:
             return f"'{self.instance.name}' is busy"

@@ -8,6 +8,7 @@ import json
 import os
 import select
 import signal
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import FrameType
 from typing import NoReturn, TextIO
@@ -164,7 +165,7 @@ def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: 
         if folder.lock() is None:  # else it is ours until this process ends
             _report(reports, AlreadyUp(_supervisor_of(folder)))
             return FINDINGS
-        told = end_leftovers(folder)
+        told = [*_not_brought_down(folder), *end_leftovers(folder)]
         folder.sweep()
         log = start_new(folder.path)
     except OSError as error:  # it is somebody else's, the disk is full
@@ -178,6 +179,13 @@ def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: 
     folder.clear()
     _report(reports, ended)
     return ended.exit_code
+
+
+def _not_brought_down(folder: RobotFolder) -> Iterator[str]:
+    """Yield that the run before has left its state, which a supervisor that ends takes away."""
+    with contextlib.suppress(BrokenStateError):  # which is told where the leftovers are ended
+        if folder.read_state() is not None:
+            yield "the run before was not brought down, its supervisor has died: what it had left is cleared away"
 
 
 def _supervisor_of(folder: RobotFolder) -> int | None:

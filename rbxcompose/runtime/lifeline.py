@@ -1,8 +1,8 @@
 """Proves that the session of a process still carries data, and opens it anew when it does not.
 
-A session can be stuck for hours while Zenoh takes it for sound. So each process asks all the others and the router of
-the robot, over the bus, and answers them. Questions are answered in Zenoh's own thread, because they are about the
-session: whether the loop of a process turns is told by its signs of life.
+A session can be stuck for hours while Zenoh takes it for sound. So each process asks the nearest of the others over the
+bus, after a miss all of them and the router of the robot, and answers them. Questions are answered in Zenoh's own
+thread, because they are about the session: whether the loop of a process turns is told by its signs of life.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Lifeline:
             if self._probe.judge(heard, is_router_up=is_router_up):
                 self._renew()
                 return
-        self._sent = _Sent(self._transport, self._key)
+        self._sent = _Sent(self._transport, self._key, of_all=self._probe.is_in_doubt)
 
     @property
     def heard(self) -> Heard:
@@ -138,9 +138,9 @@ def _close(old: Transport) -> None:
 class _Sent:
     """A probe on its way."""
 
-    def __init__(self, transport: Transport, key: str) -> None:
+    def __init__(self, transport: Transport, key: str, *, of_all: bool) -> None:
         self.heard = Heard.NOTHING
-        self._asked = transport.ask(key, b"", b"", self._answered)
+        self._asked = transport.ask(key, b"", b"", self._answered, of_all=of_all)
 
     def close(self) -> Heard:
         """Wait no longer; return what has come."""

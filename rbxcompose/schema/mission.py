@@ -10,7 +10,7 @@ from rbxcompose.config import Name
 from rbxcompose.expressions.types import FLAG, TYPES
 from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.manifest.models import Header
-from rbxcompose.missions.goals import skill_of
+from rbxcompose.missions.goals import skill_of, topic_skill
 from rbxcompose.missions.history import HISTORY
 from rbxcompose.missions.modifiers.entering import ON_ENTER
 from rbxcompose.missions.modifiers.registry import modifiers
@@ -34,7 +34,7 @@ from rbxcompose.schema.asking import (
 from rbxcompose.schema.robot import document
 from rbxcompose.schema.scalars import Schema, computed
 from rbxcompose.schema.settle import DEFINITIONS, schemas_of
-from rbxcompose.sdk.ports import ServesAction
+from rbxcompose.sdk.ports import ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
 
 ANY_NODE = "What is done: a skill, a kind of node with its settings, or a list of nodes, which is a sequence."
@@ -192,14 +192,15 @@ def skills_of(types: Iterable[str]) -> dict[str, tuple[Skill, str]]:
     found = {}
     for name in sorted(types):
         cls = component_type(name)
-        for port in _actions(cls):
-            if port.interface is not None:
-                skill = skill_of(port.interface, port.topic.rsplit("/", 1)[-1], port.claims, port.restartable)
-                found[skill.name] = (skill, f"Skill of `{name}`: {first_line(cls.__doc__)}")
+        for skill in _skills(cls):
+            found[skill.name] = (skill, f"Skill of `{name}`: {first_line(cls.__doc__)}")
     return found
 
 
-def _actions(cls: type[Any]) -> Iterator[ServesAction[Any, Any, Any]]:
+def _skills(cls: type[Any]) -> Iterator[Skill]:
     for _, port in inspect.getmembers(cls):
-        if isinstance(port, ServesAction):
-            yield port
+        name = port.topic.rsplit("/", 1)[-1] if isinstance(port, ServesAction | ServesTopic) else ""
+        if isinstance(port, ServesAction) and port.interface is not None:
+            yield skill_of(port.interface, name, port.claims, port.restartable)
+        if isinstance(port, ServesTopic) and port.interface is not None:
+            yield topic_skill(port.interface, name, None, port.claims, port.restartable)

@@ -22,7 +22,7 @@ from rbxcompose.geometry import Pose2
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Ended, Outcome, Refused, Reply, SentGoal, ServedGoal
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component
 from rbxcompose.sdk.skills import Activity, skill
 
@@ -59,6 +59,7 @@ __all__ = [
     "ServedGoal",
     "Serves",
     "ServesAction",
+    "ServesTopic",
     "Speed",
     "Time",
     "component",

@@ -33,6 +33,19 @@ class Sender(Protocol[M_contra]):
         ...
 
 
+class OrderSender(Sender[M_contra], Protocol[M_contra]):
+    """Sends orders, and knows who carries them out."""
+
+    @property
+    def listeners(self) -> frozenset[bytes]:
+        """Return who would get an order now, each by a name of its own; who has been restarted has another name."""
+        ...
+
+    def watch(self, changed: Callable[[], None], /) -> None:
+        """Have `changed` called whenever somebody begins or ceases to listen."""
+        ...
+
+
 class Latest(Protocol[M_co]):
     """The newest message of a subscription."""
 

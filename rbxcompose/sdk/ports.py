@@ -5,7 +5,7 @@ On a class, a port is its declaration; on a component, it is the live thing that
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, overload
 
@@ -89,6 +89,67 @@ class In(Port[Latest[M]]):
         self.interface, self.qos, self.unit, self.is_open, self.max_rate = message, Qos(qos), unit, is_open, max_rate
 
 
+class ServesTopic(In[M]):
+    """Takes orders, each one a message; it is a skill of every mission under its topic's name.
+
+    The method `on_<port>` begins to carry an order out, and a newer one replaces it. The fields of the message are the
+    arguments of the skill; `claims`, `restartable` and `outcomes` are as in `ServesAction`.
+
+    `ends` is the output of the same component that tells how an order ended: by its flag `success`, perhaps an
+    `outcome`, and a `message` with the reason. Without it the skill has succeeded as soon as the order was sent.
+    `halts` is the input to which an empty message comes when an order is given up: by a pause, a stop, a deadline, an
+    interrupt, the end of the mission. Without it nothing can be taken back. No order can be held: one that a pause has
+    given up is sent again at the resume.
+
+    Orders have no numbers. So of those whose ends are told at one output, one is under way at most: a newer one of a
+    mission gives the older one up, which has failed then. One that was given up, or that a stop of the robot has
+    ended, should tell no end. If it tells one within 0.2 s, that is known to be late; a later one would end the next
+    order. Nor is an order told apart that somebody else sends meanwhile.
+    """
+
+    kind = "serves_topic"
+
+    def __init__(
+        self,
+        message: type[M],
+        topic: str,
+        *,
+        ends: Out[Any] | None = None,
+        halts: In[Any] | None = None,
+        claims: str = "",
+        restartable: bool = True,
+        outcomes: Mapping[str, str] = MappingProxyType({}),
+        qos: Qos | str = Qos.EVENT,
+        max_rate: float | None = None,
+    ) -> None:
+        """Declare it.
+
+        Raises:
+            ValueError: if `ends` cannot tell an end, or what is declared could never be told or halted.
+        """
+        super().__init__(message, topic, qos=qos, is_open=True, max_rate=max_rate)
+        end: type[Message] | None = ends.interface if ends is not None else None
+        if end is not None and end.FIELDS.get("success") != "bool":
+            raise ValueError(f"{end.TYPE} has no flag 'success' by which it could tell the end of an order")
+        if halts is not None and end is None:
+            raise ValueError("an order without 'ends' is over once it is sent: 'halts' would never be used")
+        if outcomes and end is None:
+            raise ValueError("an order without 'ends' is over once it is sent: there is nobody to tell an outcome")
+        _require_outcomes(outcomes, end)
+        if halts is not None:
+            halts.is_open = True  # whether a mission feeds it depends on what the robot's missions use
+        self.ends, self.halts = ends, halts
+        self.claims, self.restartable, self.outcomes = claims, restartable, outcomes
+
+
+class SendsOrders(Out[M]):
+    """Sends orders to the components `servers`, and knows whether they listen. Missions have it for their skills."""
+
+    def __init__(self, message: type[M], topic: str, *, servers: Collection[str], qos: Qos | str = Qos.EVENT) -> None:
+        super().__init__(message, topic, qos=qos)
+        self.servers = servers
+
+
 class Serves(Port[None]):
     """Answers requests: the method `on_<port>` takes a request and returns the response."""
 
@@ -136,10 +197,7 @@ class ServesAction(Port[ActionServer[G, R, F]]):
             ValueError: if there are outcomes, but no field of the result for them, or one counts as something else.
         """
         super().__init__(topic)
-        if outcomes and action.Result.FIELDS.get("outcome") != "string":
-            raise ValueError(f"{action.TYPE} has no text field 'outcome' in its result")
-        if wrong := set(outcomes.values()) - {"success", "failure"}:
-            raise ValueError(f"an outcome counts as success or failure, not as {', '.join(sorted(wrong))}")
+        _require_outcomes(outcomes, action.Result)
         self.interface, self.claims, self.restartable = action, claims, restartable
         self.pausable, self.outcomes = pausable, outcomes
 
@@ -152,6 +210,13 @@ class CallsAction(Port[ActionCaller[G, R, F]]):
     def __init__(self, action: type[Action[G, R, F]], topic: str) -> None:
         super().__init__(topic)
         self.interface = action
+
+
+def _require_outcomes(outcomes: Mapping[str, str], end: type[Message] | None) -> None:
+    if outcomes and end is not None and end.FIELDS.get("outcome") != "string":
+        raise ValueError(f"{end.TYPE} has no text field 'outcome'")
+    if wrong := set(outcomes.values()) - {"success", "failure"}:
+        raise ValueError(f"an outcome counts as success or failure, not as {', '.join(sorted(wrong))}")
 
 
 class Looks(Port[Look]):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 from rbxcompose.plugins import BrokenPluginError, Plugins
 from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.ports import Port, ServesTopic
 
 T = TypeVar("T", bound=type[Component[Any]])
 
@@ -19,7 +21,7 @@ def component(name: str) -> Callable[[T], T]:
 
     Raises:
         TypeError: if it is no subclass of `Component`.
-        ValueError: if another class has this name.
+        ValueError: if another class has this name, or one of its ports belongs to a port that it does not have.
     """
 
     def register(cls: T) -> T:
@@ -28,11 +30,23 @@ def component(name: str) -> Callable[[T], T]:
         other = _TYPES.get(name)
         if other is not None and (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
             raise ValueError(f"two component types are named '{name}': {other.__module__} and {cls.__module__}")
+        _require_ends(cls)
         cls.type_name = name
         _TYPES[name] = cls
         return cls
 
     return register
+
+
+def _require_ends(cls: type[Component[Any]]) -> None:
+    """Raise ValueError if orders end or are halted at a port that the class does not have."""
+    ports = [port for _, port in inspect.getmembers(cls) if isinstance(port, Port)]
+    for port in ports:
+        for word in ("ends", "halts") if isinstance(port, ServesTopic) else ():
+            other = getattr(port, word)
+            if other is not None and not any(other is one for one in ports):
+                where = f"{cls.__module__}.{cls.__qualname__}"
+                raise ValueError(f"{where}: '{word}' of the port '{port.name}' is no port of this class")
 
 
 def component_names() -> list[str]:

@@ -37,7 +37,8 @@ class Line(StrEnum):
     LOOK_UP = "look-up"
 
 
-_LINES = {Way.ACTION: Line.ACTION, Way.SERVICE: Line.SERVICE}  # by which a mission reaches its skills
+# By which a mission reaches its skills; those in Python are within it.
+_LINES = {Way.ACTION: Line.ACTION, Way.SERVICE: Line.SERVICE, Way.TOPIC: Line.TOPIC}
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,10 +204,17 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
     def lead(kind: Line, topic: str, type_name: str) -> None:
         found.setdefault((kind, topic), _Open(kind, type_name)).sources.append(Tip(key))
 
+    def hear(topic: str, type_name: str, note: str) -> None:
+        found.setdefault((Line.TOPIC, topic), _Open(Line.TOPIC, type_name)).targets.append(Tip(key, note))
+
     for skill in sorted({node.skill for node in mission.program.nodes} & robot.skills.keys()):
         source = robot.skills[skill]
         if source.way in _LINES:
             lead(_LINES[source.way], source.topic, source.action)
+        if (halts := source.orders.halts) is not None:
+            lead(Line.TOPIC, halts.topic, halts.message)
+        if (ends := source.orders.ends) is not None:
+            hear(ends.topic, ends.message, skill)
     published, called = sent_by([mission.program])
     space = robot.manifest.bus.namespace or ""
     for name in sorted(published & robot.topics.keys()):
@@ -215,8 +223,7 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
         lead(Line.SERVICE, resolve(name, space), robot.services[name])
     for name in sorted(mission.program.reads() & robot.values.keys()):
         value = robot.values[name]
-        wire = found.setdefault((Line.TOPIC, value.topic), _Open(Line.TOPIC, value.message))
-        wire.targets.append(Tip(key, f"${name}"))
+        hear(value.topic, value.message, f"${name}")
 
 
 def _add_look_ups(robot: Robot, found: dict[tuple[Line, str], _Open]) -> None:

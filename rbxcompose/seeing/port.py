@@ -6,11 +6,12 @@ from rbxcompose.manifest.tree import Path, at
 from rbxcompose.model.robot import Part, Robot
 from rbxcompose.model.wiring import End, resolve
 from rbxcompose.plan.model import BusPlan
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction, ServesTopic
 from rbxcompose.seeing.answer import Answer
 from rbxcompose.seeing.wire_keys import does, keys_of, qos_of
 
-_OTHER = {
+_OTHER = {  # the first that a port is an instance of counts
+    ServesTopic: (Out, "ordered by"),
     Out: (In, "read by"),
     In: (Out, "sent by"),
     Serves: (Calls, "called by"),
@@ -66,7 +67,9 @@ def _reason(robot: Robot, part: Part, end: End) -> str:
 
 
 def _others(robot: Robot, end: End) -> tuple[str, str]:
-    other, words = _OTHER[type(end.port)]
-    names = [f"{one.instance}.{one.name}" for one in robot.ends if one.topic == end.topic and type(one.port) is other]
+    other, words = next(pair for kind, pair in _OTHER.items() if isinstance(end.port, kind))
+    names = [
+        f"{one.instance}.{one.name}" for one in robot.ends if one.topic == end.topic and isinstance(one.port, other)
+    ]
     outside = "whoever is outside" if isinstance(end.port, In) and end.port.is_open else "nobody here"
     return words, ", ".join(names) or outside

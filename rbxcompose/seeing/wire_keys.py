@@ -9,7 +9,7 @@ from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalStatusArray
 from rbxcompose.msgs.types import Interface
 from rbxcompose.plan.model import BusPlan
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Serves, ServesAction
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Serves, ServesAction, ServesTopic
 
 Keys = tuple[tuple[str, str], ...]  # what it is for, the key
 
@@ -45,6 +45,8 @@ def does(port: Port[Any]) -> str:
     match port:
         case Out():
             return "sends"
+        case ServesTopic():
+            return "carries out"
         case In():
             return "takes"
         case Serves():

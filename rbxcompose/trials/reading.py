@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,16 @@ from rbxcompose.trials.model import Event, Mock, Trial
 from rbxcompose.trials.sections import Context
 
 
+@dataclass(frozen=True, slots=True)
+class Written:
+    """The file of a test, before anything in it is understood; without `root` it cannot be read."""
+
+    path: Path
+    name: str
+    root: Tree | None
+    report: Report
+
+
 @dataclass(slots=True)
 class Reading:
     """Reads the tests of one run; each robot is compiled once, and its findings are told once.
@@ -42,20 +52,43 @@ class Reading:
     sources: dict[str, str] = field(default_factory=dict)
     report: Report = field(default_factory=Report)
     _robots: dict[str, Compilation] = field(default_factory=dict)
+    _kept_back: dict[Finding, str] = field(default_factory=dict)  # what a test is told of a robot with mistakes
 
     def read(self, path: Path) -> tuple[Trial | None, Report]:
         """Return the test of a file, None if there is something wrong with it or with its robot; and its findings."""
+        written = self.open(path)
+        return self.understand(written), written.report
+
+    def open(self, path: Path) -> Written:
+        """Return what is written in a file; a test without a name is called like its file."""
         report = Report()
-        documents = Documents(report, self.sources)
-        root = documents.read(path, TEST)
+        root = Documents(report, self.sources).read(path, TEST)
+        name = root.get("name") if root else None
+        return Written(path, name.text if isinstance(name, Scalar) and name.text else path.name, root, report)
+
+    def understand(self, written: Written) -> Trial | None:
+        """Return the test that is written, None if it cannot run; what is wrong is added to its report."""
+        root, report = written.root, written.report
         if root is None:
-            return None, report
-        documents.check(TrialFile, _without_values(root))
-        compilation = self._robot(root, path, report)
+            return None
+        Documents(report, self.sources).check(TrialFile, _without_values(root))
+        compilation = self._robot(root, written.path, report)
         if compilation is None or compilation.robot is None or compilation.plan is None:
-            return None, report
+            return None
         trial = _read(root, compilation.robot, compilation.plan, report)
-        return (None if report.has_errors else trial), report
+        return None if report.has_errors else trial
+
+    def summed_up(self, findings: Iterable[Finding]) -> Iterator[Finding]:
+        """Yield findings, but for all tests together that a robot with mistakes keeps from running only one."""
+        kept_back: dict[str, list[Finding]] = {}
+        for one in Report(list(findings)):
+            if one in self._kept_back:
+                kept_back.setdefault(self._kept_back[one], []).append(one)
+            else:
+                yield one
+        for robot, ones in kept_back.items():
+            which = "the test" if len(ones) == 1 else f"{len(ones)} tests"
+            yield replace(ones[0], message=_no_robot(robot, which))
 
     def _robot(self, root: Tree, path: Path, report: Report) -> Compilation | None:
         """Return what the compiler makes of the robot, if it can run."""
@@ -67,16 +100,21 @@ class Reading:
             report.add(file)
             return None
         name = str(file)
+        shown = name if isinstance(file, str) else shown_name(file)
         if name not in self._robots:
-            shown = name if isinstance(file, str) else shown_name(file)
             self._robots[name] = compile_robot(shown, environment=self.environment)
             self.report.extend(self._robots[name].report)
             self.sources.update(self._robots[name].sources)
         found = self._robots[name]
         if found.plan is None:
-            message = f"the robot '{written.text}' has mistakes, so that the test cannot run"
-            report.add(codes.NEVER.at(written.span, message, help="see the findings of the robot"))
+            why = codes.NEVER.at(written.span, _no_robot(shown, "the test"), help="see the findings of the robot")
+            self._kept_back[why] = shown
+            report.add(why)
         return found
+
+
+def _no_robot(robot: str, which: str) -> str:
+    return f"the robot '{robot}' has mistakes, so that {which} cannot run"
 
 
 def _without_values(root: Tree) -> Tree:

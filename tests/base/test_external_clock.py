@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.clock import LEAP, NANOSECONDS, PATIENCE, ExternalClock, Turn
+from rbxcompose.clock import DISPUTE, JUMPS, LEAP, NANOSECONDS, PATIENCE, ExternalClock, Turn
 
 EPOCH = 1_700_000_000 * NANOSECONDS
 
@@ -85,6 +85,57 @@ def test_a_jump_ends_a_standstill() -> None:
     clock.look(real=5.0)
     assert clock.hear(0, real=5.0) is Turn.JUMPED
     assert not clock.is_standing
+
+
+def told_by_two(clock: ExternalClock, ahead: float, real: float, seconds: float = 3.0) -> list[Turn]:
+    """Let two sources tell the time in turn, the second so far ahead [s], each 50 times a second."""
+    turns = []
+    for step in range(round(seconds * 50)):
+        now = real + 0.02 * step
+        for shift in (0.0, ahead):
+            turns.append(clock.hear(EPOCH + round((now + shift) * NANOSECONDS), real=now))
+            turns.append(clock.look(real=now))
+            reach(clock)
+    return [turn for turn in turns if turn is not None]
+
+
+@pytest.mark.parametrize("ahead", [0.5, -0.5, 1000.0, -1000.0])
+def test_sources_that_disagree_are_told_once_and_time_stands_still(ahead: float) -> None:
+    clock = going()
+    turns = told_by_two(clock, ahead, real=0.2)
+    assert turns == [*[Turn.JUMPED] * (JUMPS - 1), Turn.DISPUTED]
+    assert clock.is_standing
+    before = reach(clock)
+    assert told_by_two(clock, ahead, real=3.3) == []
+    assert reach(clock) == before
+
+
+def test_when_one_source_is_left_time_goes_on_after_a_while() -> None:
+    clock = going()
+    told_by_two(clock, -1000.0, real=0.2)
+    before = reach(clock)
+    turns = []
+    for step in range(200):
+        real = 3.2 + 0.02 * step
+        if turn := clock.hear(EPOCH + round(real * NANOSECONDS), real=real):
+            turns.append((real, turn))
+    last_jump = 3.2
+    assert [turn for _, turn in turns] == [Turn.GOES]
+    assert turns[0][0] == pytest.approx(last_jump + DISPUTE, abs=0.1)
+    assert reach(clock) == pytest.approx(before + 2.0, abs=0.1)
+
+
+def test_a_silence_ends_a_dispute() -> None:
+    clock = going()
+    told_by_two(clock, -1000.0, real=0.2)
+    assert clock.look(real=9.0) is Turn.STANDS
+    assert clock.hear(EPOCH, real=9.1) is Turn.JUMPED
+
+
+def test_jumps_with_time_between_them_are_told_each() -> None:
+    clock = going()
+    for number in range(1, 5):
+        assert clock.hear(EPOCH - number * NANOSECONDS, real=number * DISPUTE) is Turn.JUMPED
 
 
 def test_what_was_told_before_a_jump_and_was_not_reached_is_left_out() -> None:

@@ -122,7 +122,9 @@ class Wire:
         self.lines.append(f"serve {key}")
         return Declared(self, key)
 
-    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Declared:
+    def ask(
+        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+    ) -> Declared:
         self.note("ask", key, payload, attachment)
         self.asked[key] = answered
         return Declared(self, key)

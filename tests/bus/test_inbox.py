@@ -30,6 +30,21 @@ def test_however_much_comes_the_scheduler_is_woken_once() -> None:
     assert [owner for owner, _ in woken] == ["a"]
 
 
+def test_who_is_patient_is_woken_once_so_many_items_wait_and_may_take_them_before() -> None:
+    scheduler, handled = Scheduler(), list[int]()
+    inbox = Inbox("a", 10, handled.append, scheduler.post)
+    for item in (1, 2):
+        inbox.put(item, scheduler.post, at=3)
+    scheduler.advance(0.0)
+    assert handled == []
+    inbox.take_all()
+    assert (handled, inbox.dropped) == ([1, 2], 0)
+    for item in (3, 4, 5):
+        inbox.put(item, scheduler.post, at=3)
+    scheduler.advance(0.0)
+    assert handled == [1, 2, 3, 4, 5]
+
+
 def test_a_full_inbox_takes_turns_with_the_others() -> None:
     scheduler, handled = Scheduler(), list[str]()
     busy = Inbox("a", 10, handled.append, scheduler.post)

@@ -32,7 +32,9 @@ class Link:
     def serve(self, key: str, asked: Callable[[Question], None]) -> Closable:
         return self._declare(f"serve {key}")
 
-    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Closable:
+    def ask(
+        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+    ) -> Closable:
         return self._declare(f"ask {key}")
 
     def announce(self, token: str) -> Closable:

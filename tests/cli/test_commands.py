@@ -77,10 +77,15 @@ def test_a_misspelt_robot_gets_a_hint(capsys: pytest.CaptureFixture[str]) -> Non
     assert "did you mean 'turtlebot'?" in capsys.readouterr().err
 
 
-def test_a_robot_that_does_not_answer_is_a_finding(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("words", ["stop", "release", "mission ls", "topic ls", "top --once", "record --for 1s"])
+def test_a_robot_whose_supervisor_has_died_is_a_finding_that_says_so(
+    words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     written("a")
-    assert command.main(["stop"]) == 1
-    assert "error[RBX9005]: 'a' does not answer" in capsys.readouterr().err
+    assert command.main(words.split()) == 1
+    error = capsys.readouterr().err
+    assert "error[RBX9005]: 'a' does not answer: its supervisor has died" in error
+    assert "'rbxcompose down a' ends what is left of it" in error
 
 
 def test_ps_shows_what_a_dead_supervisor_last_wrote(capsys: pytest.CaptureFixture[str]) -> None:
@@ -95,7 +100,10 @@ def test_ps_shows_what_a_dead_supervisor_last_wrote(capsys: pytest.CaptureFixtur
         ],
     }
     assert command.main(["ps"]) == 0
-    assert "base  toy   dead   robot    -    1" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "base  toy   dead   robot    -    1" in out
+    assert "its supervisor has died" in out.splitlines()[-1]
+    assert "'rbxcompose down a', or the next 'up', clears away what it has left" in out
 
 
 @pytest.mark.parametrize("wanted", ["a", "/robots/a/robot.yaml", "/robots/a"])

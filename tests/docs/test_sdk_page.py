@@ -11,7 +11,7 @@ HOME = ROOT / "tests/third_party"
 
 def test_each_block_is_the_file_that_it_names() -> None:
     named = [block for block in blocks_of(TEXT, "sdk.md") if len(block.words) > 1]
-    assert len(named) == 9
+    assert len(named) == 10
     for block in named:
         folder = HOME if block.language == "yaml" else HOME / "rbx_lamp"
         assert block.text == (folder / block.words[1]).read_text(encoding="utf-8"), str(block)

@@ -104,6 +104,8 @@ def test_the_port_of_the_bus_is_free_or_taken_by_whom(tmp_path: Path) -> None:
 def test_a_router_listens_at_its_port_or_somebody_else_does() -> None:
     up = replace(FINE, running=(running(state(processes={"router": HERE})),))
     assert told("ports", replace(up, listeners={7447: Listener(HERE.pid, "")})) == [("ok", "port 7447: router of cart")]
+    orphaned = running(state(supervisor=GONE, processes={"router": GONE}))
+    assert told("ports", replace(FINE, running=(orphaned,))) == []  # its end is told as what it has left
     assert told("ports", up) == [
         ("RBX9403", "the router of 'cart' should listen at port 7447, but nobody listens there")
     ]
@@ -179,6 +181,14 @@ def test_what_dead_robots_have_left_is_told() -> None:
         ("RBX9409", "the state of 'cart' cannot be read: its checksum is wrong"),
         ("RBX9409", "processes of 'lost' run without a supervisor and without a state: robot (6)"),
     ]
+    assert told("leftovers", replace(FINE, running=(dead,))) == [
+        ("RBX9409", "the supervisor of 'cart' is dead; these processes still run: world")
+    ]
+    ended = running(state(supervisor=GONE, processes={"world": GONE}))
+    assert told("leftovers", replace(FINE, running=(ended,)))[0] == (
+        "RBX9409",
+        "the supervisor of 'cart' is dead; its files, and shared memory, are still there",
+    )
     assert told("leftovers", replace(FINE, running=(running(state()),)))[0] == ("ok", "cart: its supervisor runs")
 
 

@@ -102,7 +102,7 @@ def test_an_executive_that_crashed_runs_again_what_people_had_begun() -> None:
 
 
 def test_an_outcome_needs_a_field_in_the_result() -> None:
-    with pytest.raises(ValueError, match="has no text field 'outcome' in its result"):
+    with pytest.raises(ValueError, match="NavigateToPose_Result has no text field 'outcome'"):
         ServesAction(NavigateToPose, "go", outcomes={"blocked": "failure"})
     with pytest.raises(ValueError, match="has no text field"):
         ServesAction(NavigateToPose, "go", outcomes={"blocked": "maybe"})

@@ -57,7 +57,11 @@ ROWS = {
     "the wall clock jumps": ("testing/test_clocks.py", "cores_components_and_the_sdk_never_ask_for_time"),
     "a clock from outside stands still": (
         "runtime/test_external_clock.py",
-        "a_real_robot_follows_stands_goes_on_and_jumps",
+        "a_real_robot_follows_stands_goes_on_jumps_and_bears_a_dispute",
+    ),
+    "a clock from outside is told by two": (
+        "base/test_external_clock.py",
+        "sources_that_disagree_are_told_once_and_time_stands_still",
     ),
     "several start it at once": ("faults/test_folder.py", "of_many_that_start_it_at_once_one_does"),
     "the terminal goes": (REAL, "the_end_of_the_terminal_is_the_end_of_the_robot"),

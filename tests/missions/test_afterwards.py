@@ -233,3 +233,107 @@ def test_a_reaction_does_not_see_the_items_of_loops() -> None:
     )
     with pytest.raises(AssertionError, match="word"):
         simulate(text)
+
+
+THREE = """
+interrupts:
+  high:
+    when: $door
+    do: first
+    afterwards: {{restart: {}}}
+  low:
+    when: $battery < 50 %
+    do:
+      - sequence: [second, react]
+        name: inner
+do:
+  - a
+  - sequence: [b, c]
+    name: outer
+  - d:
+    name: last
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "rest"),
+    [
+        ("inner", ["5 second", "6 react", "7 c", "8 d"]),  # in the reaction that was cut
+        ("outer", ["5 react", "6 b", "7 c", "8 d"]),  # below it, in the mission itself
+        ("last", ["5 react", "6 c", "7 d"]),  # what does not run
+    ],
+)
+def test_what_is_restarted_may_be_in_a_later_reaction_or_below_it(name: str, rest: list[str]) -> None:
+    simulated = simulate(THREE.format(name))
+    simulated.set("battery", 1.0)
+    simulated.at(2.5, lambda: simulated.set("battery", 0.1))
+    simulated.at(4.0, lambda: simulated.set("door", True))
+    assert simulated.advance(40) == "success"
+    assert skills(simulated) == ["0 a", "1 b", "2 c", "2.5 second", "3.5 react", "4 first", *rest]
+
+
+def test_restart_arms_the_other_interrupts_anew() -> None:
+    text = """
+    interrupts:
+      open:
+        when: $door
+        do: first
+        afterwards: restart
+      low:
+        when: $battery < 50 %
+        do: second
+    do: a
+    """
+    simulated = simulate(text, takes={"a": 9.0})
+    simulated.set("battery", 0.1)
+    simulated.at(2.0, lambda: simulated.set("door", True))
+    assert simulated.advance(40) == "success"
+    assert skills(simulated) == ["0 second", "1 a", "2 first", "3 second", "4 a"]
+
+
+LIMITED = "do:\n  sequence:\n    - a\n  timeout: 4 s"
+CUTTING = "interrupts:\n  low:\n    when: $battery < 50 %\n    do: recharge\n"
+
+
+@pytest.mark.parametrize(
+    ("outer", "inner", "end", "at"),
+    [
+        ("", CUTTING + LIMITED, "success", 13.0),  # the sub-mission's own interrupt: its timer stands still
+        (CUTTING, LIMITED, "success", 13.0),  # its caller's: also
+        (CUTTING, "do: a\n", "success", 13.0),  # and the timer of the caller
+        ("", CUTTING + "do: a\n", "failure", 4.0),  # but not the caller's, while the sub-mission reacts
+    ],
+)
+def test_timers_stand_still_in_the_mission_whose_interrupt_acts(outer: str, inner: str, end: str, at: float) -> None:
+    timeout = "" if "timeout" in inner else "\n  timeout: 4 s"
+    simulated = simulate(f"{outer}do:\n  use: inner{timeout}", {"inner": inner}, takes={"a": 2.0, "recharge": 10.0})
+    simulated.set("battery", 1.0)
+    simulated.at(1.0, lambda: simulated.set("battery", 0.1))
+    assert simulated.advance(40) == end
+    assert simulated.now == at
+
+
+def test_a_sub_mission_is_restarted_with_what_it_was_given() -> None:
+    used = "inputs: {n: {type: number}}\ndata: {m: 0}\ninterrupts:\n  open:\n    when: $door\n    afterwards: restart\n"
+    used += "do: [{set: {m: $m + 1}}, {log: $n and $m}, a]"
+    text = "data: {n: 7}\ndo: [{use: one, with: {n: $n}, on_start: {set: {n: 8}}}, b]"
+    simulated = simulate(text.replace("on_start", "on_success"), {"one": used})
+    simulated.at(0.5, lambda: simulated.set("door", True))
+    assert simulated.advance(20) == "success"
+    assert [line for line in simulated.told if " and " in line] == ["0 7 and 1", "0.5 7 and 1"]
+    assert skills(simulated) == ["0 a", "0.5 a", "1.5 b"]
+
+
+@pytest.mark.parametrize(("afterwards", "outcome", "end"), [("end", "person", "success"), ("end", "empty", "failure")])
+def test_the_outcome_of_what_a_reaction_did_is_not_that_of_the_mission(afterwards: str, outcome: str, end: str) -> None:
+    text = f"interrupts:\n  open:\n    when: $door\n    do: look\n    afterwards: {afterwards}\ndo: a"
+    simulated = simulate(text, outcomes={"look": [outcome]})
+    simulated.set("door", True)
+    assert simulated.advance(20) == end
+    assert simulated.ended == end
+
+
+@pytest.mark.parametrize("branches", ["{end: success}, {end: failure}", "{end: failure}, {end: success}"])
+def test_of_two_ends_at_one_tick_failure_counts_whatever_their_order(branches: str) -> None:
+    simulated = simulate(f"do:\n  parallel: [{branches}]")
+    assert simulated.advance(5) == "failure"

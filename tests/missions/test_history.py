@@ -232,3 +232,31 @@ def test_restarting_the_whole_forgets_the_places() -> None:
     simulated.at(1.5, lambda: simulated.set("door", True))
     assert simulated.advance(20) == "success"
     assert skills(simulated) == ["0 a", "1 b", "1.5 a", "2.5 b"]
+
+
+@pytest.mark.parametrize("around", ["sequence", "machine"])
+def test_what_was_not_gone_back_to_is_forgotten_with_the_node_around_it(around: str) -> None:
+    """The inner list keeps its place by `deep`, but is skipped when it would take it up: it then begins afresh."""
+    inner = "{sequence: [a, b], skip_if: $door}"
+    step = f"sequence:\n        - {inner}\n      history: deep"
+    state = f"machine:\n        history: deep\n        start: s\n        states: {{s: {{do: {inner}, next: finished}}}}"
+    state = state.replace("next: finished", "next: {success: finished, failure: failed}")
+    work = f"repeat: 2\ndo:\n    - {step if around == 'sequence' else state}\n    - c"
+    simulated = tour(work)
+    simulated.set("door", False)
+    simulated.at(2.0, lambda: simulated.set("door", True))
+    simulated.at(3.0, lambda: simulated.set("door", False))
+    assert simulated.advance(20) == "success"
+    assert skills(simulated) == ["0 a", "1 b", "1.5 recharge", "2.5 c", "3.5 a", "4.5 b", "5.5 c"]
+
+
+def test_a_reactive_list_that_failed_keeps_the_place_of_its_condition_only() -> None:
+    work = "sequence:\n  - check: not $door\n  - [a, b]\nreactive: true\nhistory: deep"
+    simulated = tour(work, lost="tour")
+    simulated.set("door", False)
+    simulated.at(2.0, lambda: simulated.set("door", True))
+    simulated.at(2.5, lambda: simulated.set("battery", 1.0))
+    simulated.at(4.0, lambda: simulated.set("door", False))
+    assert simulated.advance(20) == "success"
+    first, *_, last, end = skills(simulated)
+    assert (first, last.split()[1], end.split()[1]) == ("0 a", "a", "b")

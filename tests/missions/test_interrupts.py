@@ -216,3 +216,31 @@ def test_a_condition_without_a_value_is_reported_once_and_does_not_hold() -> Non
     simulated.set("battery", 0.0)
     assert simulated.advance(20) == "success"
     assert sum("division by zero" in line for line in simulated.told) == 1
+
+
+def test_a_reaction_goes_on_although_its_condition_was_false_and_holds_again() -> None:
+    simulated = low("- a", takes={"a": 9.0, "recharge": 4.0})
+    simulated.at(2.0, lambda: simulated.set("battery", 0.9))
+    simulated.at(3.0, lambda: simulated.set("battery", 0.2))
+    assert simulated.advance(40) == "success"
+    assert skills(simulated) == ["0 a", "1.5 recharge", "5.5 a"]
+
+
+def test_one_whose_condition_was_false_during_its_reaction_acts_again_and_is_not_reported() -> None:
+    simulated = simulate(LOW.replace("recharge", "react").format("  a"), takes={"a": 9.0, "react": 4.0})
+    simulated.set("battery", 1.0)
+    for time, level in ((1.0, 0.4), (2.0, 0.9), (3.0, 0.2), (6.0, 0.9)):
+        simulated.at(time, lambda level=level: simulated.set("battery", level))  # type: ignore[misc]
+    assert simulated.advance(40) == "success"
+    assert skills(simulated) == ["0 a", "1 react", "5 react", "9 a"]
+    assert not [line for line in simulated.told if "still holds" in line]
+
+
+def test_new_counts_messages_since_the_interrupt_last_acted() -> None:
+    simulated = simulate(LOW.replace("$battery < 50 %", "new($door)").replace("recharge", "react").format("  a"))
+    simulated.set("door", True)
+    simulated.takes = {"a": 9.0}
+    for time in (1.0, 5.0):
+        simulated.at(time, lambda: simulated.set("door", True))
+    simulated.advance(40)
+    assert skills(simulated) == ["0 a", "1 react", "2 a", "5 react", "6 a"]

@@ -141,3 +141,34 @@ def test_a_text_may_be_given_the_name_of_a_place() -> None:
     simulated = simulate(text)
     assert simulated.advance(5) == "success"
     assert simulated.calls == {"go_to": 1, "a": 1}
+
+
+@pytest.mark.parametrize(
+    ("node", "settings", "kept"),
+    [
+        ("use: one", {}, {"n": 1}),
+        ("call: light\n    request: true", {"tells": {"light": {"message": "no"}}, "fails": {"light": fails(1)}}, None),
+    ],
+)
+def test_it_is_kept_also_after_a_failure(node: str, settings: dict[str, object], kept: object) -> None:
+    used = "data: {n: 0}\noutputs: {n: $n}\ndo: [{set: {n: 1}}, {check: false}]"
+    simulated = simulate(f"do:\n  - {node}\n    save: got\n    optional: true", {"one": used}, **settings)
+    assert simulated.advance(5) == "success"
+    assert simulated.engine.data["got"] == (kept or {"message": "no"})
+
+
+def test_an_input_that_is_not_given_has_its_default() -> None:
+    used = "inputs:\n  n: {type: number, default: 3}\n  to: {type: place, default: dock}\ndo: [{log: $n}, {go_to: $to}]"
+    simulated = simulate("do: {use: one}", {"one": used})
+    assert simulated.advance(5) == "success"
+    assert logged(simulated) == ["0 3"]
+    assert skills(simulated) == ["0 go_to dock"]
+
+
+@pytest.mark.parametrize(
+    ("option", "level"), [("", "info"), ("\n  level: warn", "warn"), ("\n  level: error", "error")]
+)
+def test_a_log_has_a_level(option: str, level: str) -> None:
+    simulated = simulate(f"do:\n  log: hi{option}")
+    simulated.advance(1)
+    assert [event.level for _, event in simulated.events if isinstance(event, Logged)] == [level]

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from rbxcompose.expressions.parser import parse
+from rbxcompose.missions.watching import Watched
 from rbxcompose.missions.world import Settings
-from tests.missions.simulated import simulate
+from tests.missions.simulated import PLACES, simulate
 from tests.missions.test_composites import fails, skills
 
 
@@ -115,3 +117,60 @@ def test_a_mission_with_nothing_to_do_is_a_success_for_who_uses_it() -> None:
     simulated = simulate("do:\n  fallback:\n    - use: nothing\n    - b", {"nothing": "do: {repeat: 0, do: a}"})
     assert simulated.advance(5) == "success"
     assert skills(simulated) == []
+
+
+@pytest.mark.parametrize(
+    "node",
+    [
+        "sequence: [a, {b: {}, only_if: false}]",
+        "sequence: [{b: {}, only_if: false}, a]",
+        "for: x\n      in: [1, 2]\n      do: {a: {}, only_if: $x == 1}",
+        "repeat: 2\n      do: {a: {}, once: true}",
+        "repeat: 2\n      until: $door\n      do: {a: {}, once: true}",
+    ],
+)
+def test_what_did_something_is_not_skipped(node: str) -> None:
+    simulated = simulate(f"do:\n  fallback:\n    - {node}\n    - c")
+    assert simulated.advance(5) == "success"
+    assert skills(simulated) == ["0 a"]
+
+
+def test_a_fallback_fails_although_its_last_node_was_skipped() -> None:
+    simulated = simulate("do: {fallback: [a, {b: {}, only_if: false}]}", fails={"a": fails(1)})
+    assert simulated.advance(5) == "failure"
+
+
+@pytest.mark.parametrize(
+    ("condition", "is_polled"),
+    [
+        ("age($door) < 1 s", True),
+        ("distance($seen, dock) < 1 m", True),
+        ("$pose == dock", True),
+        ("$battery < 50 %", False),
+        ("new($door)", False),
+    ],
+)
+def test_conditions_that_change_without_a_message_are_asked_at_the_rate(condition: str, is_polled: bool) -> None:
+    assert Watched.of(parse(condition)).is_polled is is_polled
+
+
+def test_a_distance_is_asked_at_the_rate_of_the_mission() -> None:
+    simulated = simulate("rate: 10 Hz\ndo:\n  - wait_for: distance($pose, kitchen) < 20 cm\n  - a")
+    simulated.values["pose"] = PLACES["dock"]
+    simulated.at(0.43, lambda: simulated.values.update(pose=PLACES["kitchen"]))
+    simulated.engine.tick(0.0)
+    assert simulated.engine.next_wake() == 0.1
+    simulated.advance(10)
+    assert len(skills(simulated)) == 1
+
+
+def test_a_condition_that_was_skipped_is_asked_again_as_well() -> None:
+    text = "do:\n  sequence:\n    - check: $door\n      skip_if: $battery > 50 %\n    - a\n  reactive: true"
+    simulated = simulate(text, takes={"a": 9.0})
+    simulated.set("door", False)
+    simulated.set("battery", 0.9)
+    simulated.at(2.0, lambda: simulated.set("battery", 0.4))
+    assert simulated.advance(1.0) == "running"
+    assert simulated.engine.reads() == {"battery", "door"}
+    assert simulated.advance(20) == "failure"
+    assert simulated.now == 2.0

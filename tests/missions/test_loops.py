@@ -219,3 +219,55 @@ def test_what_is_not_in_the_data_cannot_leave_it(given: str, items: str) -> None
     assert program is not None
     report.extend(check_program(program, ROBOT))
     assert [finding.message for finding in report] == ["'remove_done' needs an 'in' that names data"]
+
+
+@pytest.mark.parametrize("options", ["", "if_one_fails: next"])
+def test_an_item_that_failed_is_kept_whatever_comes_of_the_loop(options: str) -> None:
+    simulated = loop(options, fails={"say": fails(3)})
+    assert simulated.advance(20) == "failure"
+    assert simulated.engine.data["got"] == {"done": [1, 2], "failed": [3]}
+
+
+def test_a_loop_without_items_keeps_that_nothing_was_done() -> None:
+    simulated = simulate("do:\n  for: n\n  in: []\n  do: a\n  save: got")
+    assert simulated.advance(5) == "success"
+    assert simulated.engine.data["got"] == {"done": [], "failed": []}
+
+
+def test_until_ends_a_number_of_rounds_early_and_does_not_wait_for_the_next_one() -> None:
+    simulated = simulate("do:\n  repeat: 5\n  every: 4 s\n  until: $door\n  do: a")
+    simulated.at(4.5, lambda: simulated.set("door", True))
+    assert simulated.advance(30) == "success"
+    assert skills(simulated) == ["0 a", "4 a"]
+    assert simulated.now == 5.0
+
+
+def test_until_is_asked_also_after_a_round_that_was_skipped() -> None:
+    simulated = simulate("do:\n  repeat: forever\n  until: $door\n  do: {a: {}, only_if: false}")
+    simulated.set("door", True)
+    assert simulated.advance(5) == "success"
+
+
+def test_a_round_that_fails_fails_the_loop_also_when_until_holds() -> None:
+    simulated = simulate("do:\n  repeat: forever\n  until: $door\n  do: a", fails={"a": fails(1)})
+    simulated.set("door", True)
+    assert simulated.advance(5) == "failure"
+
+
+@pytest.mark.parametrize(
+    "loop_of_three",
+    [
+        "repeat: 3\n  do: {set: {n: $n + 1}}",
+        "for: x\n  in: [1, 2, 3]\n  do: {set: {n: $n + 1}}",
+        "sequence: [{set: {n: $n + 1}}, {check: $n == 3}]\n  attempts: 3",
+        "machine:\n    start: one\n    states:\n"
+        "      one: {do: {set: {n: $n + 1}}, next: two}\n      two: {do: {set: {n: $n + 1}}, next: three}\n"
+        "      three: {do: {set: {n: $n + 1}}, next: finished}",
+    ],
+)
+def test_interrupts_are_looked_at_between_rounds_items_attempts_and_states(loop_of_three: str) -> None:
+    text = f"data: {{n: 0}}\ninterrupts:\n  first:\n    when: $n == 1\n    do: {{log: at $n}}\ndo:\n  {loop_of_three}"
+    simulated = simulate(text)
+    assert simulated.advance(5) == "success"
+    assert "0 at 1" in simulated.told
+    assert simulated.engine.data["n"] == 3

@@ -265,3 +265,35 @@ def test_it_may_be_told_in_which_state_to_begin_the_first_time() -> None:
     simulated = simulate(ROUND, settings=Settings(start_at={0: "back"}))
     assert simulated.advance(20) == "success"
     assert skills(simulated) == ["0 b"]
+
+
+def test_a_failure_that_does_not_count_has_no_outcome_of_its_own() -> None:
+    text = (
+        "machine:\n  start: s\n  states:\n    s: {do: look, optional: true, next: {success: finished, person: failed}}"
+    )
+    simulated = simulate(text, outcomes={"look": ["empty"]})
+    assert simulated.advance(5) == "success"
+    assert ways(simulated) == ["s-success-finished"]
+
+
+ENTERED = """
+machine:
+  start: s
+  states:
+    s:
+      do: a
+      on_enter: {{log: in}}
+      on_exit: {{log: out}}
+      {}
+      next: {{success: finished, failure: failed}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("modifier", "told"),
+    [("attempts: 2", ["0 in", "2 out"]), ("timeout: 0.5 s", ["0 in", "0.5 out"]), ("skip_if: true", ["0 in", "0 out"])],
+)
+def test_a_state_is_entered_and_left_once_around_all_its_modifiers(modifier: str, told: list[str]) -> None:
+    simulated = simulate(ENTERED.format(modifier), fails={"a": fails(1)})
+    simulated.advance(5)
+    assert logged(simulated) == told

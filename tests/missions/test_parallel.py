@@ -6,6 +6,7 @@ import itertools
 
 import pytest
 
+from rbxcompose.missions.events import Transition
 from tests.missions.simulated import Simulated, simulate
 from tests.missions.test_composites import fails, skills
 
@@ -206,3 +207,49 @@ def test_otherwise_is_the_outcome_when_nothing_else_is() -> None:
     simulated = simulate(text, fails={"look": fails(1)})
     assert simulated.advance(10) == "failure"
     assert simulated.ended == "failure"
+
+
+STATE = """
+machine:
+  start: s
+  states:
+    s:
+      do:
+        parallel:
+          work: {}
+          other:
+            b:
+            only_if: false
+        {}
+      next: {}
+  ends: {{met: success}}
+"""
+
+
+def test_a_branch_that_was_skipped_is_so_for_the_outcomes() -> None:
+    options = "outcomes: {here: $other == skipped and $other != halted, odd: otherwise}"
+    simulated = simulate(STATE.format("a", options, "{here: met, odd: failed}"))
+    simulated.advance(5)
+    assert simulated.ended == "met"
+
+
+@pytest.mark.parametrize(
+    ("options", "leads", "end"),
+    [
+        ("ends_with: work", "{person: met, success: failed, failure: failed}", "met"),
+        ("succeed_when: any", "{success: finished, failure: failed}", "success"),
+    ],
+)
+def test_the_outcome_of_the_branch_it_ends_with_is_its_own(options: str, leads: str, end: str) -> None:
+    simulated = simulate(STATE.format("look", options, leads), outcomes={"look": ["person"]})
+    assert simulated.advance(5) == "success"
+    assert simulated.ended == end
+    (transition,) = [event for _, event in simulated.events if isinstance(event, Transition)]
+    assert transition.outcome == ("person" if end == "met" else "success")
+
+
+def test_the_failure_of_a_branch_that_does_not_count_is_not_the_reason() -> None:
+    text = "do:\n  parallel:\n    one: b\n    two: {check: false}\n  ends_with: one"
+    simulated = simulate(text, fails={"b": fails(1)})
+    assert simulated.advance(5) == "failure"
+    assert simulated.told[-1] == "1 mission test: failure: do.parallel.one.b: no luck"

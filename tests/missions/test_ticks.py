@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from rbxcompose.missions.results import Result
 from tests.missions.simulated import simulate
 from tests.missions.test_composites import fails, skills
@@ -135,3 +137,25 @@ def test_results_are_told_in_the_order_in_which_they_came_and_before_what_follow
         "2 b: failure (1 s): no luck",
         "2 mission test: failure: do.sequence.b.1: no luck",
     ]
+
+
+def test_a_result_of_the_instant_of_a_pause_counts() -> None:
+    simulated = simulate("do: [a, b]")
+    simulated.at(1.0, lambda: simulated.engine.pause(1.0))
+    simulated.at(5.0, lambda: simulated.engine.resume(5.0))
+    assert simulated.advance(20.0) == "success"
+    assert skills(simulated) == ["0 a", "5 b"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "interrupts:\n  old:\n    when: age($door) > 0.75 s\n    afterwards: end\ndo: a",
+        "do:\n  a:\n  as_long_as: age($door) <= 0.75 s\n  optional: true",
+    ],
+)
+def test_conditions_of_interrupts_and_modifiers_are_asked_at_the_rate(text: str) -> None:
+    simulated = simulate(f"rate: 10 Hz\n{text}", takes={"a": 9.0})
+    simulated.set("door", True)
+    assert simulated.advance(20) == "success"
+    assert simulated.now == pytest.approx(0.8)

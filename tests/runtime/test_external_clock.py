@@ -255,7 +255,9 @@ def follower(network: Network) -> Iterator[subprocess.Popen[str]]:
     shutil.rmtree(folder)
 
 
-def test_a_real_robot_follows_stands_goes_on_and_jumps(network: Network, follower: subprocess.Popen[str]) -> None:
+def test_a_real_robot_follows_stands_goes_on_jumps_and_bears_a_dispute(
+    network: Network, follower: subprocess.Popen[str]
+) -> None:
     process = network.process()
     simulator = Simulator(process.bus.publisher("simulator", "/clock", Clock, Qos.COMMAND))
     steer = process.bus.publisher("simulator", "cmd_vel/teleop", Twist, Qos.COMMAND)
@@ -289,9 +291,17 @@ def test_a_real_robot_follows_stands_goes_on_and_jumps(network: Network, followe
     until(lambda: len(odometry) > seen, simulator.run)
     simulator.time = 5.0
     until(lambda: odometry[-1].header.stamp.sec == 5, simulator.run)
+    other = Simulator(process.bus.publisher("another simulator", "/clock", Clock, Qos.COMMAND))
+
+    def dispute() -> None:
+        drive()
+        other.run()
+
+    until(lambda: levels[-1] == 2 and commands[-1] == REST, dispute)
     until(lambda: follower.poll() is not None, simulator.run)
     output, _ = follower.communicate()
     assert follower.returncode == 0, output
     told = iter(output.splitlines())
-    for words in ("does not go on", "goes", "does not go on", "goes", "has jumped"):
+    for words in ("does not go on", "goes", "does not go on", "goes", "has jumped", "jumps back", "goes"):
         assert any(f"/clock {words}" in line for line in told), output
+    assert output.count("/clock") < 12, output  # not a line for each jump

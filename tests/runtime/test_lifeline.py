@@ -67,6 +67,15 @@ def test_renewals_that_do_not_help_become_rarer_until_one_does() -> None:
     assert [probe.judge(Heard.NOTHING, is_router_up=True) for _ in range(MISSES)] == [False, False, True]
 
 
+def test_after_a_miss_all_are_asked_until_one_has_answered() -> None:
+    probe = Probe(expects_router=True)
+    doubts = [probe.is_in_doubt]
+    for heard in (Heard.NOTHING, Heard.NOTHING, Heard.ANSWER):
+        probe.judge(heard, is_router_up=True)
+        doubts.append(probe.is_in_doubt)
+    assert doubts == [False, True, True, False]
+
+
 # The real thing
 
 

@@ -17,7 +17,9 @@ OPENED_ANEW = "the session on the bus carries nothing any more; it is opened ane
 class Deaf(Nowhere):
     """A session on which no question is ever answered."""
 
-    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> Deaf:
+    def ask(
+        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+    ) -> Deaf:
         return self
 
 

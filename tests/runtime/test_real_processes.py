@@ -275,6 +275,7 @@ def test_what_a_dead_supervisor_left_is_ended_by(who: str, robot: Robot) -> None
     robot.supervisor().send_signal(signal.SIGKILL)
     if who == "the next up":
         robot.up_detached()
+        assert robot.has_logged("the run before was not brought down, its supervisor has died")
     assert robot.do("down").returncode == 0
     assert wait_until_ended(before, 0.0) == []
 

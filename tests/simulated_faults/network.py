@@ -331,7 +331,9 @@ class SimulatedTransport:
         self.servers.append(_Server(self, key, asked))
         return self.servers[-1]
 
-    def ask(self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None]) -> _Asked:
+    def ask(
+        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+    ) -> _Asked:
         asked = _Asked(self, answered)
         self.asked.append(asked)
         for peer in self.peers:

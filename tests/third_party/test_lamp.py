@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -78,6 +79,17 @@ def test_its_robot_is_checked_and_its_mission_runs_to_the_end(installed: Install
     assert out.endswith("[0]"), out
 
 
+def test_its_orders_and_their_ends_go_from_one_process_to_another(installed: Installed) -> None:
+    installed.write(ROBOT)
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    out = installed.run("-m", "rbxcompose", "up", "--set", f"bus.port={port}", ".")
+    assert "in 2 processes" in out
+    assert "dim 0.5: success" in out
+    assert out.endswith("[0]"), out
+
+
 def test_its_component_is_run_again_from_the_recording_of_a_run(installed: Installed) -> None:
     installed.write(ROBOT)
     out = installed.run("-m", "rbxcompose", "up", "--rate", "max", "--record", "again.mcap", ".")
@@ -92,13 +104,17 @@ def test_its_component_is_run_again_from_the_recording_of_a_run(installed: Insta
 
 def test_its_own_tests_pass(installed: Installed) -> None:
     words = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "--import-mode=importlib", str(LAMP / "test_lamp.py")]
-    assert "4 passed" in installed.run(*words)
+    assert "6 passed" in installed.run(*words)
 
 
 def test_its_skills_are_listed_and_their_arguments_checked(installed: Installed) -> None:
     installed.write(ROBOT)
     listed = installed.run("-m", "rbxcompose", "mission", "skills", ".")
-    assert {"blink", "cool_down", "read_character"} <= {line.split()[0] for line in listed.splitlines() if line.strip()}
+    assert {"blink", "cool_down", "dim", "read_character"} <= {
+        line.split()[0] for line in listed.splitlines() if line.strip()
+    }
+    assert "topic /dim" in listed
+    assert "- dim: " in listed
     mission = (LIGHTHOUSE / "night.yaml").read_text(encoding="utf-8")
     night = installed.folder / "night.yaml"
     night.write_text(mission.replace("cool_down: $light.flashes", "cool_down: {flahes: 3}"), encoding="utf-8")

@@ -38,6 +38,55 @@ def test_a_filter_chooses_by_name(repository: Path, capsys: pytest.CaptureFixtur
     assert command(["test", "missions", "--filter", "nothing_like_that"]) == 2
 
 
+def broken(folder: Path, *names: str) -> Path:
+    """Write a robot with one mistake and tests of it, return the folder of the tests."""
+    (folder / "robot.yaml").write_text("rbx: 1\nkind: Robot\nname: broken\ncomponents:\n  base:\n    type: bass\n")
+    for name in names:
+        head = f"rbx: 1\nkind: Test\nname: {name}\nrobot: robot.yaml\nmission: patrol\n"
+        (folder / f"{name}_file.yaml").write_text(head + "expect:\n  outcome: success\n")
+    return folder
+
+
+def test_a_filter_finds_a_test_whose_robot_has_mistakes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = str(broken(tmp_path, "first", "second"))
+    assert command(["test", folder, "--filter", "irst"]) == 1
+    captured = capsys.readouterr()
+    assert "FAILED  first" in captured.out
+    assert "second" not in captured.out
+    assert "of a type that does not exist: 'bass'" in captured.err
+    assert "no test has" not in captured.err
+    assert command(["test", folder, "--filter", "third"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err == "rbxcompose test: no test has 'third' in its name\n"
+
+
+def test_a_filter_that_finds_nothing_tells_which_files_it_could_not_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = broken(tmp_path, "first")
+    (folder / "torn.yaml").write_text('rbx: 1\nkind: Test\nname: "third\n')
+    assert command(["test", str(folder), "--filter", "third"]) == 2
+    error = capsys.readouterr().err
+    assert "torn.yaml:3" in error
+    assert "no test has 'third' in its name" in error
+
+
+@pytest.mark.parametrize("verb", ["test", "check"])
+def test_a_mistake_of_a_robot_is_told_once_for_all_of_its_tests(
+    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = broken(tmp_path, "first", "second", "third")
+    assert command([verb, *map(str, sorted(folder.glob("*_file.yaml")))]) == 1
+    captured = capsys.readouterr()
+    told = captured.err + captured.out
+    assert told.count("of a type that does not exist: 'bass'") == 1
+    assert told.count("RBX4203") == 1
+    assert "has mistakes, so that 3 tests cannot run" in told
+    assert command(["test", str(folder), "--json"]) == 1
+    tests = json.loads(capsys.readouterr().out)["tests"]
+    assert [len(one["problems"]) for one in tests] == [1, 1, 1]  # each test has its own reason
+
+
 def test_traces_coverage_and_junit(repository: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "out.xml"
     assert command(["test", PATROL, "-v", "--coverage", "--junit", str(file)]) == 0

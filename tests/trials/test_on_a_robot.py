@@ -121,3 +121,21 @@ def test_what_the_robot_refuses_is_told(trying: Trying) -> None:
     text = "events:\n  - at: 30 s\n    pause: true\nexpect:\n  for: 40 s\n"
     verdict = trying.verdict(text.replace("events:", "mocks:\n  go_to: failure\nevents:"), "states")
     assert verdict.problems
+
+
+def test_a_call_that_fails_sets_nothing_on_a_robot_either(trying: Trying) -> None:
+    mocked = """
+        mocks:
+          go_to:
+            takes: 1 s
+            result: failure
+            sets:
+              battery: 10 %
+        expect:
+          outcome: running
+          for: 5 s
+          never:
+            - recharge
+            - go_to: dock
+    """
+    assert trying.problems(mocked) == []

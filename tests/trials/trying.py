@@ -62,6 +62,37 @@ MISSIONS = {
           - wait_for: age($pose) < 1 s
           - check: not new($pose)
     """,
+    "several": """
+        data:
+          none: 0
+        do:
+          - publish: cmd_vel/teleop
+            message:
+              linear:
+                x: 0.1
+          - publish: cmd_vel/teleop
+            message:
+              linear:
+                x: 0.2
+          - go_to: corner_1
+          - name: visit
+            go_to: corner_2
+            only_if: $door
+            save: found
+          - log: This is a corner
+          - set:
+              none: 1 / $none
+            optional: true
+          - log: $found
+            only_if: $none > 0
+    """,
+    "hearing": """
+        do:
+          - wait_for: $door or new($door)
+          - wait_for: new($door) and age($door) < 1 s
+          - log: Something came
+            name: heard
+    """,
     "waiting": """
         do:
           - name: call_out

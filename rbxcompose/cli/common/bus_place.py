@@ -5,7 +5,14 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 
-from rbxcompose.cli.common.robots import NO_ANSWER, NotDoneError, add_robot_option, find_robot, known_state
+from rbxcompose.cli.common.robots import (
+    NO_ANSWER,
+    NotDoneError,
+    add_robot_option,
+    find_robot,
+    known_state,
+    no_answer,
+)
 from rbxcompose.runtime.folder import RobotFolder
 
 
@@ -43,6 +50,8 @@ def place_of(folder: RobotFolder) -> BusPlace:
         NotDoneError: if it has no router.
     """
     state = known_state(folder)
+    if state is not None and not state.is_supervised:
+        raise NotDoneError(no_answer(folder))  # its router has gone with it, or is about to
     if state is None or state.router is None:
         raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' has no router that is known"))
     return BusPlace(state.router, state.domain)

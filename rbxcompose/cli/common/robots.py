@@ -124,7 +124,17 @@ def request(folder: RobotFolder, fields: dict[str, object], *, timeout: float = 
     except RefusedError as refusal:
         raise NotDoneError(REFUSED.at(None, f"'{name}' refuses: {refusal}")) from refusal
     except NoAnswerError as error:
-        finding = NO_ANSWER.at(
-            None, f"'{name}' does not answer", help=f"'rbxcompose down {name}' ends what is left of it"
-        )
-        raise NotDoneError(finding) from error
+        raise NotDoneError(no_answer(folder)) from error
+
+
+def no_answer(folder: RobotFolder) -> Finding:
+    """Return that a robot does not answer, with the reason if its state tells it."""
+    name, state = folder.path.name, known_state(folder)
+    why = ""
+    if state is not None and not state.is_supervised:
+        why = ": its supervisor has died, without which it brakes and ends"
+    elif state is not None and state.supervisor.is_stopped:
+        why = ": its supervisor is suspended"
+    return NO_ANSWER.at(
+        None, f"'{name}' does not answer{why}", help=f"'rbxcompose down {name}' ends what is left of it"
+    )

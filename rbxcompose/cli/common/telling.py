@@ -6,6 +6,7 @@ import os
 import sys
 from typing import TextIO
 
+from rbxcompose.cli.common.answering import answer
 from rbxcompose.findings import Finding, Report, Sources
 from rbxcompose.rendering.text import render_text
 
@@ -19,12 +20,14 @@ def has_colour(stream: TextIO) -> bool:
 
 def tell(text: str) -> None:
     """Write lines to stdout at once."""
+    answer().has_begun = True
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()
 
 
 def tell_report(report: Report, sources: Sources) -> None:
     """Write all findings to stderr."""
+    answer().note(report, sources)
     sys.stderr.write(render_text(report, sources, has_colour(sys.stderr)))
     sys.stderr.flush()
 

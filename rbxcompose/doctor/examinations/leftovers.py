@@ -41,8 +41,12 @@ def leftovers(facts: Facts) -> Iterator[str | Finding]:
         told = ", ".join(f"{plain(name)} ({pid})" for name, pid in sorted(pids.items()))
         words = f"processes of '{plain(robot)}' run without a supervisor and without a state: {told}"
         yield LEFT.at(None, words, help=f"kill {' '.join(map(str, sorted(pids.values())))}")
-    if not lost:
+    if not lost and not any(_still_runs(one) for one in facts.running):
         yield "no process runs without a supervisor"
+
+
+def _still_runs(one: Running) -> bool:
+    return one.state is not None and not one.state.is_supervised and bool(one.state.alive())
 
 
 def _folder(one: Running) -> Iterator[str | Finding]:
@@ -51,7 +55,7 @@ def _folder(one: Running) -> Iterator[str | Finding]:
         yield LEFT.at(None, f"the state of '{one.name}' cannot be read: {one.problem}", help=todo)
     elif not one.state.is_supervised:
         alive = ", ".join(one.state.alive())
-        rest = f"; these processes still run: {alive}" if alive else ""
-        yield LEFT.at(None, f"the supervisor of '{one.name}' is dead{rest}", help=todo)
+        rest = f"these processes still run: {alive}" if alive else "its files, and shared memory, are still there"
+        yield LEFT.at(None, f"the supervisor of '{one.name}' is dead; {rest}", help=todo)
     else:
         yield f"{one.name}: its supervisor runs"

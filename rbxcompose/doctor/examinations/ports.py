@@ -60,6 +60,8 @@ def ports(facts: Facts) -> Iterator[str | Finding]:
 def _router(one: Running, facts: Facts) -> Iterator[str | Finding]:
     if one.state is None or one.state.router is None or "router" not in one.state.processes:
         return  # it uses a router from elsewhere, or none is known
+    if not one.state.is_supervised:
+        return  # that the robot has ended is told by `leftovers`
     router, port = one.state.processes["router"], int(one.state.router.rpartition(":")[2])
     taken = facts.listeners.get(port)
     if taken is not None and taken.pid == router.pid:

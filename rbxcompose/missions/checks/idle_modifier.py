@@ -41,7 +41,7 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
         for key in ("optional", "attempts"):
             value = node.modifiers.get(key)
             has_timeout = isinstance(value, Tries) and value.timeout is not None
-            if value and not has_timeout and not mission.ending.without(node, key).counting_as(FAILS):
+            if value and not has_timeout and not mission.ending.inside_of(node, key).counting_as(FAILS):
                 most = value.most if isinstance(value, Tries) else None
                 yield idle_modifier.at(
                     place_in_text(node, most),

@@ -26,6 +26,8 @@ class EndOptions:
 class End(Task):
     """End the mission in which this is written, in `success` or in `failure`; what runs is halted.
 
+    Where two branches of a parallel end it at one tick, failure beats success.
+
     Example:
         do:
           if: $battery < 10 %
@@ -52,7 +54,7 @@ class End(Task):
         """End it; the run of the mission sees to that as soon as this tick is done."""
         message = self.run.filled(self.options.message, self.scope) if self.options.message else ""
         status = SUCCESS if self.options.result == NAMES[SUCCESS] else FAILURE
-        if self.run.ending is None:
+        if self.run.ending is None or (status, self.run.ending) == (FAILURE, SUCCESS):
             self.run.ending, self.run.message = status, message
             if status == FAILURE:
                 self.engine.reasons[self.number] = message or "the mission was to end in failure"

@@ -71,7 +71,7 @@ class Counting(Modifier):
 
     def __init__(self, site: Site, options: object, inner: Task) -> None:
         super().__init__(site, options, inner)
-        self.ended_at = 0.0  # [s] of its course
+        self.ended_at = 0.0  # [s] of robot time without pauses
         self.ended_in = 0  # the run of the mission, counted from 1
 
     @property
@@ -83,7 +83,7 @@ class Counting(Modifier):
         """Go on, and note when it ends."""
         status = self.advance(self.inner)
         if status not in (RUNNING, SKIPPED):
-            self.ended_at, self.ended_in = self.engine.time, self.run.begun
+            self.ended_at, self.ended_in = self.engine.unpaused, self.run.begun
         return status
 
 
@@ -118,7 +118,7 @@ class Once(Counting):
 
 @modifier("cooldown")
 class Cooldown(Counting):
-    """Be skipped for a time after it has ended.
+    """Be skipped for a time after it has ended; the time of interrupts counts, that of pauses does not.
 
     Example:
         do:
@@ -142,7 +142,7 @@ class Cooldown(Counting):
 
     def begin(self) -> int:
         """Start if that time has gone by, or if it has not ended yet."""
-        is_cooling = self.has_ended and not self.engine.is_past(self.ended_at + self._seconds())
+        is_cooling = self.has_ended and not self.engine.has_gone_by(self._seconds(), self.ended_at)
         return SKIPPED if is_cooling else self.proceed()
 
     def _seconds(self) -> float:

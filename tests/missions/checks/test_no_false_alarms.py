@@ -44,6 +44,7 @@ def codes(text: str) -> list[str]:
         "do: [{wait: 1 s, timeout: 2 s, optional: true}, a]",
         "do: [{wait_for: $door, as_long_as: $battery > 20 %, optional: true}, a]",
         "do: [{wait: 3 s, attempts: 2, attempt_timeout: 1 s}, a]",
+        "do: [{go_to: dock, attempts: 2, optional: true}, a]",  # tried twice before the failure counts as success
         "do: [{wait: 1 s, invert: true, optional: true}, a]",
         "do: {fallback: [{wait: 1 s, only_if: $door}, a]}",
         "do: {fallback: [{if: $door, then: {wait: 1 s}}, a]}",
@@ -74,3 +75,34 @@ def test_what_a_hook_sets_or_a_node_keeps_is_no_constant() -> None:
         """
     )
     assert constants_of(program, {}) == {"fixed": 3.0}
+
+
+STATE = "data: {rooms: [dock, kitchen]}\nmachine: {start: one, states: {one: {do: %s, next: %s}}}"
+
+
+@pytest.mark.parametrize(
+    ("body", "fails"),
+    [
+        ("{for: x, in: [1, 2], do: {log: $x}}", False),
+        ("{for: x, in: $rooms, do: {wait: 1 s}}", False),
+        ("{for: x, in: $rooms, order: nearest, do: {wait: 1 s}}", True),  # nobody may know where the robot is
+        ("{for: x, in: $rooms, do: {go_to: $x}}", True),
+        ("{for: x, in: $rooms, do: {go_to: $x, optional: true}}", False),
+        ("[{for: x, in: $rooms, do: {wait: 1 s}}, {set: {rooms: '[]'}}]", True),  # it may be something else by then
+        ("{repeat: 2, until: $door, do: {wait: 1 s}}", False),
+        ("{repeat: 2, until: 1 / $battery > 2, do: {wait: 1 s}}", True),
+        ("{repeat: $count_of_people, do: {wait: 1 s}}", True),
+        ("{if: $door, then: {wait: 1 s}}", False),
+        ("{if: 1 / $battery > 2, then: {wait: 1 s}}", True),
+        ("{choose: $door, cases: {true: {wait: 1 s}}}", True),  # the door may not have been heard of
+    ],
+)
+def test_a_failure_has_a_transition_just_where_it_can_occur(body: str, fails: bool) -> None:
+    found = {}
+    for leads in ("finished", "{success: finished, failure: failed}"):
+        report = Report()
+        program = read_program(tree(STATE % (body, leads)), report)
+        assert program is not None
+        report.extend(check_program(program, ROBOT))
+        found[leads] = report.has_errors
+    assert list(found.values()) == [fails, not fails]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from rbx_lamp.msgs import Blink
+from rbx_lamp.msgs import Blink, Dimmed
 from rbx_lamp.signals import CoolDown, read_character
 
-from rbxcompose.msgs.std_msgs import Bool
+from rbxcompose.msgs.std_msgs import Bool, Empty, Float64
 from rbxcompose.sdk import Outcome
 from rbxcompose.testing import Bench, instance
 
@@ -32,6 +32,29 @@ def test_what_cannot_be_counted_is_refused() -> None:
     bench.bus.action_client("test", "blink", Blink)(Blink.Goal(), lambda ended: outcomes.append(ended.outcome))
     bench.advance(1.0)
     assert outcomes == [Outcome.REJECTED]
+
+
+def test_it_fades_and_tells_when_it_is_as_bright_as_wanted() -> None:
+    """Order half of the light, and more than there is."""
+    bench = Bench(instance("light", "lamp"))
+    ends = bench.collect("dim/ended", Dimmed)
+    bench.publish("dim", Float64(data=0.5))
+    bench.advance(0.9)
+    assert ends == []
+    bench.advance(0.2)
+    bench.publish("dim", Float64(data=2.0))
+    assert ends == [Dimmed(True, "", 0.5), Dimmed(False, "no lamp is 2 bright", 0.5)]
+
+
+def test_who_gives_an_order_up_hears_no_more_of_it() -> None:
+    """Halt it halfway."""
+    bench = Bench(instance("light", "lamp"))
+    ends = bench.collect("dim/ended", Dimmed)
+    bench.publish("dim", Float64(data=0.5))
+    bench.advance(0.5)
+    bench.publish("dim/halt", Empty())
+    bench.advance(5.0)
+    assert ends == []
 
 
 def test_a_character_is_read_as_charts_have_it() -> None:

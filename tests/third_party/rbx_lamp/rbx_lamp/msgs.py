@@ -133,3 +133,20 @@ class Blink(Action["Blink.Goal", "Blink.Result", "Blink.Feedback"]):
 
         goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
         feedback: Blink.Feedback = field(default_factory=lambda: Blink.Feedback())
+
+
+@dataclass(frozen=True, slots=True)
+class Dimmed(Message):
+    """How an order to dim ended."""
+
+    TYPE: ClassVar[str] = "rbx_lamp/msg/Dimmed"
+    HASH: ClassVar[str] = "RIHS01_0b6925d2d7a459dc465ef22262e02fd23eed9dd93eba6533d6389e901a247891"
+    FIELDS: ClassVar[Fields] = {
+        "success": "bool",
+        "message": "string",
+        "brightness": "float64",
+    }
+
+    success: bool = False
+    message: str = ""
+    brightness: float = 0.0  # then

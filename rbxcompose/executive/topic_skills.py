@@ -1,0 +1,172 @@
+"""Skills that are topics: an order is a message, and another message may tell how it ended."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rbxcompose.executive.errands import GONE, Done, Waiting, text_in
+from rbxcompose.executive.shell import ENDS, HALTS, SKILL, Shell, port_name
+from rbxcompose.missions.goals import SUCCESS, values_of
+from rbxcompose.missions.results import Result
+from rbxcompose.missions.sources import OUTCOME, SkillSource
+from rbxcompose.msgs import registry
+from rbxcompose.sdk.bound import OrderSender
+
+LATE_BY = 0.2  # [s] by which the end of an order that was given up may come after that
+ROUNDING = 1e-9  # [s]
+REPLACED = "replaced by a newer order"
+
+
+class Desk:
+    """The orders whose ends are told on one topic, whichever skills and missions they belong to.
+
+    Ends have no numbers, so that one order is under way at most.
+    """
+
+    def __init__(self) -> None:
+        self.current: TopicErrand | None = None
+        self.closed_until = -math.inf  # [s] until then an end belongs to an order that was given up
+
+    def take(self, errand: TopicErrand) -> None:
+        """Let an order be the one that is under way; the one before it is given up."""
+        if self.current is not None:
+            self.current.replace()
+        self.current = errand
+
+    def leave(self, errand: TopicErrand) -> None:
+        """Let an order that has ended, or was given up, be under way no more."""
+        if self.current is errand:
+            self.current = None
+
+    def told(self, message: Any) -> None:
+        """Take an end. One that comes while no order is out is that of an order that was given up."""
+        current = self.current
+        if current is not None and current.is_sent:
+            current.told(message)
+            return
+        self.closed_until = -math.inf
+        if current is not None:
+            current.look_soon()
+
+    def changed(self) -> None:
+        """Hear that others listen."""
+        if self.current is not None:
+            self.current.changed()
+
+
+class Desks:
+    """The desks of all skills that are topics."""
+
+    def __init__(self, shell: Shell) -> None:
+        self._shell = shell
+        self._desks: dict[str, Desk] = {}  # by the port at which ends come, else by that of the skill
+        self._watched: set[str] = set()  # skills
+
+    def of(self, source: SkillSource) -> Desk:
+        """Return the desk of a skill."""
+        asked, ends = SKILL + source.skill.name, source.orders.ends
+        desk = self._desks.setdefault(port_name(ENDS, ends.topic) if ends is not None else asked, Desk())
+        if asked not in self._watched:
+            self._watched.add(asked)
+            self._shell.bound[asked].watch(desk.changed)
+        return desk
+
+    def told(self, port: str, message: Any) -> None:
+        """Take the end of an order; without an order nobody waits for it."""
+        if port in self._desks:
+            self._desks[port].told(message)
+
+
+class TopicErrand(Waiting):
+    """An order on a topic."""
+
+    nobody = "nobody listens to"
+
+    def __init__(self, shell: Shell, done: Done, desk: Desk, source: SkillSource, order: Any) -> None:
+        super().__init__(shell, done, source.topic)
+        self._desk, self._source, self._order = desk, source, order
+        self._has_begun = False
+        self._sent_to: frozenset[bytes] = frozenset()
+
+    def begin(self) -> None:
+        """Send the order, once no end of an earlier one can come any more; or wait for somebody who listens."""
+        if self._source.orders.ends is not None:
+            self._desk.take(self)
+        self._begin_if_free()
+        if not self._has_begun:
+            self.look_soon()
+
+    def send(self) -> bool:
+        """Send it, if somebody listens who carries it out."""
+        sender: OrderSender[Any] = self._shell.bound[SKILL + self._source.skill.name]
+        if not sender.listeners:
+            return False
+        self.is_sent, self._sent_to = True, sender.listeners
+        sender(self._order)
+        if self._source.orders.ends is None:
+            self.end(Result(True))
+        return True
+
+    def halt(self) -> None:
+        """Give the order up."""
+        super().halt()
+        self._give_up()
+
+    def replace(self) -> None:
+        """Give the order up for a newer one."""
+        self._give_up()
+        self.end(Result(False, REPLACED))
+
+    def told(self, message: Any) -> None:
+        """Take its end."""
+        values = values_of(message)
+        told = values.get(OUTCOME) if self._source.skill.outcomes else ""
+        outcome = told if isinstance(told, str) else ""
+        self.end(Result(values.get(SUCCESS) is True, text_in(values), outcome, values))
+
+    def changed(self) -> None:
+        """Look whether anybody is left of those to whom it was sent."""
+        sender: OrderSender[Any] = self._shell.bound[SKILL + self._source.skill.name]
+        if not self.is_sent or self._sent_to & sender.listeners:
+            return
+        if not self._source.skill.restartable:
+            self.end(Result(False, GONE))
+            return
+        self.wait(f"nobody listens to {self.name} any more", GONE)
+        self.look_soon()
+
+    def next_look(self) -> float | None:
+        """Look after it when it may be sent, and while nobody listens."""
+        return super().next_look() if self._has_begun else max(self._desk.closed_until, self._shell.now)
+
+    def look(self) -> None:
+        """Send it as soon as that can be; give up after the time."""
+        if self._has_begun:
+            super().look()
+        else:
+            self._begin_if_free()
+
+    def look_soon(self) -> None:
+        """Have it looked after at this instant."""
+        self._shell.look_soon()
+
+    def end(self, result: Result) -> None:
+        """Tell how it ended."""
+        self._desk.leave(self)
+        super().end(result)
+
+    def _begin_if_free(self) -> None:
+        if self._shell.now + ROUNDING >= self._desk.closed_until:
+            self._has_begun = True
+            super().begin()
+
+    def _give_up(self) -> None:
+        self._desk.leave(self)
+        halts = self._source.orders.halts
+        if not self.is_sent:
+            return
+        self.is_sent = False
+        self._desk.closed_until = self._shell.now + LATE_BY
+        if halts is not None:
+            self._shell.bound[HALTS + self._source.skill.name](registry.message(halts.message)())

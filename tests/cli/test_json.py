@@ -1,0 +1,131 @@
+"""Whoever asks for JSON gets JSON, also where there is nothing to tell and where a person has made a mistake."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.cli import main as command
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.runtime.log import start_new
+from tests.conftest import ROOT
+
+# The words behind each verb that has `--json`, with a mistake in them: there is no such robot, file, code or type.
+MISTAKES = {
+    "action ls": "",
+    "action send": "go_to",
+    "apply": "nowhere.yaml",
+    "doctor": "nobody",
+    "down": "nobody",
+    "expand": "nowhere.yaml",
+    "explain": "RBX1099",
+    "logs": "--robot nobody",
+    "mission cancel": "",
+    "mission explore": "patrl robots/turtlebot",
+    "mission log": "",
+    "mission ls": "",
+    "mission pause": "",
+    "mission resume": "",
+    "mission run": "patrol",
+    "mission skills": "nowhere.yaml",
+    "mission status": "",
+    "mission watch": "",
+    "msg export": "pyproject.toml",
+    "msg show": "std_msgs/Strin",
+    "param get": "base max_speed",
+    "param ls": "",
+    "param set": "base max_speed 1",
+    "plan": "nowhere.yaml",
+    "ps": "nobody",
+    "record": "--for 1s",
+    "release": "",
+    "replay": "nowhere.mcap --info",
+    "service call": "set_battery_level",
+    "service ls": "",
+    "stop": "--robot nobody",
+    "test": "nowhere",
+    "tf echo": "map base",
+    "tf tree": "",
+    "top": "nobody",
+    "topic echo": "/odom",
+    "topic hz": "/odom",
+    "topic ls": "",
+    "topic pub": "/chatter std_msgs/String",
+    "topic show": "/odom",
+    "why": "components.base robots/turtlebot/robt.yaml",
+}
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.chdir(ROOT)
+
+
+def leaves(parser: argparse.ArgumentParser, words: str) -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    """Yield each verb, those below it in its place, with its parser."""
+    below = [one for one in parser._actions if isinstance(one, argparse._SubParsersAction)]
+    if not below:
+        yield words, parser
+    for group in below:
+        for name, one in group.choices.items():
+            yield from leaves(one, f"{words} {name}")
+
+
+def test_each_verb_that_claims_it_is_looked_at_here() -> None:
+    found = [leaf for verb in command.verbs() for leaf in leaves(command.parser_of(verb, command.load(verb)), verb)]
+    assert {words for words, parser in found if "--json" in parser._option_string_actions} == set(MISTAKES)
+
+
+@pytest.mark.parametrize("verb", MISTAKES)
+def test_a_mistake_is_one_document(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main([*verb.split(), *MISTAKES[verb].split(), "--json"]) in (1, 2)
+    captured = capsys.readouterr()
+    told = json.loads(captured.out)
+    assert set(told) == {"error", "findings"}
+    assert told["error"]
+    assert told["error"] in captured.err
+    assert all(one["code"] in captured.err for one in told["findings"])
+
+
+def test_words_that_no_verb_takes_are_a_document_too(capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["ps", "--colour", "--json"], ["topic", "hz", "/odom", "--for", "soon", "--json"]):
+        with pytest.raises(SystemExit):
+            command.main(words)
+        captured = capsys.readouterr()
+        told = json.loads(captured.out)
+        assert told["findings"] == []
+        assert told["error"] in captured.err
+
+
+def test_a_replay_that_has_no_answer_refuses_to_give_one_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["replay", "nowhere.mcap", "--json"]) == 2
+    assert json.loads(capsys.readouterr().out)["error"] == "--json needs --info or --into"
+
+
+def test_without_json_the_words_on_stderr_are_all(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["ps"]) == 1
+    assert capsys.readouterr().out == ""
+
+
+def test_mistakes_in_a_file_are_told_with_their_places(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "robot.yaml"
+    file.write_text("rbx: 1\nkind: Robot\nname: cart\ncomponents:\n  base: {type: bass}\n  arm: {type: armm}\n")
+    for words in (["plan"], ["apply"], ["mission", "skills"]):
+        assert command.main([*words, str(file), "--json"]) == 1
+        told = json.loads(capsys.readouterr().out)
+        assert [(one["code"], one["line"]) for one in told["findings"]] == [("RBX3004", 5), ("RBX3004", 6)]
+        assert told["error"] == told["findings"][0]["message"]
+
+
+def test_a_log_without_a_line_is_no_line(capsys: pytest.CaptureFixture[str]) -> None:
+    folder = RobotFolder.of("a")
+    folder.make()
+    start_new(folder.path).close()
+    for words in (["logs", "--json"], ["logs", "a", "--level", "error", "--json"]):
+        assert command.main(words) == 0
+        assert capsys.readouterr().out == ""

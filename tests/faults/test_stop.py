@@ -1,0 +1,34 @@
+"""A patrol that is stopped stays where it is until somebody releases it and sends it on its way again."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.faults.observer import MOTION
+from tests.faults.patrol import Patrol
+
+ODOMETRIES = 25  # as many as come in half a second
+
+
+@pytest.mark.timeout(60)
+def test_after_a_stop_and_its_release_the_patrol_moves_only_when_it_is_told_to(tmp_path: Path) -> None:
+    with Patrol(tmp_path, times=10) as patrol:
+        observer = patrol.observer
+
+        def told_after(since: float) -> list[bool]:
+            """Return whether the base was at rest, for each odometry since then."""
+            return [one.is_rest for one in list(observer.story) if one.topic == MOTION and one.time > since]
+
+        assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
+        patrol.do("stop")
+        assert patrol.wait_for(lambda: told_after(0.0)[-1])
+        stopped = time.monotonic()
+        patrol.do("release")
+        assert patrol.wait_for(lambda: len(told_after(stopped)) > ODOMETRIES)
+        assert all(told_after(stopped))
+        patrol.do("mission", "resume")
+        assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
+        assert patrol.unsafe() == []

@@ -1,0 +1,103 @@
+"""What a process knows of frames, when it takes it, and how little it is woken for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import pytest
+
+from rbxcompose.bus.attachment import Attachment
+from rbxcompose.bus.bus import Bus
+from rbxcompose.bus.transport import Arrival, Nowhere
+from rbxcompose.clock import SteppedClock
+from rbxcompose.msgs.cdr import encode
+from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
+from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.qos import Qos
+from rbxcompose.runtime.frames import Frames, Lookup
+from rbxcompose.scheduler import Scheduler
+
+
+@dataclass(frozen=True, slots=True)
+class Came:
+    """A message of another process."""
+
+    payload: bytes
+    attachment: bytes = Attachment(1, 0, bytes(16)).encode()
+
+
+@dataclass
+class World(Nowhere):
+    """A process that hears of `/tf` from another one."""
+
+    is_patient: bool
+    woken: int = 0
+    arrived: list[Callable[[Arrival], None]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.clock, self.scheduler = SteppedClock(), Scheduler()
+        bus = Bus(self.scheduler, self.clock, transport=self, log=lambda owner, text: None)
+        self.frames = Frames("host", bus, self.clock, is_patient=self.is_patient)
+        self.look = Lookup(self.frames, "odom", "base")
+
+    def wake(self, owner: str, callback: Callable[[], None]) -> None:
+        self.woken += 1
+        self.scheduler.post(owner, callback)
+
+    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Nowhere:
+        if "/tf/" in key:
+            self.arrived.append(arrived)
+        return self
+
+    def tell(self, time: float, x: float, child: str = "base") -> None:
+        """Have a pose arrive at `time` [s]."""
+        self.clock.advance_to(time)
+        placed = Transform(translation=Vector3(x, 0.0, 0.0), rotation=Quaternion(w=1.0))
+        link = TransformStamped(header=Header(frame_id="odom"), child_frame_id=child, transform=placed)
+        for arrived in self.arrived:
+            arrived(Came(encode(TFMessage(transforms=(link,)))))
+
+    def x(self) -> float | None:
+        """Return where the base is [m], as who looks sees it."""
+        pose = self.look.now()
+        return pose.x if pose else None
+
+
+def test_who_looks_sees_the_newest_pose_though_nobody_was_woken_for_it() -> None:
+    world = World(is_patient=True)
+    seen = []
+    for number in range(20):
+        world.tell(0.02 * number, float(number))
+        seen.append(world.x())
+    assert (seen, world.woken) == ([float(number) for number in range(20)], 0)
+
+
+def test_while_nobody_looks_no_frame_is_lost_that_is_told_rarely() -> None:
+    world = World(is_patient=True)
+    world.tell(0.0, 5.0, child="lamp")
+    for number in range(40):
+        world.tell(0.02 * number, float(number))
+        world.scheduler.advance(world.clock.now())
+    assert Lookup(world.frames, "odom", "lamp").now() is not None
+    assert world.x() == 39.0
+    assert world.woken <= 10
+
+
+def test_a_pose_is_as_old_as_its_arrival_however_late_it_was_taken() -> None:
+    world = World(is_patient=True)
+    world.tell(1.0, 0.0)
+    world.clock.advance_to(1.5)
+    world.x()
+    assert world.frames.tree.age("odom", "base", 1.5) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("is_patient", [False, True])
+def test_where_another_thread_looks_each_pose_is_taken_by_the_scheduler(*, is_patient: bool) -> None:
+    world = World(is_patient=is_patient)
+    world.frames.hurry()
+    world.tell(0.0, 3.0)
+    assert (world.x(), world.woken) == (None, 1)
+    world.scheduler.advance(0.0)
+    assert world.x() == 3.0
