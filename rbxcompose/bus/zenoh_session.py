@@ -21,6 +21,8 @@ def _common() -> dict[str, object]:
     return {
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": True,  # without it, two peers of one router never exchange anything
+        # Else two peers that learn of each other connect twice, once from each side, and keep both links alive.
+        "scouting/gossip/autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}},
         "scouting/delay": 0,  # a router would wait for as long before it opens
         "timestamping/enabled": True,  # the caches of latched topics need it
         "transport/link/tx/lease": LEASE,
