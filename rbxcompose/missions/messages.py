@@ -97,7 +97,7 @@ def _value(shape: Shape, ros_type: str, task: Task) -> Value:
     if isinstance(shape, tuple):
         return [_value(one, base, task) for one in shape]
     if base == TEXT:
-        return task.run.filled(shape.template, task.scope)
+        return task.run.written(shape.template, task.scope)
     if shape.expression is None:
         raise NodeFailed(f"'{shape.scalar.text}' is no value of the type {ros_type}")
     return evaluate(shape.expression, task.scope)

@@ -108,7 +108,12 @@ class Run:
         return showing.show_briefly(self._types.get(name), value)
 
     def filled(self, template: Template, scope: MissionScope) -> str:
-        """Return a text with its values."""
+        """Return a text for people with its values: names of places have no underscores there."""
+        places = self.engine.robot.places
+        return fill(template, scope, lambda name, value: self.show(name, showing.spoken(value, places)))
+
+    def written(self, template: Template, scope: MissionScope) -> str:
+        """Return a text for programs with its values: what was written down as a text stays as it is."""
         return fill(template, scope, self.show)
 
     def _look(self, now: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Mapping
 
 from rbxcompose.expressions.text import show_value
 from rbxcompose.expressions.types import UNKNOWN, Type
@@ -18,6 +19,18 @@ def show(type: Type | None, value: Value) -> str:
     if dimension and isinstance(value, int | float) and is_number(value):
         return format_quantity(value, dimension)
     return show_value("", value)
+
+
+def spoken(value: Value, places: Collection[str]) -> Value:
+    """Return a value in which texts that name a place are written as people say them: 'living room'."""
+    match value:
+        case str():
+            return value.replace("_", " ") if value in places else value
+        case list() | tuple():
+            return [spoken(one, places) for one in value]
+        case Mapping():
+            return {str(spoken(name, places)): spoken(one, places) for name, one in value.items()}
+    return value
 
 
 def show_briefly(type: Type | None, value: Value) -> str:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from rbxcompose.expressions.types import choice_of
 from rbxcompose.missions.events import SkillStarted
-from tests.missions.simulated import Simulated, simulate
+from rbxcompose.missions.program import Skill
+from rbxcompose.missions.story import Story
+from tests.missions.simulated import ROBOT, SKILLS, Simulated, program_of, simulate
 
 
 def fails(*calls: int) -> frozenset[int]:
@@ -245,3 +250,38 @@ def test_an_exception_of_a_leaf_is_a_reported_failure() -> None:
     simulated = simulate("do: {fallback: [a, b]}", raises=frozenset({"a"}))
     assert simulated.advance(10) == "success"
     assert simulated.told[:3] == ["0 a", "0 do.fallback.a.0: RuntimeError: out of order", "0 b"]
+
+
+def test_in_texts_a_name_of_a_place_has_no_underscores_wherever_it_comes_from() -> None:
+    text = """
+    data:
+      rooms: {corner_1: [corner_2, far_away]}
+    do:
+      - for: room
+        in: $rooms
+        do:
+          - say: I am at $room now
+          - go_to: $room
+          - log: Left are $rooms
+          - check: $room == 'corner_1'
+    """
+    simulated = simulate(text)
+    assert simulated.advance(10) == "success"
+    assert skills(simulated) == ["0 say I am at corner 1 now", "1 go_to corner_1"]
+    assert "2 Left are corner 1: corner 2, far_away" in simulated.told
+
+
+def test_in_a_message_to_programs_a_text_stays_as_it_was_written() -> None:
+    simulated = simulate("data: {room: corner_1}\ndo: {publish: greetings, message: $room}")
+    assert simulated.advance(5) == "success"
+    assert simulated.published == [(0.0, "greetings", {"data": "corner_1"})]
+
+
+def test_a_bare_word_is_a_choice_where_one_is_expected_also_if_a_place_has_that_name() -> None:
+    paint = Skill("paint", {"where": choice_of("dock", "wall")}, "where")
+    robot = replace(ROBOT, skills={**SKILLS, "paint": paint})
+    simulated = Simulated(program_of("do: [{paint: dock}, {paint: wall}]", robot), robot=robot)
+    simulated.story = Story("test", robot.skills)
+    assert simulated.advance(5) == "success"
+    given = [event.arguments["where"] for _, event in simulated.events if isinstance(event, SkillStarted)]
+    assert given == ["dock", "wall"]
