@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from rbxcompose.checking import check
 from rbxcompose.expressions.tree import ExpressionError, Variable
 from rbxcompose.expressions.types import TypeKind
-from rbxcompose.findings import Finding, Related, suggest
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.findings import Finding, Related, Span, suggest
+from rbxcompose.manifest.tree import Mapping, Scalar, Sequence, at
+from rbxcompose.missions.deeds import assignments, shortened
 from rbxcompose.missions.facts import Constants
 from rbxcompose.missions.kinds.for_ import ForOptions
 from rbxcompose.missions.program import Node, Program
@@ -44,17 +45,38 @@ def place_in_data(robot: Robot) -> Iterator[Finding]:
         go_to: $room
     ```
     """
+    places = robot.manifest.places
     for mission in robot.missions.values():
-        program, known = mission.program, constants(mission)
+        program, known = mission.program, {**_shortened(mission.program), **constants(mission)}
         for node, name in _goals(robot, program):
             for text, datum in _texts(program, node, name, known):
-                if text not in robot.manifest.places and datum in program.data:
+                if text not in places and datum in program.data:
                     yield place_in_data.at(
-                        program.data[datum].span,
+                        _place_of(program, datum, text),
                         f"there is no place '{text}', to which '{node.skill}' is sent with '${name}'",
-                        help=suggest(text, robot.manifest.places, "places of this robot"),
+                        help=suggest(text, places, "places of this robot"),
                         related=[Related(node.span, "used here")],
                     )
+
+
+def _shortened(program: Program) -> Constants:
+    """Return the data that only lose items: what is left of them was there from the start."""
+    names = frozenset[str]().union(*(shortened(node) for node in program.nodes))
+    written = {one.name for node in program.nodes for one in assignments(node)} | program.saved
+    return {name: program.data[name].value for name in names & program.data.keys() - written}
+
+
+def _place_of(program: Program, datum: str, text: str) -> Span:
+    """Return where a text stands in a datum; the name of the datum, if it is not found."""
+    match at(program.root, ("data", datum)):
+        case Mapping(entries=entries) if text in entries:
+            return entries[text].key.span
+        case Sequence(items=items):
+            spans = (item.span for item in items if isinstance(item, Scalar) and item.text == text)
+            return next(spans, program.data[datum].span)
+        case Scalar(span=span):
+            return span
+    return program.data[datum].span
 
 
 def _goals(robot: Robot, program: Program) -> Iterator[tuple[Node, str]]:

@@ -50,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--json", action="store_true", help="answer in JSON"
     )
     explore = _on_file(add("explore", "look for dead ends by trying all that may happen", _explore), "name")
+    explore.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
     explore.add_argument("--states", type=int, default=2000, metavar="N", help="look at so many states at most")
     explore.add_argument("--depth", type=int, default=30, metavar="N", help="let so many things happen at most")
     explore.add_argument("--json", action="store_true", help="answer in JSON")

@@ -147,7 +147,7 @@ class Missions:
         known = self._equipment.inputs.get(name, {})
         inputs, findings = bind_texts(program, given, known, self._equipment.names.places)
         if findings:
-            raise Refused("; ".join(one.message for one in findings))
+            raise Refused("; ".join((*(one.message for one in findings), "give inputs by '--set NAME=VALUE'")))
         return inputs
 
     def _clash(self, linked: Program) -> str:

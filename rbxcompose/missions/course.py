@@ -82,6 +82,7 @@ class Reaction(Course):
         self.name = definition.name
         self.afterwards = definition.afterwards
         self.targets = definition.targets
+        self.restarts = definition.restarts.text if definition.restarts else ""  # what the targets are named
         self.watched = Watched.of(definition.when.expression)
         self.scope = SinceScope(scope, new_names(definition.when.expression))
         self.is_armed = True  # it may act: its condition was false since it last did

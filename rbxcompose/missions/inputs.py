@@ -33,11 +33,14 @@ def bind_inputs(
     places: Mapping[str, Place],
     span: Span,
     removed: Mapping[str, Span] = MappingProxyType({}),
+    *,
+    is_begun: bool = True,
 ) -> tuple[dict[str, Value], list[Finding]]:
     """Return the values of all inputs by name, and what is wrong with those that were given.
 
     `given` are the entries below `with:`, `span` is the place of the robot's entry for the mission.
-    `removed` are places that are gone, with what took them away.
+    `removed` are places that are gone, with what took them away. A mission that is not begun with these inputs alone
+    gets the rest later: from `with:` of a `use`, or from who begins it.
     """
     findings: list[Finding] = []
     for name, entry in given.items():
@@ -50,6 +53,8 @@ def bind_inputs(
     for name, declared in program.inputs.items():
         datum = _given(declared, given[name], findings) if name in given else declared.default
         if datum is None and name not in given:
+            if not is_begun:
+                continue
             message = f"the input '{name}' of the mission '{program.name}' needs a value"
             findings.append(codes.WRONG_INPUT.at(span, message, help=f"write it under 'with': '{name}: ...'"))
         elif datum is not None:

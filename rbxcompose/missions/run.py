@@ -13,7 +13,7 @@ from rbxcompose.missions.course import Course, Reaction
 from rbxcompose.missions.events import InterruptEnded, InterruptStarted, Reported
 from rbxcompose.missions.history import WithHistory
 from rbxcompose.missions.places import DEEP
-from rbxcompose.missions.program import CONTINUE, END, Program, RobotNames
+from rbxcompose.missions.program import CONTINUE, END, Program, RobotNames, Target
 from rbxcompose.missions.scopes import MissionScope, RunScope
 from rbxcompose.missions.statuses import FAILURE, RUNNING, SUCCESS
 from rbxcompose.missions.task import NodeFailed, Task
@@ -162,24 +162,35 @@ class Run:
         if reaction.afterwards == END:
             return self._finish(self.mission, SUCCESS)
         self.stack.pop()
-        back = self.returns.pop()
-        if reaction.afterwards == CONTINUE or reaction.targets:
+        back, afterwards, anew = self.returns.pop(), reaction.afterwards, ""
+        if afterwards == CONTINUE or reaction.targets:
             self.stack[-1].resume(now)
-            for target in reaction.targets:
-                for course in self.stack:
-                    if course.begin_anew(target) and not target.is_round:
-                        self._forget_place_of(target.number)
+            if self._begin_anew(reaction.targets):
+                anew = reaction.restarts
+            else:
+                afterwards = CONTINUE
         else:
             self.halt()
             for root in (self.program.main, *(one.root for one in self.program.interrupts if one.root is not None)):
                 self.engine.places.forget(root, self.engine.program.nodes[root].end)
             self.begin(dict(self.inputs))
             reaction.is_armed = False
-        self.engine.say(InterruptEnded(reaction.name, reaction.afterwards, back))
+        self.engine.say(InterruptEnded(reaction.name, afterwards, back, anew))
         if not reaction.is_armed and self._holds(reaction):
             self.engine.say(Reported(f"interrupts.{reaction.name}", STILL_HOLDS))
         self.engine.again(reaction)
         return RUNNING
+
+    def _begin_anew(self, targets: tuple[Target, ...]) -> bool:
+        """Let what is named begin again wherever it runs; tell whether it runs anywhere."""
+        has_begun = False
+        for target in targets:
+            for course in self.stack:
+                if course.begin_anew(target):
+                    has_begun = True
+                    if not target.is_round:
+                        self._forget_place_of(target.number)
+        return has_begun
 
     def _forget_place_of(self, number: int) -> None:
         """Forget where a node was that is to begin anew; those inside it keep the places of histories of their own."""

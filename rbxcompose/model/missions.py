@@ -46,7 +46,8 @@ def read_missions(
         program = read_program(root, report, skills) if root else None
         if program is not None:
             gone = manifest.history.removed("places")
-            inputs, findings = bind_inputs(program, entry.with_.entries, manifest.places, entry.span, gone)
+            given, is_begun = entry.with_.entries, name == manifest.start
+            inputs, findings = bind_inputs(program, given, manifest.places, entry.span, gone, is_begun=is_begun)
             report.extend(findings)
             found[name] = RobotMission(name, program, inputs)
     using = Using({name: one.program for name, one in found.items()})

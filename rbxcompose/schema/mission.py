@@ -52,7 +52,8 @@ _ABOUT = {
     "machine": "What the mission does, as a state machine.",
     "when": "The condition that cuts the mission short.",
     "reaction": "What is done then.",
-    "afterwards": "What comes after the reaction: `continue` starts again what was cut short, `restart` begins anew.",
+    "afterwards": "What comes after the reaction: `continue` goes on with what was cut short, `restart` begins the "
+    "mission anew, `restart` with a name below it what is named, `end` ends the mission in success.",
 }
 _MACHINE = {
     "start": "The state in which it begins.",

@@ -22,7 +22,6 @@ from rbxcompose.missions.snapshot import restore, save
 from rbxcompose.missions.statuses import IDLE, RUNNING
 from rbxcompose.missions.story import Story
 from rbxcompose.missions.task import Task
-from rbxcompose.model.robot import Robot
 from rbxcompose.trials.model import FAILS, SUCCEEDS
 from rbxcompose.trials.representatives import representatives
 
@@ -82,12 +81,6 @@ class Moment:
     calls: Mapping[int, str]  # what runs, in words, by leaf
     held: Mapping[int, str]  # what is held
     script: tuple[str, ...] = ()
-
-
-def run(robot: Robot, name: str, limits: Limits = Limits()) -> Explored:
-    """Explore a mission of a robot with its inputs; raise KeyError if there is none of this name."""
-    mission = robot.missions[name]
-    return explore(mission.program, robot.names, mission.inputs, limits)
 
 
 def explore(program: Program, robot: RobotNames, inputs: Mapping[str, Value], limits: Limits = Limits()) -> Explored:

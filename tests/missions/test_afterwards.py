@@ -53,6 +53,21 @@ def test_the_current_round_of_a_loop_begins_again() -> None:
     assert [line.split()[-1] for line in skills(simulated) if "say" in line] == ["1", "2", "2", "3"]
 
 
+@pytest.mark.parametrize(
+    ("afterwards", "at", "told"),
+    [
+        ("continue", 1.5, "interrupt open done, back to b"),
+        ("restart", 1.5, "interrupt open done, the mission begins anew"),
+        ("{restart: last}", 2.5, "interrupt open done, last begins anew"),
+        ("{restart: last}", 1.5, "interrupt open done, back to b"),  # it does not run
+    ],
+)
+def test_the_story_tells_how_it_goes_on(afterwards: str, at: float, told: str) -> None:
+    simulated = opened(afterwards, "- a\n- b\n- sequence: [c, d]\n  name: last", at=at)
+    simulated.advance(20)
+    assert [line.partition(" ")[2] for line in simulated.told if "open done" in line] == [told]
+
+
 def test_restart_begins_the_whole_with_fresh_data() -> None:
     simulated = opened("restart", "- set: {n: $n + 1}\n- a\n- b")
     assert simulated.advance(20) == "success"

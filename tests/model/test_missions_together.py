@@ -100,3 +100,22 @@ def test_a_skill_in_python_is_there_for_who_names_it(tmp_path: Path) -> None:
     out = compiled(tmp_path, a="do:\n  say: hello there\n")
     assert out.robot is not None
     assert "say" in out.robot.skills
+
+
+GO = "inputs: {where: {type: place}}\ndo: {go_to: $where}\n"
+
+
+def test_an_input_may_be_left_to_who_uses_or_begins_the_mission(tmp_path: Path) -> None:
+    out = compiled(tmp_path, go=GO, both="do: [{use: go, with: {where: dock}}]\n")
+    assert not out.report.has_errors, list(out.report)
+
+
+def test_each_use_needs_the_inputs_that_have_no_default(tmp_path: Path) -> None:
+    out = compiled(tmp_path, go=GO, both="do: {use: go}\n")
+    assert told(out, "RBX4113") == ["the input 'where' of the mission 'go' needs a value"]
+
+
+def test_so_does_the_mission_that_begins_by_itself(tmp_path: Path) -> None:
+    compiled(tmp_path, go=GO)
+    out = compile_robot(str(tmp_path / "robots/bot.yaml"), sets=["start=go"], environment={})
+    assert told(out, "RBX4113") == ["the input 'where' of the mission 'go' needs a value"]

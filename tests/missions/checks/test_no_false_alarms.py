@@ -58,6 +58,10 @@ def codes(text: str) -> list[str]:
         "do: {choose: $count_of_people, cases: {1: a, 2: b}}",
         "data: {left: [dock, kitchen]}\ndo: {for: room, in: $left, remove_done: true, do: {go_to: $room}}",
         "do: {publish: greetings, message: hello}",
+        "do: {parallel: {work: {repeat: forever, do: a}, other: b}, ends_with: other}",
+        "do: {parallel: {work: {repeat: forever, do: a}, other: b}, succeed_when: any}",
+        "do: {parallel: [{repeat: forever, do: a}, b, c], succeed_when: 2}",
+        "do: {parallel: [{repeat: forever, do: a}, {repeat: forever, do: b}]}",  # meant to go on
     ],
 )
 def test_nothing_is_said_of(text: str) -> None:

@@ -1,0 +1,72 @@
+"""Parallels that wait for a branch which never ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.expressions.tree import Expression, Number
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.kinds.parallel import ALL, ParallelOptions
+from rbxcompose.missions.outcomes import SUCCEEDS
+from rbxcompose.missions.program import Node
+
+
+@mission_check("RBX4138", Severity.WARNING)
+def endless_branch(mission: Examined) -> Iterator[Finding]:
+    """A parallel waits for a branch that never succeeds
+
+    Branches that run at the same time are done when all of them have succeeded. What is repeated for ever never does,
+    so that the mission never goes on. Say which branch decides (`ends_with`), or that one success is enough.
+
+    Bad:
+    ```yaml
+    do:
+      - parallel:
+          drive:
+            go_to: corner_1
+          talk:
+            repeat: forever
+            every: 5 s
+            do:
+              log: On my way
+      - go_to: dock
+    ```
+    Good:
+    ```yaml
+    do:
+      - parallel:
+          drive:
+            go_to: corner_1
+          talk:
+            repeat: forever
+            every: 5 s
+            do:
+              log: On my way
+        ends_with: drive
+      - go_to: dock
+    ```
+    """
+    program, ending = mission.program, mission.ending
+    for node in program.nodes:
+        options = node.options
+        if not isinstance(options, ParallelOptions) or options.ends_with:
+            continue
+        endless = [child for child in node.children if not ending.of(child).counting_as(SUCCEEDS)]
+        others = [child for child in node.children if child not in endless]
+        if endless and others and _most_wanted(node, options) > len(others):
+            yield endless_branch.at(
+                program.nodes[endless[0]].span,
+                "this branch never succeeds, and the parallel waits for it",
+                help="write 'ends_with' and the name of the branch that decides, or 'succeed_when: any'",
+                related=[Related(program.nodes[others[0]].span, "beside this one")],
+            )
+
+
+def _most_wanted(node: Node, options: ParallelOptions) -> float:
+    """Return how many branches must succeed, as far as that is written down; else none."""
+    if options.succeed_when == ALL:
+        return len(node.children)
+    tree = options.succeed_when.tree if isinstance(options.succeed_when, Expression) else None
+    return tree.value if isinstance(tree, Number) else 0
