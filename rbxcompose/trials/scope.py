@@ -109,9 +109,12 @@ def read_value(node: Node, wanted: Type, robot: RobotNames, what: str) -> tuple[
 
 
 def agrees(expected: Value, happened: Value) -> bool:
-    """Tell whether a value is the one that was expected; of maps only the entries that were written count."""
+    """Tell whether a value is the one that was expected.
+
+    Of maps only the entries that were written count; one without entries is expected to be empty.
+    """
     if isinstance(expected, Mapping) and isinstance(happened, Mapping):
-        return all(name in happened and agrees(entry, happened[name]) for name, entry in expected.items())
+        return (bool(expected) or not happened) and all(name in happened and agrees(entry, happened[name]) for name, entry in expected.items())
     if isinstance(expected, list | tuple) and isinstance(happened, list | tuple):
         return len(expected) == len(happened) and all(map(agrees, expected, happened))
     if isinstance(expected, int | float) and isinstance(happened, int | float) and is_number(expected):

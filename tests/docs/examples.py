@@ -16,7 +16,7 @@ HEADER = "rbx: 1\nkind: Mission\nname: example\n"
 EXAMPLE = f"{HEADER}do: recharge\n"
 URDF = '<robot name="example"/>\n'
 
-WALKED_THROUGH = ("tutorial.md", "sdk.md")  # their manifests need each other, or a package; tests of their own follow
+WALKED_THROUGH = ("tutorial.md", "missions.md", "sdk.md")  # their manifests need each other, or a package
 
 _FENCE = re.compile(r"^```(?P<info>[^\n`]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 _SECTION = re.compile(r"^(?=[^\s#])", re.MULTILINE)
@@ -63,8 +63,8 @@ def page_blocks(language: str, trials: bool = False) -> list[Block]:
 
 
 def is_walked_through(block: Block) -> bool:
-    """Tell whether a manifest is part of a walk: its page is one, or the block names the file that it goes into."""
-    return block.page in WALKED_THROUGH or any("/" in word for word in block.words[1:])
+    """Tell whether a test follows the whole page of a manifest, from its first block to its last."""
+    return block.page in WALKED_THROUGH
 
 
 def checked(block: Block, folder: Path) -> Checked:

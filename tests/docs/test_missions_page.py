@@ -7,56 +7,110 @@ import re
 import shlex
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from rbxcompose.cli import main as command
 from rbxcompose.missions.registry import kinds
-from rbxcompose.testing import check_file
-from tests.docs.examples import ROOT, blocks_of, is_walked_through
+from rbxcompose.testing import check_file, run_robot
+from tests.docs.examples import ROOT, Block, blocks_of
 
 TEXT = (ROOT / "docs/missions.md").read_text(encoding="utf-8")
-WALK = list(blocks_of(TEXT.partition("## 4.")[0], "missions.md"))
-ROBOT = "robots/cart/robot.yaml"
+BLOCKS = list(blocks_of(TEXT, "missions.md"))
+ROBOT = Path("robots/cart/robot.yaml")
+TRIED = Path("missions/play.yaml")  # in which the page tells its reader to try the examples
+ENDS = ("success", "failure", "running")
+LONGEST = 500.0  # [s] of robot time: the battery of the robot is low once in it
 SKIPS = "..."
 
 
-def see(shown: str, wanted: str) -> None:
-    """Find lines in their order; what `...` stands for may lie between."""
-    at = 0
-    for line in wanted.splitlines():
-        if line != SKIPS:
-            found = shown.find(line, at)
-            assert found >= 0, f"'{line}' does not come in\n{shown[at:]}"
-            at = found + len(line)
+@dataclass
+class Reader:
+    """Does what the page says, in a folder of its own, and compares what is shown there with what the page shows."""
 
+    capsys: pytest.CaptureFixture[str]
+    shown: str = ""  # by the last commands
+    lent: str = ""  # the robot before lines that the page lets its reader take out again after one mission
 
-def printed(words: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    """Return what a command prints; `up` starts processes, for which it needs one of its own."""
-    if words[0] != "up":
-        command.main(words)
-        return capsys.readouterr().out
-    environment = {**os.environ, "XDG_RUNTIME_DIR": str(Path.cwd())}
-    call = [sys.executable, "-m", "rbxcompose", *words]
-    return subprocess.run(call, env=environment, capture_output=True, text=True, check=True).stdout
-
-
-def test_who_follows_it_sees_what_it_tells(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    shown = ""
-    for block in WALK:
+    def follow(self, block: Block) -> None:
         if block.language == "sh":
-            shown = "".join(printed(shlex.split(line)[1:], capsys) for line in block.text.splitlines())
+            self.shown = "".join(self.run(line) for line in block.text.splitlines())
         elif block.language == "text":
-            see(shown, block.text)
-        elif is_walked_through(block):
+            self.see(block)
+        else:
+            self.write(block)
+            found = check_file(ROBOT)
+            assert found.codes == ([block.wrong] if block.wrong else []), f"{block}: {found.text}"
+            if "mission" in block.words:
+                self.try_out(block)
+
+    def see(self, block: Block) -> None:
+        """Find lines in their order; what `...` stands for may lie between."""
+        at = 0
+        for line in block.text.splitlines():
+            if line != SKIPS:
+                found = self.shown.find(line, at)
+                assert found >= 0, f"{block}: '{line}' does not come in\n{self.shown[at:]}"
+                at = found + len(line)
+
+    def run(self, line: str) -> str:
+        """Return what a command prints; what is not ours, and `up`, which starts processes, have a process."""
+        program, *words = shlex.split(line)
+        if program == "rbxcompose" and words[0] != "up":
+            command.main(words)
+            return self.capsys.readouterr().out
+        ours = [sys.executable, "-m"] if program == "rbxcompose" else []
+        call = " ".join([*map(shlex.quote, ours), line.replace("PATH_TO_THIS_REPOSITORY", shlex.quote(str(ROOT)))])
+        environment = {**os.environ, "XDG_RUNTIME_DIR": str(Path.cwd())}
+        done = subprocess.run(["bash", "-c", call], env=environment, capture_output=True, text=True, check=False)
+        is_told = "error: mission play: failure" in done.stdout
+        assert done.returncode == 0 or is_told, f"{line}: {done.stdout}{done.stderr}"
+        return done.stdout
+
+    def write(self, block: Block) -> None:
+        """Write a whole file, or steps below the head of a mission, or lines below a section of the robot."""
+        if "robot" in block.words:
+            self.lent = ROBOT.read_text(encoding="utf-8")
+            section = f"\n{block.text.partition(':')[0]}:\n"
+            assert self.lent.count(section) == 1
+            ROBOT.write_text(self.lent.replace(section, f"\n{block.text}"), encoding="utf-8")
+        elif "mission" in block.words:
+            head, about, rest = TRIED.read_text(encoding="utf-8").partition("\nabout:")
+            first = rest.partition("\n")[0]
+            TRIED.write_text(f"{head}{about}{first}\n{block.text}", encoding="utf-8")
+        else:
             path = Path(block.words[1])
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(block.text, encoding="utf-8")
-            assert check_file(tmp_path / ROBOT).codes == ([block.wrong] if block.wrong else []), str(block)
+
+    def try_out(self, block: Block) -> None:
+        """Let the robot do an example, which ends in success if its fence says nothing else."""
+        wanted = next((word for word in block.words if word in ENDS), "success")
+        ran = run_robot(check_file(ROBOT, sets=["start=play"]).plan, most=LONGEST)
+        assert ran.outcome == wanted, f"{block}: {ran.log}"
+        if self.lent:
+            ROBOT.write_text(self.lent, encoding="utf-8")
+            self.lent = ""
+
+
+@pytest.mark.timeout(120)
+def test_who_follows_it_sees_what_it_tells(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All of the page, from its first line to its last, in one folder, as a reader has it."""
+    monkeypatch.chdir(tmp_path)
+    reader = Reader(capsys)
+    for block in BLOCKS:
+        reader.follow(block)
+
+
+def test_every_block_of_the_page_is_one_that_the_walk_knows() -> None:
+    """Nothing that is shown goes by untried, as a language that is misspelt would."""
+    assert {block.language for block in BLOCKS} == {"sh", "text", "yaml"}
+    manifests = [block for block in BLOCKS if block.language == "yaml"]
+    assert [str(block) for block in manifests if len(block.words) < 2] == []
 
 
 def test_every_kind_of_step_has_its_line() -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from rbxcompose.expressions.values import Value
 from rbxcompose.manifest.tree import NOWHERE
 from rbxcompose.trials.judge import is_it
 from rbxcompose.trials.model import Step
 from rbxcompose.trials.record import Done
+from rbxcompose.trials.scope import agrees
 from tests.trials.trying import Trying
 
 SETTING = """
@@ -142,3 +144,18 @@ def test_a_value_that_is_set_again_is_a_new_message_of_no_age(trying: Trying) ->
         trying.problems(f"{events}expect:\n  outcome: success\n  steps:\n    - heard:\n      at: 5 s\n", "hearing")
         == []
     )
+
+
+@pytest.mark.parametrize(
+    ("expected", "happened", "is_so"),
+    [
+        ({}, {}, True),
+        ({}, {"kitchen": []}, False),
+        ({"kitchen": []}, {"kitchen": [], "hallway": []}, True),
+        ({"kitchen": {}}, {"kitchen": {"mop": 7.0}}, False),
+    ],
+)
+def test_of_a_map_what_was_written_counts_and_an_empty_one_is_empty(
+    expected: Value, happened: Value, is_so: bool
+) -> None:
+    assert agrees(expected, happened) is is_so
