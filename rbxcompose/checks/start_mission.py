@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 
 from rbxcompose.checking import check
-from rbxcompose.findings import Finding
+from rbxcompose.findings import Finding, Span
+from rbxcompose.manifest.files import files_named
+from rbxcompose.manifest.reader import read_file
+from rbxcompose.manifest.robot_file import MISSION
+from rbxcompose.manifest.tree import Mapping, Scalar
 from rbxcompose.model.robot import Robot
+
+_ENDING = ".yaml"
 
 
 @check("RBX3009", is_fixable=True)
@@ -27,11 +34,25 @@ def start_mission(robot: Robot) -> Iterator[Finding]:
     ```
     """
     start = robot.manifest.start
-    if start is not None and start not in robot.manifest.missions:
-        yield start_mission.misspelt(
-            robot.value("start"),
-            f"the robot has no mission '{start}' to start",
-            start,
-            robot.manifest.missions,
-            "missions of this robot",
-        )
+    if start is None or start in robot.manifest.missions:
+        return
+    place = robot.value("start")
+    message = f"the robot has no mission '{start}' to start"
+    if files := _files((place, robot.value("name")), start):
+        help_text = f"add '{start}: {files[0]}' below 'missions:'"
+        yield start_mission.at(place, message, help=help_text)
+        return
+    yield start_mission.misspelt(place, message, start, robot.manifest.missions, "missions of this robot")
+
+
+def _files(places: Iterable[Span], start: str) -> list[str]:
+    """Return the mission files of the project that are named like it, as the first of some files has to write them."""
+    writer = next((path for one in places if (path := Path(one.file)).is_file()), None)  # `--set` and the library: none
+    found = files_named(f"{start}{_ENDING}", writer) if writer else []
+    return [one for one in found if writer and _is_mission(writer.resolve().parent / one)]
+
+
+def _is_mission(file: Path) -> bool:
+    root, _ = read_file(file, str(file), {})
+    written = root.get("kind") if isinstance(root, Mapping) else None
+    return isinstance(written, Scalar) and written.text == MISSION

@@ -82,9 +82,9 @@ def _absolute(written: str, folder: Path) -> Path | None:
 
 
 def _missing(written: str, path: Path, span: Span | None, writer: Path | None = None) -> Finding:
-    if writer is not None and (namesakes := _namesakes(path.name, writer)):
-        message = f"'{plain(written)}' does not exist"
-        return UNREADABLE.at(span, message, help=f"did you mean {' or '.join(namesakes)}?")
+    if writer is not None and (namesakes := files_named(path.name, writer)):
+        message, help_text = f"'{plain(written)}' does not exist", " or ".join(f"'{one}'" for one in namesakes)
+        return UNREADABLE.at(span, message, help=f"did you mean {help_text}?")
     try:
         neighbours = [entry.name for entry in list(path.parent.iterdir())[:_MOST_NEIGHBOURS]]
     except OSError:
@@ -93,14 +93,14 @@ def _missing(written: str, path: Path, span: Span | None, writer: Path | None = 
     return UNREADABLE.misspelt(span, message, path.name, neighbours, there, within=written)
 
 
-def _namesakes(name: str, writer: Path) -> list[str]:
-    """Return the files of a name elsewhere in the writer's project, quoted, as the writer has to name them."""
+def files_named(name: str, writer: Path) -> list[str]:
+    """Return the files of a name elsewhere in the writer's project, as the writer has to name them."""
     file, found, looked_at = writer.resolve(), [], 0
     for above, folders, files in os.walk(project_of(writer)):
         folders[:] = sorted(one for one in folders if not one.startswith("."))
         looked_at += len(folders) + len(files)
         if name in files and (path := Path(above, name)) != file:
-            found.append(f"'{plain(Path(os.path.relpath(path, file.parent)).as_posix())}'")
+            found.append(plain(Path(os.path.relpath(path, file.parent)).as_posix()))
         if looked_at > _MOST_NEIGHBOURS or len(found) >= _MOST_NAMESAKES:
             break
     return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as AnyMapping
 from dataclasses import replace
 from difflib import get_close_matches
@@ -15,6 +15,9 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from rbxcompose.findings import SIMILAR, Finding, Report, Span, correction, kind
+from rbxcompose.manifest.brackets import bracketed, without_brackets
+from rbxcompose.manifest.first_line import KEY, first_line
+from rbxcompose.manifest.repairs import changed, repaired
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import dimension_at, keys_at
 from rbxcompose.manifest.tree import Mapping, Node, Path, Scalar, Sequence, at, key_span, value_span
@@ -60,6 +63,7 @@ teleop:
   timeout: 0.5 s
 ```
 """,
+    is_fixable=True,
 )
 WRONG_TYPE = kind(
     "RBX1003",
@@ -77,6 +81,7 @@ Good:
 max_speed: 0.3 m/s
 ```
 """,
+    is_fixable=True,
 )
 NOT_A_CHOICE = kind(
     "RBX1004",
@@ -197,50 +202,11 @@ def validate(
             errors = error.errors(include_url=False)
         before = data
         for details in errors:
-            data = _repaired(data, details, node)
+            data = repaired(data, details, node)
         if data is before:
             break
     report.extend(islice(_findings(model, node, path, errors, tuple(also)), _MOST_FINDINGS))
     return None
-
-
-def _repaired(data: Any, error: ErrorDetails, node: Node) -> Any:
-    """Return `data` with what a strict field takes and YAML cannot write: text for a number, a tuple for a list."""
-    convert = _REPAIRS.get(error["type"])
-    if convert is None:
-        return data
-    try:
-        return _changed(data, error["loc"], lambda value: convert(value, at(node, error["loc"])))
-    except (KeyError, IndexError, TypeError):  # a place that is not in the data, such as a member of a union
-        return data
-
-
-def _changed(data: Any, path: Path, convert: Callable[[object], object]) -> Any:
-    """Return `data` with the value at `path` converted; the same object if the value stays the same."""
-    if not path:
-        return convert(data)
-    key = path[0]
-    inner = _changed(data[key], path[1:], convert)
-    if inner is data[key]:
-        return data
-    if isinstance(data, dict):
-        return {**data, key: inner}
-    return type(data)(inner if index == key else item for index, item in enumerate(data))
-
-
-def _as_text(value: object, node: Node | None) -> object:
-    if isinstance(value, Quantity):
-        return format_quantity(value.value, value.dimension)
-    if isinstance(node, Scalar) and node.filled is None and value is not None:
-        return node.text
-    return str(value) if isinstance(value, int | float) else value
-
-
-def _as_tuple(value: object, _node: Node | None) -> object:
-    return tuple(value) if isinstance(value, list) else value
-
-
-_REPAIRS: dict[str, Callable[[object, Node | None], object]] = {"string_type": _as_text, "tuple_type": _as_tuple}
 
 
 def _findings(
@@ -310,7 +276,8 @@ def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails)
     match error["type"]:
         case "missing":
             message = f"{where((*path, *loc[:-1]))} needs the key '{name}'"
-            return MISSING_KEY.at(key_span(node, loc[:-1]), message)
+            help_text, fix = first_line(node) if (*path, *loc) == (KEY,) else ("", None)
+            return MISSING_KEY.at(key_span(node, loc[:-1]), message, help=help_text, fix=fix)
         case "literal_error" | "enum":
             choices = re.findall(r"'([^']*)'|(\d+)", str(context.get("expected", "")))
             return not_a_choice(span, name, value, ["".join(choice) for choice in choices])
@@ -329,7 +296,9 @@ def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails)
             bound = format_quantity(context[key], dimension) if dimension else context[key]
             return OUT_OF_RANGE.at(span, f"'{name}' must be {words} {bound}")
         case kind_of_error if kind_of_error in _EXPECTED:
-            return WRONG_TYPE.at(span, f"'{name}' must be {_EXPECTED[kind_of_error]}", label=label_of(value))
+            help_text, fix = bracketed(value) if kind_of_error in _LISTS and _is_list(model, node, loc) else ("", None)
+            message = f"'{name}' must be {_EXPECTED[kind_of_error]}"
+            return WRONG_TYPE.at(span, message, label=label_of(value), help=help_text, fix=fix)
     if "valid" in context:  # a validator of ours, which tells what there is
         message = f"'{name}': {error['msg']}"
         return NOT_A_CHOICE.misspelt(span, message, context["name"], context["valid"], context["what"])
@@ -376,6 +345,17 @@ def unit_finding(error: UnitError, node: Node, name: str) -> Finding:
     return WRONG_TYPE.at(node.span, f"'{name}' {error.message}", label=label, help="" if is_word else error.help)
 
 
+def _is_list(model: Any, node: Node, loc: Path) -> bool:
+    """Tell whether the items that a text seems to hold are what the list at `loc` takes."""
+    items = [plain_value(Scalar(text, node.span)) for text, _ in without_brackets(at(node, loc))]
+    try:
+        _adapter(model).validate_python(changed(to_plain(node), loc, lambda _: items))
+    except ValidationError as error:
+        return bool(items) and not any(one["loc"][: len(loc)] == loc for one in error.errors(include_url=False))
+    return bool(items)
+
+
+_LISTS = ("list_type", "tuple_type")
 _BOUNDS = {
     "greater_than": ("greater than", "gt"),
     "greater_than_equal": ("at least", "ge"),

@@ -7,6 +7,7 @@ import re
 import yaml
 
 from rbxcompose.findings import Edit, Finding, Fix, Related, Span, kind, replacement
+from rbxcompose.manifest.yaml_slips import Slip, key_in_line, missing_dash, too_far_left
 from rbxcompose.plain import plain
 
 QUOTES_NEEDED = kind(
@@ -160,6 +161,8 @@ def _colon(trouble: _Trouble) -> Finding:
     before = trouble.line_text[: trouble.column]
     key = re.match(r"\s*(- +)*[^\s:][^:]*: +", before)
     if key and key.end() < len(before):
+        if slip := key_in_line(trouble.lines, trouble.line, trouble.file):
+            return _told(slip)
         span = trouble.to_line_end(key.end())
         message = "text with a colon and a space needs quotes"
         return QUOTES_NEEDED.at(span, message, label=QUOTE_HELP, fix=trouble.quoting(span))
@@ -177,6 +180,8 @@ def _colon(trouble: _Trouble) -> Finding:
         )
         below = (Related(trouble.here, "this stands below it"),)
         return NOT_YAML.at(step, message, label="put a colon here", help=help_text, related=below, fix=fix)
+    if slip := _too_far_left(trouble):
+        return _told(slip)
     message = "this key cannot stand here: the line above already holds a value"
     begin = _indent(trouble.line_text)
     span = Span(trouble.file, trouble.line + 1, begin + 1, trouble.line + 1, max(begin, trouble.column) + 1)
@@ -193,6 +198,18 @@ def _step_above(trouble: _Trouble) -> tuple[Span, str] | None:
     start = len(step["before"])
     place = Span(trouble.file, line + 1, start + 1, line + 1, start + len(step["word"]) + 1)
     return place, (step["value"] or "").strip()
+
+
+def _too_far_left(trouble: _Trouble) -> Slip | None:
+    """Return the slip of this line, or of the one above it, that stands further left than its neighbours."""
+    below = next((one for one in range(trouble.line + 1, len(trouble.lines)) if trouble.lines[one].strip()), None)
+    lines = (trouble.line, below)
+    found = (too_far_left(trouble.lines, line, trouble.file) for line in lines if line is not None)
+    return next((slip for slip in found if slip), None)
+
+
+def _told(slip: Slip) -> Finding:
+    return NOT_YAML.at(slip.span, slip.message, help=slip.help, fix=slip.fix)
 
 
 def _first_character(trouble: _Trouble) -> Finding:
@@ -240,24 +257,34 @@ def _after_value(trouble: _Trouble) -> Finding:
         help_text = "put quotes of the other kind round the whole text"
         message, fix = "text goes on after its closing quote", trouble.quoting(span)
         return QUOTES_NEEDED.at(span, message, label=QUOTE_HELP, help=help_text, fix=fix)
+    if slip := _too_far_left(trouble):
+        return _told(slip)
     message = "this line does not fit the lines above it"
     begun = (Related(trouble.opening, "what it would belong to begins here"),)
     return NOT_YAML.at(
-        trouble.here, message, help="check the indentation: keys of one map begin in one column", related=begun
+        trouble.here,
+        message,
+        help="check the indentation: keys that belong together begin in one column",
+        related=begun,
     )
 
 
 def _missing_dash(trouble: _Trouble) -> Finding:
+    if slip := _too_far_left(trouble):
+        return _told(slip)
     begun = (Related(trouble.opening, "the list begins here"),)
     key = re.match(r" *([a-z][a-z0-9_]*):", trouble.line_text)
     help_text = "put a dash here"
     if key:
-        help_text = f"move it right if it belongs to the item above; put a dash here if '{key[1]}' is one of its own"
+        where = "move it right if it belongs to the item above, left if it belongs beside the list"
+        help_text = f"{where}; put a dash here if '{key[1]}' is an item of its own"
     return NOT_YAML.at(trouble.here, "this stands in a list and has no dash", help=help_text, related=begun)
 
 
 def _missing_colon(trouble: _Trouble) -> Finding:
     trouble.line = trouble.opening.line - 1
+    if slip := missing_dash(trouble.lines, trouble.line, trouble.file):
+        return _told(slip)
     span = trouble.to_line_end(trouble.opening.column - 1)
     tight = _tight_colon(trouble, trouble.line, span.column - 1)
     return tight or NOT_YAML.at(span, "a colon is missing after this key", help="write 'key: value'")

@@ -9,10 +9,10 @@ from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
 from rbxcompose.missions.literals import WrongValue, literal, typed
+from rbxcompose.missions.naming import NAME, no_name
 from rbxcompose.missions.program import RATE, Datum, Input
 from rbxcompose.missions.registry import kinds
 from rbxcompose.missions.showing import show
-from rbxcompose.missions.value_reader import NAME, NAME_HELP
 
 INPUT_KEYS = ("type", "default", "min", "max", "choices", "about")
 CHOICE = "choice"
@@ -47,20 +47,20 @@ def _named(node: Node | None, section: str, report: Report) -> dict[str, Entry]:
     if node is None or (isinstance(node, Scalar) and node.plain and not node.text):
         return {}
     if not isinstance(node, Mapping):
-        report.add(codes.WRONG_SHAPE.at(node.span, f"'{section}' needs a map from names to values"))
+        report.add(codes.WRONG_SHAPE.at(node.span, f"'{section}' needs names with their values below it"))
         return {}
     for name, entry in node.entries.items():
         if not NAME.fullmatch(name):
-            report.add(codes.WRONG_SHAPE.at(entry.key.span, f"'{name}' is no name", help=NAME_HELP))
+            report.add(no_name(entry.key))
         elif name in kinds():
-            report.add(codes.NAME_CLASH.at(entry.key.span, f"'{name}' is the name of a kind"))
+            report.add(codes.NAME_CLASH.at(entry.key.span, f"'{name}' is a word of the language"))
     return node.entries
 
 
 def _input(name: str, entry: Entry, report: Report) -> Input | None:
     value, place = entry.value, entry.key.span
     if not isinstance(value, Mapping):
-        message = f"the input '{name}' needs a map with its 'type'"
+        message = f"the input '{name}' needs its 'type' below it"
         report.add(codes.WRONG_SHAPE.at(value.span, message, help="give 'type' and perhaps 'default'"))
         return None
     for key, unknown in value.entries.items():

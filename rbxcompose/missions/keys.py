@@ -43,7 +43,7 @@ def find_key(mapping: Mapping, nodes: Nodes, skills: Collection[str] = ()) -> tu
     if len(others) < len(own) and (misspelt := next((key for key in others if _near(key, kinds())), None)):
         kind = kinds()[_near(misspelt, kinds())]
         span = mapping.entries[misspelt].key.span
-        nodes.add(codes.UNKNOWN_KEY.misspelt(span, f"unknown kind '{misspelt}'", misspelt, kinds()))
+        nodes.add(codes.UNKNOWN_KEY.misspelt(span, f"unknown step '{misspelt}'", misspelt, kinds()))
         return _of_kind(mapping, misspelt, kind, nodes, skills)
     return _of_skill(mapping, own, others, nodes, skills)
 
@@ -92,7 +92,7 @@ def _of_skill(
             nodes.add(codes.UNKNOWN_KEY.at(mapping.entries[key].key.span, message, help=help_text))
     if not steps:
         if len(own) == len(others):
-            nodes.add(codes.WRONG_SHAPE.at(mapping.span, "a node needs a kind or a skill", help=_KINDS_HELP))
+            nodes.add(codes.WRONG_SHAPE.at(mapping.span, "there is no step here", help=_KINDS_HELP))
         return "", None
     _check_steps(mapping, steps, nodes, skills)
     return (steps[0], None) if _is_word(mapping.entries[steps[0]].key, nodes) else ("", None)
@@ -107,7 +107,7 @@ def _check_steps(mapping: Mapping, steps: list[str], nodes: Nodes, skills: Colle
 def _two_steps(mapping: Mapping, first: str, second: str, nodes: Nodes, *, is_known: bool) -> None:
     span = mapping.entries[second].key.span
     message, help_text = (
-        f"'{second}' is a second step in the mapping of '{first}'",
+        f"'{second}' is a second step beside '{first}', without a dash of its own",
         f"write '- {second}: ...' as its own step",
     )
     fix = _dash_before(mapping, second) if is_known else None
@@ -151,7 +151,7 @@ def _is_word(key: Scalar, nodes: Nodes) -> bool:
         message = "with settings below it, a step needs a colon"
         nodes.add(codes.WRONG_SHAPE.at(key.span, message, help=f"write '{words[0]}:'"))
     else:
-        message = f"'{key.text}' is no name of a kind or a skill"
+        message = f"'{key.text}' is no step and no skill"
         nodes.add(codes.WRONG_SHAPE.at(key.span, message, help=f"write '{words[0]}: {' '.join(words[1:])}'"))
     return False
 
@@ -168,4 +168,4 @@ def _owners(option: str) -> str:
     return " and ".join(f"'{name}'" for name, kind in sorted(kinds().items()) if option in kind.options)
 
 
-_KINDS_HELP = "such as 'sequence', 'wait', or the name of a skill"
+_KINDS_HELP = "a step is a word such as 'sequence' or 'wait', or the name of a skill"

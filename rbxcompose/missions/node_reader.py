@@ -9,13 +9,21 @@ from rbxcompose.expressions.text import Template, parse_template
 from rbxcompose.expressions.tree import Expression, ExpressionError
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span, replacement
+from rbxcompose.manifest.brackets import bracketed, without_brackets
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
+from rbxcompose.missions.adrift import among_branches
+from rbxcompose.missions.assigning import EXAMPLE, read_line
+from rbxcompose.missions.dashes import needs_dashes, steps_of
+from rbxcompose.missions.hook_slips import is_step, step_in_hook, without_dashes
 from rbxcompose.missions.messages import Message, Shape, Written
+from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.moments import DEEDS, LEVELS, OPTIONS, Deeds, Moments
+from rbxcompose.missions.naming import NAME, no_name
 from rbxcompose.missions.program import Argument, Asked, Assignment
-from rbxcompose.missions.spans import expression_of
-from rbxcompose.missions.value_reader import NAME, NAME_HELP, Nodes, ValueReader, read_expression
+from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.spans import expression_of, inner_span
+from rbxcompose.missions.value_reader import Nodes, ValueReader, read_expression
 
 
 class NodeReader(ValueReader):
@@ -62,6 +70,7 @@ class NodeReader(ValueReader):
         if not isinstance(value, Mapping):
             self.steps()
             return ()
+        value = self._without_settings(value)
         if not value.entries:
             self.add(codes.MISSING.at(value.span, f"'{self.key}' needs at least one branch"))
         for name, entry in value.entries.items():
@@ -69,9 +78,21 @@ class NodeReader(ValueReader):
             self.child_node(entry.value, name)
         return tuple(value.entries)
 
+    def _without_settings(self, branches: Mapping) -> Mapping:
+        """Return the branches without what belongs beside them; that is told, and read there."""
+        own = self.mapping.entries[self.key]
+        options = kinds()[self.key].options if self.key in kinds() else ()
+        found, findings = among_branches(branches, own.key, options, modifier_keys())
+        if not found:
+            return branches
+        for finding in findings:
+            self.add(finding)
+        self.mapping = replace(self.mapping, entries={**found, **self.mapping.entries})
+        return replace(branches, entries={name: one for name, one in branches.entries.items() if name not in found})
+
     def cases(self, key: str) -> tuple[Asked, ...]:
         """Read a map from values to nodes, and return the values in the order of the children."""
-        value = self.map_of(key, "a map from values to what is done")
+        value = self.map_of(key, "values below it, each with what is done then")
         if value is None:
             return ()
         read = []
@@ -102,7 +123,7 @@ class NodeReader(ValueReader):
         return Moments({key: self._deeds(key) for key in keys if self.has(key)})
 
     def _deeds(self, key: str) -> Deeds:
-        value = self.map_of(key, "something small to do: 'set', 'log' or 'publish' below it")
+        value = self._small(key)
         if value is None:
             return Deeds()
         inner = self.inside(value, (*DEEDS, *OPTIONS), f"'{key}'")
@@ -117,6 +138,28 @@ class NodeReader(ValueReader):
         )
         self.asked.extend(inner.asked)
         return deeds
+
+    def _small(self, key: str) -> Mapping | None:
+        """Return what stands below a hook, without what cannot: lists are taken apart, steps are told."""
+        value, finding = self.mapping.get(key), None
+        if isinstance(value, Sequence):
+            value, finding = without_dashes(key, value)
+        if (
+            finding
+            and isinstance(value, Mapping)
+            and not all(is_step(name, self.nodes.skills) for name in value.entries)
+        ):
+            self.add(finding)
+        word = value.text.partition(" ")[0] if isinstance(value, Scalar) and value.plain else ""
+        if isinstance(value, Scalar) and is_step(word, self.nodes.skills):
+            self.add(step_in_hook(key, replace(value, text=word)))
+            return None
+        if not isinstance(value, Mapping):
+            return self.map_of(key, "something small to do: 'set', 'log' or 'publish' below it, without a dash")
+        steps = [name for name in value.entries if is_step(name, self.nodes.skills)]
+        for name in steps:
+            self.add(step_in_hook(key, value.entries[name].key))
+        return replace(value, entries={name: one for name, one in value.entries.items() if name not in steps})
 
     def _shape(self, node: Node) -> Shape:
         match node:
@@ -155,16 +198,26 @@ class NodeReader(ValueReader):
         elif isinstance(value, Sequence):
             self.nodes.add(codes.MISSING.at(value.span, f"'{self.key}' needs at least one step"))
         else:
-            self.nodes.add(codes.WRONG_SHAPE.at(self.span, f"'{self.key}' needs a list of steps"))
+            self._undashed(value)
+
+    def _undashed(self, value: Node | None) -> None:
+        """Tell that steps have no dashes, and read them all the same."""
+        settings = {*modifier_keys(), "name", *(option for kind in kinds().values() for option in kind.options)}
+        key = Scalar(self.key, self.span)
+        self.add(needs_dashes(key, value, settings, self.nodes.skills))
+        for index, step in enumerate(steps_of(value, settings) if isinstance(value, Mapping) and value.entries else ()):
+            self.child_node(step, str(index))
 
     def item_name(self) -> None:
         """Read the name that the nodes below give to a loop's item."""
         scalar = self.scalar(self.key, "a name for the item")
         if scalar and not NAME.fullmatch(scalar.text):
             bare = scalar.text[1:] if scalar.text.startswith("$") and NAME.fullmatch(scalar.text[1:]) else ""
-            help_text = f"write '{bare}' without '$'" if bare else NAME_HELP
-            fix = replacement(scalar.span, scalar.text, bare) if bare else None
-            self.nodes.add(codes.WRONG_SHAPE.at(scalar.span, f"'{scalar.text}' is no name", help=help_text, fix=fix))
+            finding = no_name(scalar)
+            if bare:
+                fix = replacement(scalar.span, scalar.text, bare)
+                finding = replace(finding, help=f"write '{bare}' without '$'", fix=fix)
+            self.add(finding)
             self.item = scalar.text[1:] if NAME.fullmatch(scalar.text[1:]) else ""
         elif scalar:
             self.item = scalar.text
@@ -172,6 +225,11 @@ class NodeReader(ValueReader):
     def items(self, key: str) -> Expression | tuple[Expression, ...]:
         """Read a list that is written out, or an expression that gives one (of a map: its keys)."""
         value = self.mapping.get(key)
+        if isinstance(value, Scalar) and len(found := without_brackets(value)) > 1:
+            help_text, fix = bracketed(value)
+            self.add(codes.WRONG_SHAPE.at(value.span, f"'{key}' needs a list", help=help_text, fix=fix))
+            pieces = [Scalar(text, inner_span(value, start, start + len(text))) for text, start in found]
+            value = Sequence(tuple(pieces), value.span)
         if not isinstance(value, Sequence):
             expression = self.expression(key, UNKNOWN, "a list")
             self.nodes.loop(self.item, expression)
@@ -187,9 +245,15 @@ class NodeReader(ValueReader):
     def assignments(self, key: str) -> tuple[Assignment, ...]:
         """Read a map from names of data to expressions."""
         value = self.mapping.get(key)
+        if isinstance(value, Scalar):
+            value, finding = read_line(Scalar(key, self.key_span(key)), value)
+            self.add(finding)
+            if value is None:
+                return ()
         if not isinstance(value, Mapping) or not value.entries:
-            message = f"'{key}' needs a map of names and values"
-            self.nodes.add(codes.WRONG_SHAPE.at(self.key_span(key), message, help="write the names below it, indented"))
+            message = f"'{key}' needs names and their values"
+            help_text = f"write {EXAMPLE} on the line below '{key}:', further right and without a dash"
+            self.nodes.add(codes.WRONG_SHAPE.at(self.key_span(key), message, help=help_text))
             return ()
         inner = NodeReader(value, key, self.number, self.nodes)
         read: list[Assignment] = []

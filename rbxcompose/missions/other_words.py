@@ -27,6 +27,21 @@ SETTINGS: Mapping[str, str] = {
 FLAGS: Mapping[str, str] = {"no": "false", "off": "false", "on": "true", "yes": "true"}
 ENDLESS: Mapping[str, str] = dict.fromkeys(("always", "endless", "endlessly", "infinite", "unlimited"), "forever")
 
+_NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+NUMBERS: Mapping[str, str] = {
+    **{word: str(number) for number, word in enumerate(_NUMBERS, start=1)},
+    "once": "1",
+    "twice": "2",
+}
+
+
+def in_digits(scalar: Scalar, key: str, digits: str) -> Finding:
+    """Return the finding about a number that is written as a word."""
+    fix = replacement(scalar.span, scalar.text, digits)
+    return codes.WRONG_TYPE.at(
+        scalar.span, f"'{key}' takes a number in digits", help=f"write a number such as {digits}", fix=fix
+    )
+
 
 def not_our_word(scalar: Scalar, message: str, ours: Mapping[str, str]) -> Finding:
     """Return the finding about a word that cannot stand here, cured if it is one of those that have ours."""

@@ -10,16 +10,19 @@ from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Finding, Related, Report, Span
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes, program
+from rbxcompose.missions.adrift import settled
 from rbxcompose.missions.header import read_data, read_inputs, read_rate
 from rbxcompose.missions.held import ITEM, Pattern, matching, pattern_of, with_held
 from rbxcompose.missions.keys import find_key
 from rbxcompose.missions.machines import STATE
 from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
+from rbxcompose.missions.naming import NAME, NAME_HELP, no_name
 from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.program import AFTERWARDS, RESTART, Asked, Interrupt, Program, Target
 from rbxcompose.missions.registry import Kind, all_kinds, kinds
-from rbxcompose.missions.state_reading import STATE_KEYS, as_state
-from rbxcompose.missions.value_reader import NAME, NAME_HELP
+from rbxcompose.missions.restart_slips import restart_in_line
+from rbxcompose.missions.spans import inner_span
+from rbxcompose.missions.state_reading import MACHINE_KEYS, STATE_KEYS, as_state
 
 BODIES = ("do", "machine")
 KEYS = ("rbx", "kind", "name", "about", "inputs", "data", "outputs", "interrupts", "rate", *BODIES)
@@ -34,6 +37,7 @@ def read_program(root: Mapping, report: Report, skills: Collection[str] = ()) ->
     What could not be read is left out of the program, so that the rest can be checked; it may run only if the report
     has no errors.
     """
+    whole, root = root, settled(root, KEYS, MACHINE_KEYS, report)
     for name, entry in root.entries.items():
         if name not in KEYS:
             message = f"unknown key '{name}' in a mission"
@@ -59,7 +63,7 @@ def read_program(root: Mapping, report: Report, skills: Collection[str] = ()) ->
         interrupts,
         read_rate(root.get("rate"), report),
         reader.outputs(root.get("outputs")),
-        root=root,
+        root=whole,
     )
 
 
@@ -118,7 +122,7 @@ class _Reader:
         self.nodes.append(None)
         mapping = _as_mapping(node)
         if len(self.paths) == LEVELS:
-            self.add(codes.TOO_DEEP.at(node.span, f"more than {LEVELS} levels of nodes"))
+            self.add(codes.TOO_DEEP.at(node.span, f"more than {LEVELS} levels of steps"))
             mapping = Mapping(span=node.span)
             key, kind = "", None
         else:
@@ -172,7 +176,7 @@ class _Reader:
         if node is None:
             return {}
         if not isinstance(node, Mapping):
-            self.add(codes.WRONG_SHAPE.at(node.span, "'outputs' needs a map from names to values"))
+            self.add(codes.WRONG_SHAPE.at(node.span, "'outputs' needs names with their values below it"))
             return {}
         reader = NodeReader(node, "outputs", len(self.nodes), self)
         read: dict[str, Asked] = {}
@@ -222,14 +226,21 @@ class _Reader:
         value = mapping.get("name")
         if value is None:
             return ""
-        if not isinstance(value, Scalar) or not NAME.fullmatch(value.text):
+        if not isinstance(value, Scalar):
             self.add(codes.WRONG_SHAPE.at(value.span, "this is no name", help=NAME_HELP))
             return ""
+        if not NAME.fullmatch(value.text):
+            self.add(no_name(value))
+            return ""
         if value.text in kinds():
-            self.add(codes.NAME_CLASH.at(value.span, f"a node cannot be named like the kind '{value.text}'"))
+            self.add(
+                codes.NAME_CLASH.at(
+                    value.span, f"a step cannot be named '{value.text}': that is a word of the language"
+                )
+            )
         elif value.text in self.names:
             related = [Related(self.names[value.text], "the first one")]
-            self.add(codes.NAME_CLASH.at(value.span, f"two nodes are named '{value.text}'", related=related))
+            self.add(codes.NAME_CLASH.at(value.span, f"two steps are named '{value.text}'", related=related))
         self.names.setdefault(value.text, value.span)
         return value.text
 
@@ -238,7 +249,7 @@ class _Reader:
         if node is None:
             return ()
         if not isinstance(node, Mapping):
-            self.add(codes.WRONG_SHAPE.at(node.span, "'interrupts' needs a map from names to interrupts"))
+            self.add(codes.WRONG_SHAPE.at(node.span, "'interrupts' needs names below it, each with 'when' and 'do'"))
             return ()
         read = [self.interrupt(name, entry) for name, entry in node.entries.items()]
         # A restart may name what stands in the reaction of a later interrupt, which it may cut: all are read by now.
@@ -248,7 +259,7 @@ class _Reader:
         """Read `when`, `do` and `afterwards`."""
         value = entry.value
         if not NAME.fullmatch(name):
-            self.add(codes.WRONG_SHAPE.at(entry.key.span, f"'{name}' is no name", help=NAME_HELP))
+            self.add(no_name(entry.key))
         if not isinstance(value, Mapping):
             self.add(codes.WRONG_SHAPE.at(value.span, f"the interrupt '{name}' needs 'when' and 'do'"))
             return None
@@ -272,10 +283,14 @@ class _Reader:
     def afterwards(self, reader: NodeReader) -> tuple[str, Scalar | None]:
         """Read what comes after a reaction: a word, or `restart` with the name of what begins anew."""
         value = reader.mapping.get("afterwards")
+        if isinstance(value, Scalar) and (finding := restart_in_line(reader.mapping.entries["afterwards"].key, value)):
+            self.add(finding)
+            name = value.text.split()[-1]
+            return RESTART, Scalar(name, inner_span(value, len(value.text) - len(name), len(value.text)))
         if not isinstance(value, Mapping):
             return reader.choice("afterwards", AFTERWARDS), None
         inner = reader.inside(value, (RESTART,), "'afterwards'")
-        return RESTART, inner.scalar(RESTART, "the name of a node, a state or a loop's item")
+        return RESTART, inner.scalar(RESTART, "the name of a step, a state or a loop's item")
 
     def targets(self, named: Scalar | None) -> tuple[Target, ...]:
         """Return all nodes, states and loops over an item with a name; nothing if none is named."""

@@ -11,6 +11,7 @@ from rbxcompose.missions import codes
 from rbxcompose.missions.history import WithHistory
 from rbxcompose.missions.machines import ENDS, MachineOptions, Next, StateOptions
 from rbxcompose.missions.node_reader import NodeReader
+from rbxcompose.missions.state_names import with_names
 from rbxcompose.missions.statuses import FAILURE, NAMES, SUCCESS
 from rbxcompose.missions.value_reader import WORDS
 
@@ -22,20 +23,26 @@ RESULTS = (NAMES[SUCCESS], NAMES[FAILURE])
 
 def read_machine(reader: NodeReader) -> MachineOptions:
     """Read the map below `machine`: the first state, the states, ends and history."""
-    value = reader.map_of(reader.key, "a map with 'start' and 'states'")
+    value = reader.map_of(reader.key, "'start' and 'states' below it")
     if value is None:
         return MachineOptions()
+    value, misnamed = with_names(value)
+    for finding in misnamed:
+        reader.add(finding)
     inner = reader.inside(value, MACHINE_KEYS, "a machine")
     states = value.get("states")
     names: tuple[str, ...] = ()
     if isinstance(states, Tree) and states.entries:
         names = tuple(states.entries)
         for name, entry in states.entries.items():
-            reader.check_name(entry.key)
             reader.state(name, entry)
     else:
         span = inner.key_span("states") if "states" in value else reader.span
-        reader.add(codes.MISSING.at(span, "a machine needs 'states': a map from names to states"))
+        reader.add(
+            codes.MISSING.at(
+                span, "a machine needs 'states': the names of its states below it, each with 'do' and 'next'"
+            )
+        )
     ends = _ends(inner, names)
     start = inner.scalar("start", "the name of a state") if "start" in value else None
     if "start" not in value:
@@ -50,7 +57,7 @@ def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:
     if value is None:
         return ENDS
     if not isinstance(value, Tree):
-        inner.add(codes.WRONG_SHAPE.at(value.span, "'ends' needs a map such as 'lost: failure'"))
+        inner.add(codes.WRONG_SHAPE.at(value.span, "'ends' needs names below it, such as 'lost: failure'"))
         return ENDS
     read = dict(ENDS)
     for name, entry in value.entries.items():
@@ -92,7 +99,10 @@ def _next(reader: NodeReader) -> Next | None:
         return Next({"": value.text}, {"": value.span})
     if not isinstance(value, Tree) or not value.entries:
         reader.add(
-            codes.WRONG_SHAPE.at(reader.key_span("next"), "'next' needs a state, or a map from outcomes to states")
+            codes.WRONG_SHAPE.at(
+                reader.key_span("next"),
+                "'next' needs a state, or below it outcomes with states, such as 'success: finished'",
+            )
         )
         return Next()
     to: dict[str, str] = {}

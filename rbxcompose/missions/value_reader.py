@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Collection
+from dataclasses import replace
 from typing import Protocol
 
 from rbxcompose.expressions.text import Slot, Template, parse_template
@@ -12,14 +13,14 @@ from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
-from rbxcompose.missions.other_words import ENDLESS, FLAGS, not_our_word
+from rbxcompose.missions.naming import NAME, no_name
+from rbxcompose.missions.other_words import ENDLESS, FLAGS, NUMBERS, in_digits, not_our_word
 from rbxcompose.missions.program import Asked
 from rbxcompose.missions.spans import expression_of, inner_span
 from rbxcompose.units import NUMBER, TIME
 
 FOREVER = "forever"
 WORDS = "it can be"
-NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
 
 # Stands for an expression that could not be read, so that the rest is read all the same.
 UNREADABLE = Expression("", Number(0, 0, 0.0, NUMBER))
@@ -27,6 +28,9 @@ UNREADABLE = Expression("", Number(0, 0, 0.0, NUMBER))
 
 class Nodes(Protocol):
     """Who reads the nodes below, and keeps the findings."""
+
+    skills: Collection[str]
+    """Those of the robot, as far as they are known."""
 
     def child(self, node: Node, step: str, parent: int) -> int:
         """Read a node below `parent` and return its number; `step` is the next part of its path."""
@@ -90,7 +94,7 @@ class ValueReader:
         if value is None or isinstance(value, Scalar):
             self.nodes.add(codes.MISSING.at(self.key_span(key), f"'{key}' needs {what}"))
             return None
-        found = "a list" if isinstance(value, Sequence) else "a map"
+        found = "a list" if isinstance(value, Sequence) else "names with values"
         help_text = _FLOW_HELP if isinstance(value, Mapping) and what == "a condition" else ""
         self.nodes.add(codes.WRONG_SHAPE.at(value.span, f"'{key}' needs {what}, not {found}", help=help_text))
         return None
@@ -121,6 +125,9 @@ class ValueReader:
         if isinstance(value, Scalar) and ENDLESS.get(value.text) in words:
             self.add(not_our_word(value, f"'{key}' cannot be '{value.text}'", ENDLESS))
             return FOREVER
+        if isinstance(value, Scalar) and value.plain and (digits := NUMBERS.get(value.text.lower())):
+            self.add(in_digits(value, key, digits))
+            return self._asked(replace(value, text=digits), COUNT)
         return self.expression(key, COUNT, f"a number or {' or '.join(repr(word) for word in words)}")
 
     def flag(self, key: str) -> bool:
@@ -169,7 +176,7 @@ class ValueReader:
     def check_name(self, scalar: Scalar) -> bool:
         """Tell whether a word may be a name; a finding says it if not."""
         if not NAME.fullmatch(scalar.text):
-            self.add(codes.WRONG_SHAPE.at(scalar.span, f"'{scalar.text}' is no name", help=NAME_HELP))
+            self.add(no_name(scalar))
             return False
         return True
 
@@ -189,7 +196,6 @@ class ValueReader:
         return scalar.text if scalar else ""
 
 
-NAME_HELP = "names begin with a small letter; small letters, digits and underscores follow"
 _FLOW_HELP = "inside '{}', commas and colons divide: put quotes round the condition, or write it in block style"
 
 

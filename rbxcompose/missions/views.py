@@ -111,7 +111,8 @@ def findings_of(
             yield codes.UNKNOWN_NAME.at(span, problem.message, help=problem.help, fix=fix)
         elif unknown_word and wanted.kind in _MEASURED and isinstance(expression.tree, Word):
             message = f"this must be {wanted.phrase}; nothing is named '{unknown_word}'"
-            yield kind.at(span, message, fix=fix)
+            help_text = "write a number such as 2" if wanted.kind is TypeKind.COUNT else problem.help
+            yield kind.at(span, message, help=help_text, fix=fix)
         elif unknown_word and wanted == TEXT and unknown_word not in scope.removed:
             yield _no_text(unknown_word, span, scope, kind)
         elif unknown_word in scope.removed:

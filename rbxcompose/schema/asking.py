@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from rbxcompose.expressions.text import Template
 from rbxcompose.expressions.tree import Expression
@@ -38,6 +38,8 @@ MAPS: dict[str, Schema] = {  # by the key that takes the map
 
 class _Nobody:
     """Takes what a reader would hand on: there is nothing to be read."""
+
+    skills: Collection[str] = ()
 
     def child(self, node: Node, step: str, parent: int) -> int:
         """Give every node the same number."""

@@ -114,7 +114,9 @@ def agrees(expected: Value, happened: Value) -> bool:
     Of maps only the entries that were written count; one without entries is expected to be empty.
     """
     if isinstance(expected, Mapping) and isinstance(happened, Mapping):
-        return (bool(expected) or not happened) and all(name in happened and agrees(entry, happened[name]) for name, entry in expected.items())
+        if not expected:
+            return not happened
+        return all(name in happened and agrees(entry, happened[name]) for name, entry in expected.items())
     if isinstance(expected, list | tuple) and isinstance(happened, list | tuple):
         return len(expected) == len(happened) and all(map(agrees, expected, happened))
     if isinstance(expected, int | float) and isinstance(happened, int | float) and is_number(expected):

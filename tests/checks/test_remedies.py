@@ -68,3 +68,35 @@ def test_a_place_that_nobody_removed_is_misspelt_as_ever(tmp_path: Path) -> None
     others = {"tour.yaml": MISSION.replace("go_to: corner_3", "go_to: corner_33")}
     [finding] = check_text(text, tmp_path, others=others).compilation.report
     assert finding.help == "did you mean 'corner_3'?"
+
+
+ELSEWHERE = "rbx: 1\nkind: {}\nname: delivery\ndo: recharge\n"
+
+
+def test_a_start_mission_that_lies_in_the_project_is_to_be_named(tmp_path: Path) -> None:
+    text = HEAD + "start: delivery\n"
+    others = {"missions/delivery.yaml": ELSEWHERE.format("Mission"), "delivery.yaml": ELSEWHERE.format("Test")}
+    found = list(check_text(text, tmp_path, others=others).compilation.report)
+    assert [one.help for one in found if one.code == "RBX3009"] == [
+        "add 'delivery: missions/delivery.yaml' below 'missions:'"
+    ]
+
+
+def test_the_path_to_it_is_that_from_the_robot(tmp_path: Path) -> None:
+    folder = tmp_path / "robots" / "cart"
+    folder.mkdir(parents=True)
+    (tmp_path / "missions").mkdir()
+    (tmp_path / "missions" / "delivery.yaml").write_text(ELSEWHERE.format("Mission"), encoding="utf-8")
+    found = list(check_text(HEAD + "start: delivery\n", folder).compilation.report)
+    assert "add 'delivery: ../../missions/delivery.yaml' below 'missions:'" in [one.help for one in found]
+
+
+def test_a_start_mission_of_the_command_line_is_to_be_named_in_the_robot(tmp_path: Path) -> None:
+    others = {"missions/delivery.yaml": ELSEWHERE.format("Mission")}
+    found = list(check_text(HEAD, tmp_path, others=others, sets=["start=delivery"]).compilation.report)
+    assert "add 'delivery: missions/delivery.yaml' below 'missions:'" in [one.help for one in found]
+
+
+def test_a_start_mission_that_lies_nowhere_is_told_as_before(tmp_path: Path) -> None:
+    found = list(check_text(HEAD + "start: delivery\n", tmp_path).compilation.report)
+    assert [one.help for one in found if one.code == "RBX3009"] == [""]

@@ -32,7 +32,7 @@ CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"
 MAY_IMPORT: dict[str, set[str]] = {
     **dict.fromkeys(BASE, BASE),
     **{core: BASE | {core} for core in CORES},
-    "missions": BASE | {"missions", "manifest.tree", "manifest.scalars", "diagnostics.levels"},
+    "missions": BASE | {"missions", "manifest.brackets", "manifest.scalars", "manifest.tree", "diagnostics.levels"},
     "sim": BASE | {"sim", "diagnostics.levels"},
     "sdk": BASE | {"sdk", "diagnostics.levels"},
     "skills": BASE | {"sdk"},

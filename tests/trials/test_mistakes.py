@@ -96,6 +96,12 @@ def test_a_wrong_shape_is_told(trying: Trying, text: str, words: str) -> None:
     assert words in found
 
 
+def test_values_without_the_brackets_of_a_list_are_told_with_them(trying: Trying) -> None:
+    trial, found = trying.read("mocks:\n  go_to:\n    fails_for: dock\nexpect:\n  for: 1 s\n")
+    assert trial is None
+    assert "a list has brackets: write '[dock]'" in found
+
+
 def test_a_mock_that_nothing_uses_is_a_warning(trying: Trying) -> None:
     trial, found = trying.read("mocks:\n  go_to:\n  recharge:\nexpect:\n  for: 1 s\n", "states")
     assert trial is not None

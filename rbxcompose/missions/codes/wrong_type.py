@@ -24,4 +24,5 @@ do:
   wait_for: $battery < 30 %
 ```
 """,
+    is_fixable=True,
 )

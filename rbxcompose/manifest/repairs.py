@@ -1,0 +1,50 @@
+"""What a strict field takes and YAML cannot write, made of what was read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pydantic_core import ErrorDetails
+
+from rbxcompose.manifest.tree import Node, Path, Scalar, at
+from rbxcompose.units import Quantity, format_quantity
+
+
+def repaired(data: Any, error: ErrorDetails, node: Node) -> Any:
+    """Return `data` with what a strict field takes and YAML cannot write: text for a number, a tuple for a list."""
+    convert = _REPAIRS.get(error["type"])
+    if convert is None:
+        return data
+    try:
+        return changed(data, error["loc"], lambda value: convert(value, at(node, error["loc"])))
+    except (KeyError, IndexError, TypeError):  # a place that is not in the data, such as a member of a union
+        return data
+
+
+def changed(data: Any, path: Path, convert: Callable[[object], object]) -> Any:
+    """Return `data` with the value at `path` converted; the same object if the value stays the same."""
+    if not path:
+        return convert(data)
+    key = path[0]
+    inner = changed(data[key], path[1:], convert)
+    if inner is data[key]:
+        return data
+    if isinstance(data, dict):
+        return {**data, key: inner}
+    return type(data)(inner if index == key else item for index, item in enumerate(data))
+
+
+def _as_text(value: object, node: Node | None) -> object:
+    if isinstance(value, Quantity):
+        return format_quantity(value.value, value.dimension)
+    if isinstance(node, Scalar) and node.filled is None and value is not None:
+        return node.text
+    return str(value) if isinstance(value, int | float) else value
+
+
+def _as_tuple(value: object, _node: Node | None) -> object:
+    return tuple(value) if isinstance(value, list) else value
+
+
+_REPAIRS: dict[str, Callable[[object, Node | None], object]] = {"string_type": _as_text, "tuple_type": _as_tuple}

@@ -1,0 +1,62 @@
+"""Steps below a word that takes a list, written without dashes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+from rbxcompose.findings import Edit, Finding, Fix
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.missions import codes
+from rbxcompose.missions.registry import kinds
+
+_DASH = "- "
+
+
+def needs_dashes(key: Scalar, value: Node | None, settings: Collection[str], skills: Collection[str]) -> Finding:
+    """Return the finding about a `sequence` or another list of steps that is none."""
+    message = f"'{key.text}' needs a list: each of its steps has a dash"
+    if not isinstance(value, Mapping) or not value.entries:
+        word = value.text.split()[0] if isinstance(value, Scalar) and value.text.strip() else "go_to: dock"
+        help_text = f"write each step on a line of its own below '{key.text}:', such as '- {word}'"
+        return codes.WRONG_SHAPE.at(key.span, message, help=help_text)
+    first = next(iter(value.entries.values()))
+    shown = f"- {first.key.text}" + (f": {first.value.text}" if isinstance(first.value, Scalar) else ":")
+    help_text = f"put a dash before each step: '{shown.removesuffix(': ')}'"
+    fix = _dashed(value, settings, skills)
+    return codes.WRONG_SHAPE.at(first.key.span, message, label="put a dash here", help=help_text, fix=fix)
+
+
+def steps_of(value: Mapping, settings: Collection[str]) -> Iterator[Mapping]:
+    """Yield the steps that the keys of a map were meant to be; a setting belongs to the step above it."""
+    entries: dict[str, Entry] = {}
+    for name, entry in value.entries.items():
+        if entries and name not in settings:
+            yield Mapping(entries, next(iter(entries.values())).key.span)
+            entries = {}
+        entries[name] = entry
+    yield Mapping(entries, next(iter(entries.values())).key.span)
+
+
+def _dashed(value: Mapping, settings: Collection[str], skills: Collection[str]) -> Fix | None:
+    """Return the fix that puts a dash before each step, if each is one known word with a value on its line."""
+    entries = list(value.entries.items())
+    lines = [entry.key.span.line for _, entry in entries]
+    is_plain = all(
+        (name in skills or name in kinds())
+        and name not in settings
+        and entry.key.plain
+        and isinstance(entry.value, Scalar)
+        and entry.value.span.end_line == entry.key.span.line
+        for name, entry in entries
+    )
+    # A key that is written twice is not in the map: its line, here the last one, would stay without a dash.
+    behind = value.span.end_line - lines[-1], value.span.end_column
+    is_whole = behind[0] <= 0 or (behind[0] == 1 and behind[1] < entries[0][1].key.span.column)
+    if not is_plain or not is_whole or lines != list(range(lines[0], lines[0] + len(lines))):
+        return None
+    edits = []
+    for name, entry in entries:
+        span, indent = entry.key.span, " " * (entry.key.span.column - 1)
+        before = span._replace(column=1, end_line=span.line, end_column=span.column)
+        edits += [Edit(before, indent, indent), Edit(span, name, f"{_DASH}{name}")]
+    return Fix(tuple(edits), True, f"'{entries[0][0]}' -> '- {entries[0][0]}'")

@@ -1,0 +1,26 @@
+"""Names in missions: what may be one, and what to write in the place of a text that may not."""
+
+from __future__ import annotations
+
+import re
+
+from rbxcompose.findings import Finding, Fix
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions import codes
+
+NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
+NAME_HELP = "names begin with a small letter; small letters, digits and underscores follow"
+_BETWEEN = re.compile(r"[\s-]+")
+
+
+def cure(text: str) -> str:
+    """Return the name that a text was meant to be: `go_home` for `Go home`; nothing if that is not clear."""
+    meant = _BETWEEN.sub("_", text.strip()).lower()
+    return meant if NAME.fullmatch(meant) else ""
+
+
+def no_name(scalar: Scalar, fix: Fix | None = None) -> Finding:
+    """Return the finding about a text that stands where a name should."""
+    meant = cure(scalar.text)
+    help_text = f"write '{meant}': names have small letters, digits and underscores" if meant else NAME_HELP
+    return codes.WRONG_SHAPE.at(scalar.span, f"'{scalar.text}' is no name", help=help_text, fix=fix)
