@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from rbxcompose.findings import Finding, replacement
@@ -35,11 +36,21 @@ NUMBERS: Mapping[str, str] = {
 }
 
 
+_TIMES = re.compile(r"(?P<digits>\d+)\s*(times?|x|rounds?|attempts?|tries)")
+
+
+def digits_of(scalar: Scalar) -> str:
+    """Return the digits that were meant by a number in words, or by one with a word behind it; else nothing."""
+    text = scalar.text.lower() if scalar.plain else ""
+    found = _TIMES.fullmatch(text)
+    return found["digits"] if found else NUMBERS.get(text, "")
+
+
 def in_digits(scalar: Scalar, key: str, digits: str) -> Finding:
-    """Return the finding about a number that is written as a word."""
+    """Return the finding about a number that is no digits alone."""
     fix = replacement(scalar.span, scalar.text, digits)
     return codes.WRONG_TYPE.at(
-        scalar.span, f"'{key}' takes a number in digits", help=f"write a number such as {digits}", fix=fix
+        scalar.span, f"'{key}' takes a number in digits and nothing else", help=f"write '{digits}'", fix=fix
     )
 
 

@@ -18,6 +18,7 @@ from rbxcompose.missions.value_reader import WORDS
 MACHINE_KEYS = ("start", "states", "ends", "history")
 BODIES = ("do", "machine")
 STATE_KEYS = (*BODIES, "on_enter", "on_exit", "next")
+ASKING = ("if", "then", "else", "when", "check", "choose", "cases")  # that ask, where `next` only leads
 RESULTS = (NAMES[SUCCESS], NAMES[FAILURE])
 
 
@@ -105,6 +106,14 @@ def _next(reader: NodeReader) -> Next | None:
             )
         )
         return Next()
+    if asking := next((entry.key for word, entry in value.entries.items() if word in ASKING), None):
+        help_text = (
+            "let a 'check' be the last step of this state, and write below 'next' where 'success' and 'failure' lead"
+        )
+        reader.add(
+            codes.WRONG_SHAPE.at(asking.span, f"'next' cannot ask: there is no '{asking.text}' in it", help=help_text)
+        )
+        return Next(dict(zip(RESULTS, ENDS, strict=True)))  # so that nothing else is said of where it leads
     to: dict[str, str] = {}
     spans: dict[str, Span] = {}
     for outcome, entry in value.entries.items():

@@ -14,7 +14,7 @@ from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
 from rbxcompose.missions.naming import NAME, no_name
-from rbxcompose.missions.other_words import ENDLESS, FLAGS, NUMBERS, in_digits, not_our_word
+from rbxcompose.missions.other_words import ENDLESS, FLAGS, digits_of, in_digits, not_our_word
 from rbxcompose.missions.program import Asked
 from rbxcompose.missions.spans import expression_of, inner_span
 from rbxcompose.units import NUMBER, TIME
@@ -125,7 +125,7 @@ class ValueReader:
         if isinstance(value, Scalar) and ENDLESS.get(value.text) in words:
             self.add(not_our_word(value, f"'{key}' cannot be '{value.text}'", ENDLESS))
             return FOREVER
-        if isinstance(value, Scalar) and value.plain and (digits := NUMBERS.get(value.text.lower())):
+        if isinstance(value, Scalar) and (digits := digits_of(value)):
             self.add(in_digits(value, key, digits))
             return self._asked(replace(value, text=digits), COUNT)
         return self.expression(key, COUNT, f"a number or {' or '.join(repr(word) for word in words)}")

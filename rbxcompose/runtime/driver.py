@@ -13,6 +13,7 @@ from rbxcompose.runtime.inbox import Inbox
 from rbxcompose.scheduler import Scheduler
 
 BEAT = 0.25  # [s] of real time between signs of life
+EARLY = 0.02  # [s] by which one may come too early: a process that is awake need not be woken again for it
 LOOK = 0.1  # [s] of real time between looks whether outside time still goes
 SLICE = 0.05  # [s] of real time for catching up with outside time, before messages are heard again
 
@@ -74,7 +75,7 @@ class Driver:
 
     def _listen(self, pause: float) -> None:
         until_beat = self._next_beat - time.monotonic()
-        if until_beat <= 0:
+        if until_beat <= EARLY:
             self._driven.beat()
             self._next_beat = time.monotonic() + BEAT
             until_beat = BEAT

@@ -49,6 +49,11 @@ SLIPS = {
     "a key in the column of a dash": "do:\n  - for: room\n  in: [dock, kitchen]\n  do:\n    go_to: $room\n",
     "a state of two words": HOME.format("home"),
     "a number in words": "do:\n  go_to: dock\n  attempts: two\n",
+    "a number with a word behind it": "do:\n  repeat: 3 times\n  do:\n    go_to: dock\n",
+    "a question in next": (
+        "machine:\n  start: rest\n  states:\n    rest:\n      do:\n        wait: 1 s\n      next:\n"
+        "        if: $battery > 50 %\n        then: rest\n        else: finished\n"
+    ),
     "a step below a hook": HOOK.format("on_failure", "say: I cannot get there"),
     "a step in the line of a hook": HOOK.format("on_start", "recharge"),
 }

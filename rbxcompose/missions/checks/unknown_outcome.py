@@ -47,8 +47,9 @@ def unknown_outcome(mission: Examined) -> Iterator[Finding]:
             continue
         words, handled = mission.ending.of(node.number).words, leads_to.to
         counted = {counts_as for word, counts_as in words.items() if word not in handled}
-        for outcome in handled:
+        for outcome in leads_to.keys:
             if outcome not in words and outcome not in counted:
                 message = f"the state '{node.name}' never ends with '{outcome}'"
-                span = leads_to.keys.get(outcome, node.span)
-                yield unknown_outcome.misspelt(span, message, outcome, words, "its outcomes", taken=handled)
+                yield unknown_outcome.misspelt(
+                    leads_to.keys[outcome], message, outcome, words, "its outcomes", taken=handled
+                )
