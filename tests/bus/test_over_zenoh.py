@@ -177,7 +177,7 @@ def test_a_flood_of_commands_is_capped_before_anything_is_decoded_and_other_topi
     level(Float32(data=0.5))
     network.until(lambda: levels and got)
     lasted = other.clock.now() - started
-    assert heard.refusals.total >= 5000 * 0.5  # what a congested link has dropped by itself does not count
+    assert heard.refusals.total > heard._inbox._arrived  # most of what a congested link has not dropped by itself
     assert heard._inbox._arrived <= 50.0 * (lasted + BURST)
     assert set(heard.refusals.news()) == {Refusal.TOO_MANY}
 
