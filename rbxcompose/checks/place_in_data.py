@@ -9,7 +9,7 @@ from rbxcompose.expressions.tree import ExpressionError, Variable
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.findings import Finding, Related, Span, suggest
 from rbxcompose.manifest.tree import Mapping, Scalar, Sequence, at
-from rbxcompose.missions.deeds import assignments, shortened
+from rbxcompose.missions.deeds import replaced, written
 from rbxcompose.missions.facts import Constants
 from rbxcompose.missions.kinds.for_ import ForOptions
 from rbxcompose.missions.program import Node, Program
@@ -61,9 +61,8 @@ def place_in_data(robot: Robot) -> Iterator[Finding]:
 
 def _shortened(program: Program) -> Constants:
     """Return the data that only lose items: what is left of them was there from the start."""
-    names = frozenset[str]().union(*(shortened(node) for node in program.nodes))
-    written = {one.name for node in program.nodes for one in assignments(node)} | program.saved
-    return {name: program.data[name].value for name in names & program.data.keys() - written}
+    names = (written(program) & program.data.keys()) - replaced(program)
+    return {name: program.data[name].value for name in names}
 
 
 def _place_of(program: Program, datum: str, text: str) -> Span:

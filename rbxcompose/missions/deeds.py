@@ -33,10 +33,14 @@ def called(node: Node) -> Iterator[Message]:
         yield node.options
 
 
+def replaced(program: Program) -> frozenset[str]:
+    """Return the names of all data that get other values while a mission runs."""
+    return program.saved.union(one.name for node in program.nodes for one in assignments(node))
+
+
 def written(program: Program) -> frozenset[str]:
-    """Return the names of all data that change while a mission runs."""
-    found = {one.name for node in program.nodes for one in assignments(node)} | program.saved
-    return frozenset(found.union(*(shortened(node) for node in program.nodes)))
+    """Return the names of all data that change while a mission runs, also those that only lose items."""
+    return replaced(program).union(*(shortened(node) for node in program.nodes))
 
 
 def shortened(node: Node) -> frozenset[str]:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 
+from rbxcompose.cli.common.answering import misused
 from rbxcompose.cli.common.mission_files import mission_in, robot_of
 from rbxcompose.cli.common.robots import NotDoneError
 from rbxcompose.cli.common.telling import FINDINGS, tell
+from rbxcompose.executive.words import joined
 from rbxcompose.expressions.values import Value
 from rbxcompose.missions.inputs import bind_texts
 from rbxcompose.model.robot import Robot
+from rbxcompose.sdk.bound import Refused
 from rbxcompose.trials.exploring import Limits, text_of
 from rbxcompose.trials.exploring import explore as explore_program
 
@@ -23,18 +26,20 @@ def explore(arguments: argparse.Namespace) -> int:
     if robot is None:
         return FINDINGS
     program = mission_in(robot, arguments.name)
-    inputs = _inputs(robot, arguments.name, arguments.sets)
+    try:
+        inputs = _inputs(robot, arguments.name, joined(arguments.sets))
+    except Refused as refusal:
+        return misused("mission explore", str(refusal))
     explored = explore_program(program, robot.names, inputs, Limits(arguments.states, arguments.depth))
     tell(json.dumps(asdict(explored), indent=1) if arguments.json else text_of(explored))
     return FINDINGS if explored.found else 0
 
 
-def _inputs(robot: Robot, name: str, sets: Sequence[str]) -> Mapping[str, Value]:
-    """Return the inputs of a mission, those of `--set` laid over the robot's; raise NotDoneError if one is missing."""
-    given = {key: value for key, _, value in (one.partition("=") for one in sets)}
+def _inputs(robot: Robot, name: str, given: Mapping[str, str]) -> Mapping[str, Value]:
+    """Return the inputs of a mission, `given` ones laid over the robot's; raise NotDoneError if one is missing."""
     mission = robot.missions[name]
     inputs, findings = bind_texts(mission.program, given, mission.inputs, robot.manifest.places)
     if findings:
-        help_text = findings[0].help if sets else "give inputs by '--set NAME=VALUE'"
+        help_text = findings[0].help if given else "give inputs by '--set NAME=VALUE'"
         raise NotDoneError(replace(findings[0], span=None, help=help_text))
     return inputs

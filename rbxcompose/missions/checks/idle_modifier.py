@@ -8,6 +8,7 @@ from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
 from rbxcompose.missions.facts import place_in_text
+from rbxcompose.missions.in_turn import InTurnOptions
 from rbxcompose.missions.modifiers.limits import Tries
 from rbxcompose.missions.outcomes import FAILS
 from rbxcompose.missions.program import CONTINUE, Node, Program
@@ -69,5 +70,6 @@ def _comes_again(program: Program, node: Node) -> bool:
     if parent is None:
         return node.number != program.main  # a reaction comes as often as its interrupt
     above = program.nodes[parent]
-    is_anew = "attempts" in above.modifiers or getattr(above.options, "reactive", False)
+    is_reactive = isinstance(above.options, InTurnOptions) and above.options.reactive
+    is_anew = "attempts" in above.modifiers or is_reactive
     return above.kind in AGAIN or is_anew or _comes_again(program, above)
