@@ -157,7 +157,7 @@ def rows() -> list[Row]:
     peer = found.pop("in the same thread")
     return [
         Row(
-            name=f"99 of 100 messages of a fast topic, long computing {place}",
+            name=f"99 % of the messages of a fast topic, long computations {place}",
             unit="ms",
             how=how,
             ours=1000 * late.p99,

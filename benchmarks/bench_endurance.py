@@ -52,9 +52,9 @@ def _load(name: str, path: str, folder: str) -> Row:
         time.sleep(WATCHED)
         taken = sum(map(processor_time, processes)) - before
     return Row(
-        name=f"load of the patrol robot, which {name}",
+        name=f"load of the patrol robot while it {name}",
         unit="% of a core",
-        how=f"processor time of all of its processes over {WATCHED:.0f} s; its simulated base tells odometry at 50 Hz",
+        how=f"processor time of all of its processes over {WATCHED:.0f} s; its simulated base publishes odometry at 50 Hz",
         ours=100 * taken / WATCHED,
         most=3 if name == "waits" else None,
     )
@@ -77,7 +77,7 @@ def _growth(path: str) -> Row:
     return Row(
         name="growth of memory while it patrols",
         unit="kB/min",
-        how="all in one process on a stepped clock, minutes 10 to 30; the mission's diary fills up to its bound",
+        how="all in one process on a stepped clock, minutes 10 to 30; the mission's history fills up to its limit",
         ours=(memory_now() - start) / 1e3 / ((PATROLLED - FILLED) / 60.0),
         most=200,
     )

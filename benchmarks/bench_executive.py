@@ -44,7 +44,7 @@ def rows() -> list[Row]:
             most=5,
         ),
         Row(
-            name="load of the patrol mission, which waits for its skills",
+            name="load of the patrol mission while it waits for its skills",
             unit="% of a core",
             how=f"processor time of its process over {WATCHED:.0f} s of a patrol, signs of life and probes included",
             ours=100 * load,

@@ -79,8 +79,8 @@ def rows() -> list[Row]:
     return [
         _ticks("check: true", "steps that do nothing", "py_trees, Success", _py_trees(_successes)),
         _ticks("check: $battery > 5 %", "conditions", "py_trees, CheckBlackboardVariableValue", _py_trees(_conditions)),
-        _row(_run(PARALLEL), "lists at the same time", "py_trees, Parallel", _py_trees(_lists, is_parallel=True)),
-        _row(_run(MACHINES), "machines, one after the other", "", None),
+        _row(_run(PARALLEL), "parallel lists", "py_trees, Parallel", _py_trees(_lists, is_parallel=True)),
+        _row(_run(MACHINES), "machines, one after another", "", None),
         _watched(),
         _reading(),
     ]

@@ -57,7 +57,7 @@ def rows() -> list[Row]:
         Row(
             name="a process that was killed is shown as STALE, with the cause",
             unit="ms",
-            how=f"`kill -9` of `{KILLED}`, until the report of `/diagnostics_agg` that tells it",
+            how=f"`kill -9` of `{KILLED}`, until the report of `/diagnostics_agg` that shows it",
             ours=Samples(tuple(stale)).median * 1e3,
             p99=Samples(tuple(stale)).p99 * 1e3,
             most=1000,

@@ -23,13 +23,13 @@ PAGE = ROOT / "docs" / "benchmarks.md"
 ONE = "--one"
 ABOUT = """# Benchmarks
 
-Written by `make bench`. Times are medians, beside 99 of 100 where there are many; of whole commands by the clock on the
-wall, within a process by that of the processor. A peer is measured in turns with ours, in the same run, so that ratios
-hold where times do not: these differ from machine to machine by a factor of two or three.
+`make bench` writes this page. Times are medians, with the 99th percentile where there are many samples: wall time for whole
+commands, processor time within a process. A peer and ours are measured in turns, in the same run. So ratios hold
+where times do not: times differ between machines by a factor of two or three.
 
 {table}
 
-Measured on {machine}; load of other work when it began: {load:.1f}. The rows of ROS 1 and dora are there where these
+Measured on {machine}; load of other work at the start: {load:.1f}. The rows of ROS 1 and dora appear only where these
 are installed.
 """
 

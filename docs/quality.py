@@ -1,4 +1,4 @@
-"""Writes `docs/quality.md` from what `make soak` has found, which is in `docs/quality.json`."""
+"""Writes `docs/quality.md` from the results of `make soak` in `docs/quality.json`."""
 
 from __future__ import annotations
 
@@ -8,34 +8,33 @@ from pathlib import Path
 DOCS = Path(__file__).parent
 ABOUT = """# Quality
 
-What random and hostile input has found, by the suites below. `make test` tries a part of each (some hundreds of
-examples), `make soak` what stands in the table; a failure becomes a file that is tried in each run from then on.
+What random and hostile input has found, by the suites below. `make test` runs a part of each (some hundreds of
+examples), `make soak` the numbers in the table. A failure becomes a file that every later run tries again.
 
 {table}
 
-- **Mutants of manifests** (`tests/mutate`): one file of the shipped robots, missions and parts is changed, up to three
-  times: bytes, lines, keys, values, parts of the tree. Each mutant must be refused, in every format and with places
-  that lie in its texts, or be a robot; then its plan, written down and read again, must be the same plan.
-- **Random expressions** (`tests/properties`): none may raise what is not declared, reach into an object or the system,
+- **Mutants of manifests** (`tests/mutate`): changes one file of the shipped robots, missions and parts up to three
+  times: bytes, lines, keys, values, branches of the tree. Each mutant must either be refused, in every format and with
+  places that lie in its texts, or be a robot. Its plan, written and read again, must then be the same plan.
+- **Random expressions** (`tests/properties`): none may raise an undeclared exception, reach into an object or the system,
   give a value beyond the limits, or take half a second; each batch has 200 MB.
-- **Hostile manifests** (`tests/hostile`): made to take time or memory, to read what they may not, or to write to the
-  terminal; each must be refused with a place, within 2 s (times 3 for slow machines) and 200 MB.
-- **Storms over simulated robots** (`tests/simulated_faults`): the patrol robot as its real conductor and processes, in
-  virtual time, over a network that delays, loses, doubles and reorders; processes are killed and hang, links part,
-  components raise, commands make no sense, people stop, release and set parameters, all from one seed. What the run has
-  told is judged by `rbxcompose/testing/invariants.py`, which defines what is safe.
-- **Disks that fail** (`tests/io`): each call that a writer makes of the system fails once, in each way that a disk can
-  fail. Nothing that was there is torn or lost, it is told, and the next try works.
+- **Hostile manifests** (`tests/hostile`): written to take time or memory, to read what they may not, or to write to the
+  terminal. Each must be refused with a place, within 2 s (times 3 for slow machines) and 200 MB.
+- **Storms over simulated robots** (`tests/simulated_faults`): runs the patrol robot with its real conductor and processes,
+  in virtual time, over a network that delays, loses, duplicates and reorders. Processes are killed and hang, links
+  break, components raise, commands make no sense, people stop, release and set parameters, all from one seed.
+  `rbxcompose/testing/invariants.py` defines what is safe and judges the record of the run.
+- **Disks that fail** (`tests/io`): each system call of a writer fails once, in each way that a disk can
+  fail. Existing data is never torn or lost, the failure is reported, and the next try works.
 - **Links that fail** (`tests/net`): a proxy before the router delays, slows down, cuts and freezes the links.
-- **Faults of processes** (`tests/faults`): each process of a patrolling robot is killed and stopped (`SIGKILL`,
-  `SIGSTOP`) in turn, in a random order. What can come back does, and the mission succeeds; else all end in
-  order. A process outside of the robot listens: the base moves by live commands alone, and rests in time after the
-  last one.
-  A page of faults with the test of each is `tests/faults/test_table.py`.
-- **Flood of commands** (`tests/faults`): as many messages as a process can send, none of them a command, at the base.
-- **Attacks on listeners** (`tests/exposure`): what a running robot listens on, from the kernel's tables, and what
-  becomes of nonsense, floods and crowds there.
-- **Fuzzing** (`tests/fuzz`, extra `fuzz`): inputs that are led by the code they reach.
+- **Faults of processes** (`tests/faults`): kills and stops each process of a patrolling robot (`SIGKILL`, `SIGSTOP`) in
+  turn, in a random order. What can come back does, and the mission succeeds; otherwise everything ends in order. A
+  process outside the robot listens: the base moves by live commands alone, and rests in time after the last one.
+  `tests/faults/test_table.py` has a table of faults with the test of each.
+- **Flood of commands** (`tests/faults`): sends the base as many messages as a process can, none of them a command.
+- **Attacks on listeners** (`tests/exposure`): finds in the kernel's tables what a running robot listens on, and sends
+  nonsense, floods and crowds there.
+- **Fuzzing** (`tests/fuzz`, extra `fuzz`): coverage-guided inputs.
 """
 
 

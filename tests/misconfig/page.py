@@ -6,17 +6,17 @@ from tests.misconfig.corpus import Figures, Outcome, figures, kinds, outcomes
 
 TOP = """# Misconfigurations
 
-What can be wrong with a robot's files, by kind, and whether `rbxcompose check` tells it. Each kind has a folder of
-small robots in `tests/misconfig/wrong/`, each with its mistake marked in a comment. `tests/misconfig/right/` holds
-robots that are unusual and right; none of them may give a finding. This page is generated from what `check` says.
+What can be wrong with a robot's files, by kind, and whether `rbxcompose check` reports it. Each kind has a folder of
+small robots in `tests/misconfig/wrong/`, each with its error marked in a comment. `tests/misconfig/right/` holds
+unusual but correct robots; none of them may give a finding. This page is generated from the output of `check`.
 """
-HEADER = ("| kind | what is wrong | robots | findings | told |", "| --- | --- | ---: | --- | ---: |")
+HEADER = ("| kind | what is wrong | robots | findings | reported |", "| --- | --- | ---: | --- | ---: |")
 CANNOT = (
-    "- Qualities of service that do not fit together: they belong to the type of a port, and both sides have the same.",
-    "- A parameter file for a node of another name, or in another namespace: settings stand with their component.",
-    "- A wrong frame in a goal: places are in `map`, and skills say which frames they look up.",
-    "- Mixed simulated and wall time: all of a robot runs on one clock.",
-    "- Fixed pauses in the place of a start order: a component starts when those in its `starts_after` are active.",
+    "- Incompatible qualities of service: they belong to the type of a port, so both sides have the same.",
+    "- A parameter file for a node with another name or namespace: settings are in the component's own entry.",
+    "- A wrong frame in a goal: places are in `map`, and skills declare which frames they look up.",
+    "- Mixed simulated and wall time: the whole robot runs on one clock.",
+    "- Fixed pauses instead of a start order: a component starts when those in its `starts_after` are active.",
 )
 
 
@@ -29,8 +29,8 @@ def page() -> str:
     sections = {
         "Figures": _figures(figures()),
         "Kinds": [*HEADER, *rows],
-        "Told otherwise than a user would want": otherwise,
-        "Not told": missed,
+        "Reported differently than a user would want": otherwise,
+        "Not reported": missed,
         "What cannot be written": list(CANNOT),
     }
     return TOP + "".join(f"\n## {title}\n\n{chr(10).join(lines)}\n" for title, lines in sections.items())
@@ -41,14 +41,14 @@ def _figures(count: Figures) -> list[str]:
         "| | |",
         "| --- | ---: |",
         f"| wrong robots | {count.wrong} |",
-        f"| told at the line of the mistake | {count.caught} ({count.caught / count.wrong:.0%}) |",
-        f"| told elsewhere, or otherwise than a user would want | {count.elsewhere} |",
-        f"| not told | {count.missed} |",
-        f"| findings that nobody wants, in wrong robots | {count.noise} |",
+        f"| reported at the line of the error | {count.caught} ({count.caught / count.wrong:.0%}) |",
+        f"| reported elsewhere, or differently than a user would want | {count.elsewhere} |",
+        f"| not reported | {count.missed} |",
+        f"| unwanted findings in wrong robots | {count.noise} |",
         f"| kinds | {count.kinds} |",
-        f"| kinds of which every robot is told at its line | {count.kinds_caught} |",
-        f"| right robots | {count.right} |",
-        f"| right robots with a finding (false alarms) | {count.false_alarms} |",
+        f"| kinds with every robot reported at its line | {count.kinds_caught} |",
+        f"| correct robots | {count.right} |",
+        f"| correct robots with a finding (false alarms) | {count.false_alarms} |",
     ]
 
 

@@ -82,7 +82,7 @@ def count(soak: Soak) -> Iterator[Count]:
     count = Count()
     yield count
     slowest = max(count.recoveries, default=0.0)
-    note = f"{count.false_deletes} taken for gone in vain; the slowest was back after {slowest:.1f} s"
+    note = f"{count.false_deletes} wrongly taken for gone; the slowest was back after {slowest:.1f} s"
     soak.tell("links that fail", count.rounds, count.false_deletes, note)
 
 
