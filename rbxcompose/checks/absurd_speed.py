@@ -14,8 +14,8 @@ from rbxcompose.model.robot import Robot
 def absurd_speed(robot: Robot) -> Iterator[Finding]:
     """A component drives so fast that its base drops the commands
 
-    A base takes a command above twice its limit for a fault of the sender and does not follow it: the robot would not
-    move. Often a unit is wrong.
+    A base treats a command above twice its limit as a fault of the sender and does not follow it, so the robot would
+    not move. Often a unit is wrong.
 
     Bad:
     ```yaml

@@ -14,8 +14,8 @@ from rbxcompose.model.robot import Robot
 def always_holds(robot: Robot) -> Iterator[Finding]:
     """A condition always holds
 
-    A battery has 0 % to 100 %, a distance and an age are never below zero. Where a condition asks for more than that,
-    or one half of it rules out the other, it decides nothing.
+    A battery has 0 % to 100 %, and a distance or an age is never below zero. A condition that is true for every
+    possible value decides nothing.
 
     Bad:
     ```yaml

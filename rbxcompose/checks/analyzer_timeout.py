@@ -16,7 +16,7 @@ REPORTS = 1.0  # [s] between two reports of a component's status
 def analyzer_timeout(robot: Robot) -> Iterator[Finding]:
     """An analyzer gives its components up between two reports
 
-    Components report once a second. With a shorter `timeout` they are STALE between each report and the next.
+    Components report once a second. With a shorter `timeout` they are STALE between two reports.
 
     Bad:
     ```yaml

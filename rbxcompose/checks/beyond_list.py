@@ -18,8 +18,8 @@ from rbxcompose.model.robot import Robot
 def beyond_list(robot: Robot) -> Iterator[Finding]:
     """An item of a list that is not there
 
-    The items of a list are counted from 0, so that the last of two is `$rooms[1]`. Where nothing sets the list, an item
-    behind its end can never be had: what needs it fails, and a condition with it never holds.
+    List items are counted from 0, so the last of two is `$rooms[1]`. If nothing sets the list, an item past its end
+    never exists: a node that needs it fails, and a condition on it never holds.
 
     Bad:
     ```yaml

@@ -18,8 +18,8 @@ CHARGED = 0.99  # a charge ends at or above this level
 def charge_and_call(robot: Robot) -> Iterator[Finding]:
     """A charge ends below the level that calls for it
 
-    The charger is done at 99 %. An interrupt that still holds then has done nothing for its cause, and cannot act
-    again.
+    The charger stops at 99 %. If the interrupt's condition still holds then, the reaction has not removed its cause,
+    and the interrupt cannot act again.
 
     Bad:
     ```yaml

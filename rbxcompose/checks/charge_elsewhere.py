@@ -17,7 +17,7 @@ from rbxcompose.model.robot import Robot
 def charge_elsewhere(robot: Robot) -> Iterator[Finding]:
     """A mission charges where there is no dock
 
-    The charger works at its `dock` only. Right before, the mission has driven to another place, which is out of reach.
+    The charger works only at its `dock`. Just before, the mission has driven to another place, which is out of reach.
 
     Bad:
     ```yaml

@@ -15,7 +15,8 @@ from rbxcompose.units import LENGTH, format_quantity
 def charger_reach(robot: Robot) -> Iterator[Finding]:
     """The robot may stop too far from its dock to be charged
 
-    What drives to the dock ends anywhere within its `tolerance`. The `reach` of the charger must not be less.
+    The component that drives to the dock stops anywhere within its `tolerance`. The `reach` of the charger must not be
+    smaller.
 
     Bad:
     ```yaml

@@ -19,7 +19,8 @@ ABSURD = 2.0  # a base takes a command above this many times its limit for a fau
 def clamped_speed(robot: Robot) -> Iterator[Finding]:
     """A component drives faster than its base can
 
-    The base cuts each such command to its limit, and what drives it plans with a speed that is never reached.
+    The base clamps each such command to its limit, but the component that sends it plans with a speed that is never
+    reached.
 
     Bad:
     ```yaml

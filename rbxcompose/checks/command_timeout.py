@@ -15,7 +15,8 @@ from rbxcompose.units import TIME, format_quantity
 def command_timeout(robot: Robot) -> Iterator[Finding]:
     """A base brakes between two commands
 
-    A base brakes when no command came for its `command_timeout`. What drives it must send more often than that.
+    A base brakes when no command arrives within its `command_timeout`. The component that drives it must send more
+    often than that.
 
     Bad:
     ```yaml

@@ -13,7 +13,8 @@ from rbxcompose.model.robot import Robot
 def expected_component(robot: Robot) -> Iterator[Finding]:
     """An analyzer expects a component that the robot does not have
 
-    What is expected and never reports is STALE for ever, and so is its group. `expected` takes names, no patterns.
+    A component that is expected but never reports is STALE for ever, and so is its group. `expected` takes names, not
+    patterns.
 
     Bad:
     ```yaml

@@ -13,8 +13,8 @@ from rbxcompose.model.robot import Robot
 def external_clock(robot: Robot) -> Iterator[Finding]:
     """The real robot keeps its own time
 
-    With `clock: external` robot time is that of a simulator: it may run slower, stand still or jump. A real motor goes
-    on meanwhile, and no deadline would stop it.
+    With `clock: external`, robot time is that of a simulator: it may run slower, stand still or jump. A real motor
+    keeps running meanwhile, and no deadline would stop it.
 
     Bad: `rbxcompose up robot.yaml --real`, with
     ```yaml

@@ -15,7 +15,7 @@ from rbxcompose.units import ANGLE, format_quantity
 def full_turn(robot: Robot) -> Iterator[Finding]:
     """The heading of a place is beyond a full turn
 
-    Headings lie between -360 deg and 360 deg. One beyond that was probably meant in another unit.
+    Headings lie between -360 deg and 360 deg. A heading beyond that was probably meant in another unit.
 
     Bad:
     ```yaml

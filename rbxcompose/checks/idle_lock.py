@@ -13,8 +13,8 @@ from rbxcompose.model.robot import Robot
 def idle_lock(robot: Robot) -> Iterator[Finding]:
     """A lock of a mux holds back no input
 
-    While it is silent, a lock holds back the inputs of a lower priority than its own. If there is none, the robot
-    drives on as if the lock were not there.
+    A silent lock holds back the inputs with a lower priority than its own. If there are none, the robot drives as if
+    the lock did not exist.
 
     Bad:
     ```yaml

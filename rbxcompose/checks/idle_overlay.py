@@ -17,7 +17,7 @@ from rbxcompose.model.robot import Robot
 def idle_overlay(robot: Robot) -> Iterator[Finding]:
     """A profile or an overlay sets a value to what it is already
 
-    It changes nothing. Perhaps another value was meant, or the robot has been changed since.
+    It changes nothing. Perhaps you meant another value, or the robot has changed since.
 
     Bad:
     ```yaml

@@ -13,7 +13,7 @@ from rbxcompose.model.robot import Robot
 def matched_twice(robot: Robot) -> Iterator[Finding]:
     """Two entries of analyzers name the same component
 
-    It would be shown in both groups, and a fault of it would be counted twice.
+    The component would appear in both groups, and its faults would count twice.
 
     Bad:
     ```yaml

@@ -13,7 +13,7 @@ from rbxcompose.model.robot import Robot
 def mux_priority(robot: Robot) -> Iterator[Finding]:
     """Two inputs of a mux have the same priority
 
-    When both talk, nothing says which one should win.
+    When both are live, nothing says which one should win.
 
     Bad:
     ```yaml

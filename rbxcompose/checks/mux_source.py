@@ -15,7 +15,7 @@ from rbxcompose.sdk.ports import Out
 def mux_source(robot: Robot) -> Iterator[Finding]:
     """The `from:` of a mux input names no output
 
-    `from:` names a component, or `component.port`, that publishes what the mux takes. Without `from:` an input is
+    `from:` names a component, or `component.port`, that publishes the type of the mux. Without `from:`, an input is
     open to the outside.
 
     Bad:

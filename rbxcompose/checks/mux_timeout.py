@@ -15,9 +15,9 @@ from rbxcompose.units import TIME, format_quantity
 def mux_timeout(robot: Robot) -> Iterator[Finding]:
     """A mux gives up an input between two of its messages
 
-    An input is live until its `timeout` has passed since its last message. Where the source sends less often than that,
-    the mux lets go of it after each message: the robot jerks, or a source of a lower priority drives in between. With
-    less than two periods, one message that is late or lost is enough for that.
+    An input is live until its `timeout` has passed since its last message. If the source publishes less often than
+    that, the mux drops it after each message: the robot jerks, or a source of a lower priority drives in between. With
+    less than two periods, a single late or lost message is enough for that.
 
     Bad:
     ```yaml

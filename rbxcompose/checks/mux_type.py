@@ -13,7 +13,7 @@ from rbxcompose.model.robot import Robot
 def mux_type(robot: Robot) -> Iterator[Finding]:
     """A mux input takes an output of another type
 
-    A mux forwards messages of one type: that of who listens to it.
+    A mux forwards messages of one type: that of its subscribers.
 
     Bad:
     ```yaml

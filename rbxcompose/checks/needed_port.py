@@ -19,8 +19,8 @@ MISSION = "mission"  # its values may come from outside, and its skills are thos
 def needed_port(robot: Robot) -> Iterator[Finding]:
     """A component needs what nobody in the robot gives
 
-    An input that nobody feeds stays silent, a service that nobody serves never answers. Often the one who would do so
-    stands on another topic, or is missing.
+    An input without a publisher stays silent, and a service without a server never responds. Often the component that
+    should provide it is on another topic, or is missing.
 
     Bad:
     ```yaml

@@ -14,8 +14,8 @@ from rbxcompose.model.robot import Robot
 def never_holds(robot: Robot) -> Iterator[Finding]:
     """A condition can never hold
 
-    A battery has 0 % to 100 %, a distance and an age are never below zero. Where a condition asks for more than that,
-    or one half of it rules out the other, what depends on it would never happen.
+    A battery has 0 % to 100 %, and a distance or an age is never below zero. If a condition asks for a value beyond
+    that, or if one half of it contradicts the other, nothing that depends on it ever happens.
 
     Bad:
     ```yaml

@@ -17,7 +17,7 @@ from rbxcompose.sdk.ports import Looks
 def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
     """Two ports of one topic have different types
 
-    The type is part of the address on the wire: the two would never hear of each other, and nothing would say so.
+    The type is part of the address on the wire. The two would never find each other, and nothing would report it.
 
     Bad:
     ```yaml

@@ -20,8 +20,8 @@ WIRES: tuple[tuple[type[Port[Any]], type[Port[Any]]], ...] = ((Out, In), (Calls,
 def part_needs(robot: Robot) -> Iterator[Finding]:
     """A part needs a topic that nobody else has
 
-    `needs:` of a part names topics with their types that something outside of the part must have: whoever listens to
-    what the part writes, writes what it reads, or serves what it calls.
+    `needs:` of a part lists topics with their types. Something outside the part must subscribe to what the part
+    publishes, publish what it subscribes to, or serve what it calls.
 
     Bad:
     ```yaml

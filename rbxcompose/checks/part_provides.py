@@ -18,8 +18,8 @@ from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 def part_provides(robot: Robot) -> Iterator[Finding]:
     """A part does not have what it says that it provides
 
-    `provides:` of a part tells the topics with their types, the skills and the values that it gives to the rest of the
-    robot. Who includes the part counts on them.
+    `provides:` of a part lists the topics with their types, the skills and the values that it gives to the rest of the
+    robot. A file that includes the part relies on them.
 
     Bad:
     ```yaml

@@ -16,7 +16,7 @@ from rbxcompose.sdk.ports import In
 def past_the_mux(robot: Robot) -> Iterator[Finding]:
     """A component listens to an input of a mux instead of its output
 
-    It would follow that one source whatever its priority, and also while the robot is stopped.
+    It would follow that one source whatever its priority, even while the robot is stopped.
 
     Bad:
     ```yaml

@@ -22,7 +22,8 @@ from rbxcompose.model.robot import Robot
 def place_in_data(robot: Robot) -> Iterator[Finding]:
     """The data of a mission name a place that the robot does not know
 
-    Text in `data:` becomes a place where a skill needs one. Nothing sets these data, so the skill would fail each time.
+    Text in `data:` becomes a place where a skill needs one. Nothing changes these data, so the skill would fail each
+    time.
 
     Bad:
     ```yaml

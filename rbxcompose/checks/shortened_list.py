@@ -16,8 +16,8 @@ from rbxcompose.model.robot import Robot
 def shortened_list(robot: Robot) -> Iterator[Finding]:
     """A profile or an overlay adds to a list and drops what was in it
 
-    Maps are merged, but a list takes the place of the one below it. One that has something new, and not all that was
-    there, was probably to be added to it. `!replace` before the list says that it is meant so.
+    Maps are merged, but a list replaces the one below it. A list with new items that lacks some of the old ones was
+    probably meant to extend them. `!replace` before the list says that you mean it.
 
     Bad:
     ```yaml

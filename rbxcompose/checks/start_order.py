@@ -14,7 +14,7 @@ from rbxcompose.model.robot import Robot
 def start_order(robot: Robot) -> Iterator[Finding]:
     """`starts_after:` names no component, or goes round in a circle
 
-    Each name must be a component of the robot, and following the names must come to an end.
+    Each name must be a component of the robot, and the names must not form a circle.
 
     Bad:
     ```yaml

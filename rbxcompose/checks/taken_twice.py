@@ -13,7 +13,7 @@ from rbxcompose.model.robot import Robot
 def taken_twice(robot: Robot) -> Iterator[Finding]:
     """Two inputs of muxes take the same output
 
-    An output goes to one topic. Only one of the inputs would ever hear of it.
+    An output publishes on one topic, so only one of the inputs would ever receive it.
 
     Bad:
     ```yaml

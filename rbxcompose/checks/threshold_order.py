@@ -17,8 +17,8 @@ BATTERY = "battery_sim"
 def threshold_order(robot: Robot) -> Iterator[Finding]:
     """A battery is in error before it warns
 
-    Below `warn` the status of a battery is WARN, below `error` it is ERROR. With `error` above `warn` nobody is ever
-    warned.
+    Below `warn` the status of a battery is WARN, below `error` it is ERROR. With `error` above `warn`, there is never a
+    warning.
 
     Bad:
     ```yaml

@@ -17,8 +17,8 @@ from rbxcompose.units import LENGTH, TIME, format_quantity
 def timeout_and_way(robot: Robot) -> Iterator[Finding]:
     """A timeout is shorter than what it is for
 
-    The way from one place to the next, straight and at full speed, takes longer than the step may: it would fail each
-    time. The same is said of waits.
+    The way from one place to the next, straight and at full speed, takes longer than the step's timeout, so the step
+    would fail each time. Waits are checked in the same way.
 
     Bad:
     ```yaml

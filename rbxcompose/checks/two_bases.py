@@ -16,8 +16,8 @@ from rbxcompose.sdk.ports import In, Out
 def two_bases(robot: Robot) -> Iterator[Finding]:
     """Two bases follow the same commands
 
-    A base takes commands and tells by its odometry where it is. Two that follow one topic both move, and both say where
-    the robot stands: whoever drives to a place would be told now the one pose, now the other.
+    A base takes commands and publishes its position as odometry. If two bases follow one topic, both move and both say
+    where the robot is: a component that drives to a place would see two poses in turn.
 
     Bad:
     ```yaml

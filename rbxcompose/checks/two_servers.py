@@ -15,7 +15,7 @@ from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 def two_servers(robot: Robot) -> Iterator[Finding]:
     """Two components serve the same service or action
 
-    Who asks would be answered by one of them, nobody knows which.
+    Either of them might respond to a client; nobody knows which.
 
     Bad:
     ```yaml

@@ -15,8 +15,8 @@ from rbxcompose.sdk.ports import ServesAction, ServesTopic
 def two_skills(robot: Robot) -> Iterator[Finding]:
     """Two actions are the same skill
 
-    A skill of missions is named like the last word of the topic of its action, or of the topic that takes its orders.
-    Missions could not tell which one is meant.
+    A skill is named after the last word of the topic of its action, or of the topic that takes its orders. Missions
+    could not tell the two apart.
 
     Bad:
     ```yaml

@@ -24,8 +24,8 @@ def is_command(end: End) -> bool:
 def two_writers(robot: Robot) -> Iterator[Finding]:
     """Two components write commands on one topic without a mux
 
-    What listens would follow the one that spoke last, so the robot jerks between the two. A mux decides by priority
-    who is let through.
+    A subscriber would follow whichever published last, so the robot jerks between the two. A mux decides by priority
+    which one gets through.
 
     Bad:
     ```yaml

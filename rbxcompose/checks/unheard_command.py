@@ -14,8 +14,8 @@ from rbxcompose.model.robot import Robot
 def unheard_command(robot: Robot) -> Iterator[Finding]:
     """Commands go to a topic that nobody listens to
 
-    What sends them believes that it drives the robot, and nothing moves. A mux is named after the topic that it
-    writes; a base listens to `cmd_vel`.
+    The publisher believes that it drives the robot, but nothing moves. A mux is named after the topic that it
+    publishes; a base subscribes to `cmd_vel`.
 
     Bad:
     ```yaml

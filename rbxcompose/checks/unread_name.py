@@ -14,8 +14,8 @@ from rbxcompose.model.robot import Robot
 def unread_name(robot: Robot) -> Iterator[Finding]:
     """A mission never reads one of its inputs or data
 
-    Giving it another value would change nothing. It is left over, or a number stands where its name should. The same
-    holds for a result that is kept by `save` and never looked at.
+    Changing its value would change nothing. It is left over, or a number stands where its name should. The same applies
+    to a result that `save` keeps and nothing reads.
 
     Bad:
     ```yaml

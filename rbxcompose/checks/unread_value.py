@@ -13,8 +13,8 @@ from rbxcompose.model.robot import Robot
 def unread_value(robot: Robot) -> Iterator[Finding]:
     """A value that no mission reads
 
-    `values:` are names for missions. One that none of them reads is left over, or a mission looks at another one by
-    mistake. What a part of the robot gives without being asked is no mistake.
+    `values:` are names for missions. A value that none of them reads is left over, or a mission reads the wrong one.
+    Unread values that a part brings are fine.
 
     Bad:
     ```yaml

@@ -15,7 +15,8 @@ from rbxcompose.model.robot import Robot
 def unseen_component(robot: Robot) -> Iterator[Finding]:
     """A component belongs to no group of the diagnostics
 
-    As soon as there are analyzers, what none of them matches goes into the group `Other`, where nobody looks for it.
+    As soon as there are analyzers, every component that none of them matches goes into the group `Other`, where nobody
+    looks for it.
 
     Bad:
     ```yaml

@@ -15,9 +15,9 @@ WORLD = "world"
 def world_group(robot: Robot) -> Iterator[Finding]:
     """The process group `world` is for simulated truth, and for nothing else
 
-    What is simulated (where the robot is, how much charge it has) lives in the group `world`, so that the end of any
-    other process never changes it. A component of the robot itself does not belong there: `world` may not fail, and the
-    robot goes down with it.
+    Simulated truth (where the robot is, how much charge it has) lives in the process group `world`, so that the end of
+    any other process never changes it. A component of the robot itself does not belong there: if the process `world`
+    fails, the robot goes down.
 
     Bad:
     ```yaml

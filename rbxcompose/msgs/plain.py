@@ -22,7 +22,7 @@ NO_FIELD = kind(
     "RBX9023",
     """A field that the message does not have
 
-The text of a message names its fields as its type does. `rbxcompose msg show TYPE` prints the type.
+The text of a message uses the field names of its type. `rbxcompose msg show TYPE` prints the type.
 
 Bad: `rbxcompose topic pub /cmd_vel geometry_msgs/Twist '{linaer: {x: 0.1}}'`
 Good: `rbxcompose topic pub /cmd_vel geometry_msgs/Twist '{linear: {x: 0.1}}'`
@@ -32,8 +32,8 @@ WRONG_VALUE = kind(
     "RBX9024",
     """A value that does not fit the field of a message
 
-Each field has a type and a range: numbers, flags, texts, lists of so many values, other messages. Numbers of messages
-have no units: they are what ROS 2 means by them, mostly SI.
+Each field has a type and a range: numbers, flags, texts, lists with a given length, other messages. Numbers in messages
+have no units: they are what ROS 2 takes them for, mostly SI.
 
 Bad: `rbxcompose topic pub /answer std_msgs/Int32 '{data: many}'`
 Good: `rbxcompose topic pub /answer std_msgs/Int32 '{data: 42}'`

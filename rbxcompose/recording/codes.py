@@ -6,7 +6,7 @@ UNREADABLE = kind(
     "RBX9201",
     """The recording cannot be read
 
-There is no such file, it may not be opened, or it is no recording: those are MCAP files, as `rbxcompose record`,
+The file does not exist, may not be opened, or is not a recording. Recordings are MCAP files, as `rbxcompose record`,
 `ros2 bag record -s mcap` and Foxglove write them.
 """,
 )
@@ -14,7 +14,7 @@ DAMAGED = kind(
     "RBX9202",
     """The recording is damaged
 
-It was cut off, or some of its bytes have changed. What comes before that place is read, the rest is left out; the file
+It was cut off, or some of its bytes have changed. Everything before that place is read, the rest is left out; the file
 stays as it is.
 """,
     Severity.WARNING,
@@ -23,17 +23,17 @@ UNWRITABLE = kind(
     "RBX9203",
     """The recording cannot be written
 
-The file is there already, its folder may not be written to, or the disk is full. A recording that was cut short by this
-is recovered at the next `rbxcompose record` or `replay` in its folder.
+The file exists already, its folder is not writable, or the disk is full. The next `rbxcompose record` or `replay` in
+that folder recovers a recording that was cut short by this.
 """,
 )
 RECOVERED = kind(
     "RBX9204",
     """An unfinished recording was found
 
-A recorder was killed, or its computer lost power: a file whose name ends in `.mcap.part` was left. What is whole in it
-is copied to a new file with an index, which gets the name that was meant. If that is not possible, the message says why
-and the file stays as it is.
+A recorder was killed or its computer lost power, and left a file whose name ends in `.mcap.part`. Its intact content is
+copied to a new file with an index, under the intended name. If that is not possible, the message says why and the file
+stays as it is.
 """,
     Severity.WARNING,
 )
@@ -41,16 +41,16 @@ NOTHING = kind(
     "RBX9205",
     """There is nothing to replay
 
-The recording has no messages in ROS 2's encoding (`cdr`) with a known type on the topics that were chosen, or none
-after the time given by `--from`. `rbxcompose replay FILE --info` shows what is in it.
+The chosen topics have no messages in ROS 2's encoding (`cdr`) with a known type, or none after the time given by
+`--from`. `rbxcompose replay FILE --info` shows what is in the recording.
 """,
 )
 NOT_REPLAYED = kind(
     "RBX9206",
     """Some topics of the recording are not replayed
 
-Topics of the class `command` make a robot move: they are replayed only if `--topics` names them. Topics in another
-encoding than `cdr`, or without a known type, cannot be published.
+Topics of the class `command` make a robot move: they are replayed only if `--topics` names them. Topics in an encoding
+other than `cdr`, or without a known type, cannot be published.
 """,
     Severity.WARNING,
 )
@@ -58,9 +58,9 @@ SENT_ALREADY = kind(
     "RBX9210",
     """The recording has topics that somebody sends now
 
-Messages of then would stand beside those of now: an old `/tf` leads a robot astray that drives, an old status hides
-what is wrong. A stopped robot sends too. Choose other topics with `--topics` or `--class`, replay where no robot is, or
-take `--over` if old and new messages side by side are what you want.
+Old messages would mix with new ones: an old `/tf` misleads a robot that drives, an old status hides what is wrong. A
+stopped robot publishes too. Choose other topics with `--topics` or `--class`, replay where no robot runs, or use
+`--over` if you want old and new messages side by side.
 
 Bad: `rbxcompose replay run.mcap` while the robot is up
 Good: `rbxcompose replay run.mcap --topics '/camera/*'`
@@ -70,25 +70,25 @@ NOT_ENOUGH = kind(
     "RBX9208",
     """The recording has not enough to run a component again
 
-`replay --into` needs all inputs of the component, in their order, with the requests that it got and the replies to its
-own. Those are in what `rbxcompose up --rate max --record FILE` writes; `rbxcompose record` sees the topics only. The
-component must be one of the robot, and a secret of its configuration comes from the robot's file: `--robot PATH`.
+`replay --into` needs all inputs of the component in their order, with the requests that it received and the responses
+to its own. `rbxcompose up --rate max --record FILE` writes them; `rbxcompose record` sees only topics. The component
+must belong to the robot. A secret in its configuration comes from the robot's file: `--robot PATH`.
 """,
 )
 DIFFERENT = kind(
     "RBX9209",
     """A component does not send what it sent when it was recorded
 
-The message names the first difference: the robot time, the topic, the field and both values. If code or configuration
-have changed on purpose, that is what they changed. If not, the component asks for something that is no input of it,
-such as a clock of the system or a random number without a seed, or somebody published to the recorded run from outside.
+The message names the first difference: robot time, topic, field and both values. If you changed code or configuration
+on purpose, this is the effect. If not, the component uses something that is not one of its inputs, such as a system
+clock or a random number without a seed, or something outside published to the recorded run.
 """,
 )
 LOST = kind(
     "RBX9207",
     """Messages are missing from the recording
 
-They came faster than they could be written, so that the oldest of those that waited were left out.
+They arrived faster than they could be written, so the oldest waiting ones were dropped.
 """,
     Severity.WARNING,
 )

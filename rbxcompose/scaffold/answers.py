@@ -18,15 +18,15 @@ NAME = kind(
     "RBX9102",
     """A name that cannot be used
 
-`new` makes files, keys and components of the name. It begins with a small letter and goes on with small letters, digits
-and underscores, at most 60 of them; words that mean something already are taken.
+`new` uses the name for files, keys and components. It begins with a lower-case letter, continues with lower-case
+letters, digits and underscores, and has at most 60 characters. Reserved words are refused.
 """,
 )
 ANSWER = kind(
     "RBX9103",
     """An answer that cannot be used
 
-A question of `new`, or one of its options, got an answer that it cannot make anything of; the message says why.
+`new` cannot use the answer to one of its questions, or the value of one of its options. The message says why.
 """,
 )
 

@@ -22,8 +22,8 @@ NOT_WRITTEN = kind(
     "RBX9104",
     """A file cannot be written
 
-The system refuses: the folder may not be written to, the disk is full, or a file stands where a folder should be.
-Nothing of what `new` was to write is left behind.
+The system refuses: the folder is not writable, the disk is full, or a file stands where a folder should be. `new`
+leaves nothing behind.
 """,
 )
 

@@ -8,8 +8,8 @@ UNKNOWN = kind(
     "RBX4201",
     """A test names what is not there
 
-What a test mocks, sets, looks for or counts must exist: a skill of the robot, a value, a step of the mission, a datum.
-A step that the mission does not have could not be found, and one that must never be done would never be.
+Everything that a test mocks, sets, expects or counts must exist: a skill of the robot, a value, a step of the mission,
+a datum. A step that the mission does not have could never be found, and a `never` for it would always pass.
 
 Bad:
 ```yaml
@@ -30,7 +30,7 @@ WRONG_VALUE = kind(
     "RBX4202",
     """A value of a test has the wrong type
 
-A value that a test sets or expects is of another type or unit than what it belongs to.
+A value that a test sets or expects has a different type or unit than its target.
 
 Bad:
 ```yaml
@@ -52,8 +52,8 @@ NEVER = kind(
     "RBX4203",
     """Something in a test can never be
 
-What is written cannot happen, whatever the mission does: an event or a step after the end of the test, a mission that
-goes on while the robot is stopped, a call number 0, `running` without the time for which it is watched.
+It cannot happen, whatever the mission does: an event or a step after the end of the test, a mission that continues
+while the robot is stopped, a call number 0, `running` without the time to watch.
 
 Bad:
 ```yaml
@@ -79,8 +79,8 @@ NO_STEP = kind(
     "RBX4204",
     """A step of a test is written wrongly
 
-A step is the name of a skill, a node or a state. The value of a skill's main argument may stand behind it, or a map of
-its arguments below it, and `ended` and `at` beside it.
+A step is the name of a skill, a node or a state. A skill may have the value of its main argument behind it, or a map of
+its arguments below it. `ended` and `at` go beside it.
 
 Bad:
 ```yaml
@@ -101,7 +101,7 @@ UNUSED_MOCK = kind(
     "RBX4205",
     """A mock of a skill that the mission does not use
 
-The test answers for a skill that is never asked. It may be a leftover, or the wrong skill.
+The test mocks a skill that is never called. It may be left over, or the wrong skill.
 
 Bad: a mock of `recharge`, in a test of a mission that never recharges.
 Good: mocks of the skills that the mission uses.

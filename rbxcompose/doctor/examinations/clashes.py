@@ -13,8 +13,8 @@ CLASH = kind(
     "RBX9408",
     """Two ends of one topic, service or action have different types
 
-They never hear each other, and nobody says so: the type and the hash of its definition are part of the name on the
-wire. The definitions of one type differ where packages of different versions are mixed.
+They never find each other, and nothing reports it: the type and the hash of its definition are part of the name on the
+wire. Definitions of one type differ if packages of different versions are mixed.
 
 Bad: `/battery` as `std_msgs/Float32` at one end, and as `sensor_msgs/BatteryState` at the other.
 Good: one type, in one version, at all ends: `rbxcompose msg show TYPE` prints its hash.

@@ -15,7 +15,7 @@ WRONG_CLOCK = kind(
     "RBX9404",
     """The clock of this machine is wrong
 
-Robots move by the monotonic clock, which nobody sets; but stamps of messages, recordings and ROS 2 use the wall clock.
+Robots move by the monotonic clock, which nobody sets. But stamps of messages, recordings and ROS 2 use the wall clock.
 
 Bad: a computer without a battery for its clock, and without a time server.
 Good: `timedatectl set-ntp true`
@@ -26,8 +26,9 @@ OTHER_CLOCK = kind(
     "RBX9405",
     """Somebody on the bus has another time
 
-The stamps of its messages lie in the future, or long ago. What compares stamps of several senders, such as transforms
-and recordings, is then wrong. A robot that runs with `--rate` counts its own time from zero, and so do its stamps.
+The stamps of its messages lie in the future, or long ago. Whatever compares stamps from several publishers, such as
+transforms and recordings, is then wrong. A robot that runs with `--rate` counts its own time from zero, and so do its
+stamps.
 
 Bad: two computers of which one has no time server.
 Good: `timedatectl set-ntp true` on both

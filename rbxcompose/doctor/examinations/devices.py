@@ -20,8 +20,8 @@ NO_DEVICE = kind(
     "RBX9411",
     """A device that the robot names cannot be used
 
-It is not plugged in, has another name, or this user may not open it. Serial devices mostly belong to the group
-`dialout`; who was added to it has to log in anew.
+It is not plugged in, has another name, or this user may not open it. Serial devices usually belong to the group
+`dialout`; after you join it, log in again.
 
 Bad: `port: /dev/ttyUSB0`, which is `/dev/ttyUSB1` after the next start.
 Good: `port: /dev/serial/by-id/...`, and `sudo usermod -aG dialout $USER`

@@ -14,8 +14,8 @@ LEFT = kind(
     "RBX9409",
     """A robot has left something behind
 
-Its supervisor is dead, so that nothing starts its parts again and `down` has to clear up; or its state cannot be read;
-or processes of it run without a supervisor.
+Its supervisor is dead, so nothing restarts its processes and you must clean up with `down`. Or its state cannot be
+read, or some of its processes run without a supervisor.
 
 Bad: `kill -9` of the supervisor.
 Good: `rbxcompose down`

@@ -16,7 +16,7 @@ LOW_LIMIT = kind(
     """A limit of this machine is low
 
 Each link of a process takes an open file, and large messages may go through shared memory. Nothing that rbxcompose
-ships needs real-time priority or locked memory; drivers of others may.
+ships needs real-time priority or locked memory; third-party drivers may.
 
 Bad: a container with 1 MB at `/dev/shm`, or `ulimit -n 64`.
 Good: `docker run --shm-size=256m`, `ulimit -n 4096`

@@ -18,8 +18,8 @@ OPEN_TO_OTHERS = kind(
     "RBX9410",
     """Others may open what is this user's alone
 
-The folder of a robot holds the socket through which it is commanded; a secret is read only if nobody else may read
-it. `up` refuses both.
+The folder of a robot contains the socket that commands it. A secret is read only if nobody else may read it. `up`
+refuses both.
 
 Bad: `chmod 755 /run/user/1000/rbxcompose`, `chmod 644 secrets/token`
 Good: `chmod 700 /run/user/1000/rbxcompose`, `chmod 600 secrets/token`

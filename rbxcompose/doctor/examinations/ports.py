@@ -14,8 +14,8 @@ PORT_TAKEN = kind(
     "RBX9402",
     """The port of the bus is taken
 
-A robot that starts takes the next free port instead, of twenty; `rbxcompose ps` tells which. A program that looks for
-the robot at its usual port then finds somebody else.
+A robot that starts uses the next free port instead, one of twenty; `rbxcompose ps` shows which. A program that looks
+for the robot at its usual port then finds something else.
 
 Bad: a router of ROS 2 at 7447, and a robot with `bus: {port: 7447}` beside it.
 Good: `bus: {port: 7460}`, or `bus: {router: tcp/127.0.0.1:7447}` to use that router.
@@ -26,8 +26,8 @@ NO_LISTENER = kind(
     "RBX9403",
     """Nobody listens at the port of a running robot's router
 
-Its processes still talk with each other, but nobody new finds them. The supervisor starts a router that has ended
-again; if it cannot, somebody else may have taken the port.
+Its processes still talk to each other, but nobody new finds them. The supervisor restarts a router that has ended; if
+it cannot, another program may have taken the port.
 
 Bad: the router was killed together with the supervisor.
 Good: `rbxcompose down`, then `rbxcompose up`

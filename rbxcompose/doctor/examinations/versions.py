@@ -12,8 +12,8 @@ OTHER_VERSION = kind(
     "RBX9401",
     """A package is missing, or has another version than the one that is locked
 
-`requirements.lock` names the versions with which rbxcompose is tested. Others mostly work, too; when something odd
-happens, it is the first thing to look at.
+`requirements.lock` lists the versions with which rbxcompose is tested. Others mostly work, too. When something odd
+happens, check this first.
 
 Bad: `pip install rbxcompose` over an environment that is years old.
 Good: `pip install -r requirements.lock`

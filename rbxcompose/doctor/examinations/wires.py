@@ -15,7 +15,8 @@ NOBODY_PUBLISHES = kind(
     "RBX9407",
     """Somebody subscribes to a topic that nobody publishes
 
-It waits for ever. Inputs that the robot leaves open to the outside, such as `teleop` of a mux, are not meant.
+The subscriber waits for ever. Inputs that the robot leaves open to the outside, such as `teleop` of a mux, are not
+reported.
 
 Bad: a node of ROS 2 that subscribes to `/odometry`, beside a robot that publishes `/odom`.
 Good: the same name at both ends: `ros2 run ... --ros-args -r odometry:=odom`

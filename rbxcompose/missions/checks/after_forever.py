@@ -18,8 +18,8 @@ from rbxcompose.missions.program import Node, Program
 def after_forever(mission: Examined) -> Iterator[Finding]:
     """A step is never reached
 
-    A sequence goes on after a step that succeeds, a fallback after one that fails. What is repeated for ever does not
-    succeed, and what cannot fail is never followed by a second choice.
+    A sequence continues after a step that succeeds, a fallback after one that fails. A step that repeats for ever never
+    succeeds, and a step that cannot fail never leads to a second choice.
 
     Bad:
     ```yaml

@@ -17,8 +17,8 @@ from rbxcompose.missions.program import Node
 def endless_branch(mission: Examined) -> Iterator[Finding]:
     """A parallel waits for a branch that never succeeds
 
-    Branches that run at the same time are done when all of them have succeeded. What is repeated for ever never does,
-    so that the mission never goes on. Say which branch decides (`ends_with`), or that one success is enough.
+    A parallel is done when all of its branches have succeeded. A branch that repeats for ever never does, so the
+    mission never continues. Say which branch decides (`ends_with`), or that one success is enough.
 
     Bad:
     ```yaml

@@ -20,8 +20,8 @@ AGAIN = ("for", "repeat", "machine")  # kinds that do what is in them more than 
 def idle_modifier(mission: Examined) -> Iterator[Finding]:
     """A modifier changes nothing
 
-    `optional` and `attempts` are for steps that can fail. On one that cannot, they probably belong to another step.
-    `once` and `cooldown` are for steps that come round again, in a loop or a machine.
+    `optional` and `attempts` are for steps that can fail. On a step that cannot, they probably belong to another step.
+    `once` and `cooldown` are for steps that run repeatedly, in a loop or a machine.
 
     Bad:
     ```yaml

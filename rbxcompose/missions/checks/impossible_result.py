@@ -17,8 +17,8 @@ from rbxcompose.missions.spans import inner_span
 def impossible_result(mission: Examined) -> Iterator[Finding]:
     """A branch is compared with a result that it cannot have
 
-    The conditions of `outcomes` ask how each branch has ended. A branch that only waits cannot fail, and one that is
-    repeated for ever cannot succeed; a condition that asks for it is never decided by that branch.
+    The conditions of `outcomes` test how each branch has ended. A branch that only waits cannot fail, and one that
+    repeats for ever cannot succeed. Such a branch never decides a condition on that result.
 
     Bad:
     ```yaml

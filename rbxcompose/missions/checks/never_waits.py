@@ -17,7 +17,7 @@ from rbxcompose.missions.modifiers.limits import Tries
 def never_waits(mission: Examined) -> Iterator[Finding]:
     """A loop without an end never waits
 
-    Nothing in the body takes time, so that it would run as fast as it can; the engine slows it down to the mission's
+    Nothing in the body takes time, so the loop would run as fast as it can. The engine slows it down to the mission's
     rate.
 
     Bad:

@@ -14,7 +14,7 @@ from rbxcompose.missions.program import END
 def not_restartable(mission: Examined) -> Iterator[Finding]:
     """An interrupt may start a skill again that cannot be restarted
 
-    `afterwards: continue` starts what was cut short again from its beginning. The skill says that this does it no good.
+    `afterwards: continue` restarts the step that was cut short. The skill declares that it must not be restarted.
 
     Bad:
 

@@ -15,7 +15,7 @@ from rbxcompose.missions.modifiers.saving import SAVED
 def nothing_to_keep(mission: Examined) -> Iterator[Finding]:
     """A node has no result to keep
 
-    Skills, `call`, `use` and `for` have a result that `save` keeps in the data. Others only succeed or fail.
+    Skills, `call`, `use` and `for` have a result that `save` keeps in the data. Other nodes only succeed or fail.
 
     Bad:
     ```yaml

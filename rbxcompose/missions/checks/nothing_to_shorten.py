@@ -15,8 +15,8 @@ from rbxcompose.missions.kinds.for_ import ForOptions
 def nothing_to_shorten(mission: Examined) -> Iterator[Finding]:
     """`remove_done` without a list in the data
 
-    An item that is done leaves the data that `in` names, so that the next run of the loop does only the rest. A list
-    that is written behind `in` itself, or comes from elsewhere, stays as it is.
+    An item that is done is removed from the data that `in` names, so that the next run of the loop does only the rest.
+    A list written directly in `in`, or one from elsewhere, stays as it is.
 
     Bad:
     ```yaml

@@ -18,7 +18,7 @@ from rbxcompose.missions.program import Node
 def pointless_number(mission: Examined) -> Iterator[Finding]:
     """A number of rounds or attempts, or a duration, leaves nothing to be done
 
-    `repeat: 0` does nothing, a timeout of no time fails at once, and durations are not negative.
+    `repeat: 0` does nothing, a timeout of zero fails at once, and durations are never negative.
 
     Bad:
     ```yaml

@@ -21,8 +21,8 @@ NUMBERS = (TypeKind.QUANTITY, TypeKind.COUNT)
 def same_case(mission: Examined) -> Iterator[Finding]:
     """A case that is never taken
 
-    The first case that is equal to the value is taken. A second one that is equal to it, or one of a value that the
-    choice cannot have, is never taken.
+    The first case that equals the value is taken. A second equal case, or one with a value that the choice cannot have,
+    is never taken.
 
     Bad:
 

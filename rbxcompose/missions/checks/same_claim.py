@@ -16,8 +16,8 @@ from rbxcompose.missions.kinds.parallel import ParallelOptions
 def same_claim(mission: Examined) -> Iterator[Finding]:
     """Two branches of a parallel need the same part of the robot
 
-    A skill claims what it needs for itself, such as the base. Two that claim the same at the same time work against
-    each other: the robot would drive to two places at once.
+    A skill claims what it needs for itself, such as the base. Two skills that claim the same thing at the same time
+    work against each other: the robot would drive to two places at once.
 
     Bad:
 

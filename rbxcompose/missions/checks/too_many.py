@@ -15,7 +15,7 @@ from rbxcompose.missions.kinds.parallel import ParallelOptions
 def too_many(mission: Examined) -> Iterator[Finding]:
     """A parallel counts more branches than it has
 
-    `succeed_when: 3` of two branches can never come about.
+    `succeed_when: 3` can never be met by two branches.
 
     Bad:
 

@@ -16,8 +16,8 @@ from rbxcompose.missions.transitions import reached, transitions
 def trapped_state(mission: Examined) -> Iterator[Finding]:
     """A state from which no way leads to an end
 
-    The machine has an end that can be reached, but once it is in this state it goes round for ever. A state whose body
-    never ends by itself is meant so, and not told.
+    The machine has an end that can be reached, but from this state it runs in circles for ever. A state whose body
+    never ends by itself is taken as intended and not reported.
 
     Bad:
     ```yaml

@@ -15,7 +15,7 @@ from rbxcompose.missions.messages import Message
 def unknown_channel(mission: Examined) -> Iterator[Finding]:
     """A mission publishes or calls what the robot does not have
 
-    `publish` takes a topic of the robot, `call` one of its services, both by the name that the components use.
+    `publish` takes a topic of the robot, `call` one of its services, both under the name that the components use.
 
     Bad:
 

@@ -14,7 +14,7 @@ from rbxcompose.missions.machines import StateOptions
 def unknown_outcome(mission: Examined) -> Iterator[Finding]:
     """A transition for an outcome that cannot occur
 
-    The body of the state never ends in that way: it may be misspelt, or left over from an earlier version.
+    The body of the state never ends in that way. The outcome may be misspelt, or left over from an earlier version.
 
     Bad:
 

@@ -14,7 +14,7 @@ from rbxcompose.missions.registry import kinds
 def unknown_skill(mission: Examined) -> Iterator[Finding]:
     """A mission uses a skill that the robot does not have
 
-    Skills are the actions that the robot's components serve. Nobody on this robot serves an action of this name.
+    Skills are the actions that the robot's components serve. No component of this robot serves an action of this name.
 
     Bad:
 

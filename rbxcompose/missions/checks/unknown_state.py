@@ -15,7 +15,7 @@ from rbxcompose.missions.program import Node
 def unknown_state(mission: Examined) -> Iterator[Finding]:
     """A transition leads to a state that does not exist
 
-    States are declared under `states:`, ends under `ends:`; the ends `finished` and `failed` always exist.
+    Declare states under `states:` and ends under `ends:`. The ends `finished` and `failed` always exist.
 
     Bad:
 

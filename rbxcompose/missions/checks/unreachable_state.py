@@ -14,7 +14,7 @@ from rbxcompose.missions.transitions import reached, transitions
 def unreachable_state(mission: Examined) -> Iterator[Finding]:
     """A state that no way leads to
 
-    The machine begins in `start` and goes where `next` leads it; nothing leads to this state.
+    The machine begins in `start` and follows `next`; nothing leads to this state.
 
     Bad:
 

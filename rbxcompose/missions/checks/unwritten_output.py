@@ -14,8 +14,8 @@ from rbxcompose.missions.examined import Examined
 def unwritten_output(mission: Examined) -> Iterator[Finding]:
     """An output that nothing writes
 
-    What the mission gives back is read from its data, and nothing in the mission changes those: the output is always
-    the value under `data`.
+    An output is read from the mission's data, and nothing in the mission changes this datum: the output always has the
+    value under `data`.
 
     Bad:
     ```yaml

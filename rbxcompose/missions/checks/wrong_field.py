@@ -30,7 +30,7 @@ NUMBERS = (TypeKind.QUANTITY, TypeKind.COUNT)
 def wrong_field(mission: Examined) -> Iterator[Finding]:
     """A message of a mission does not fit its type
 
-    The fields of a message are those of its ROS type, and each has a type of its own. `rbxcompose msg show TYPE` lists
+    The fields of a message are those of its ROS type, and each field has its own type. `rbxcompose msg show TYPE` lists
     them.
 
     Bad:

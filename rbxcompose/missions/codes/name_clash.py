@@ -8,8 +8,8 @@ NAME_CLASH = kind(
     "RBX4112",
     """Two things in a mission have one name
 
-Inputs, data, values of the robot and the items of loops share one scope, in which each name means one thing. A name
-may not be that of a kind or a skill either.
+Inputs, data, values of the robot and the items of loops share one scope, in which each name has one meaning. The name
+of a kind or a skill cannot be used either.
 
 Bad:
 

@@ -8,7 +8,7 @@ NO_EXPRESSION = kind(
     "RBX4111",
     """A condition or a value cannot be read
 
-The caret stands where reading stopped. `$name` is looked up while the robot runs, numbers have units.
+The caret marks where reading stopped. `$name` is looked up while the robot runs; numbers have units.
 
 Bad:
 

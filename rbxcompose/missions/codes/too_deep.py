@@ -8,7 +8,7 @@ TOO_DEEP = kind(
     "RBX4115",
     """Mission nodes are nested too deeply
 
-A mission has at most 40 levels of nodes: nobody could follow more. Give a part of it to a mission of its own.
+A mission has at most 40 levels of nodes; more would be unreadable. Move some of it to a mission of its own.
 
 Bad:
 

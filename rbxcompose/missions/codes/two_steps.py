@@ -8,7 +8,7 @@ TWO_STEPS = kind(
     "RBX4108",
     """Two steps in one mapping
 
-A node has exactly one kind or skill. Steps of a list begin with a dash each.
+A node has exactly one kind or skill. In a list, each step begins with a dash.
 
 Bad:
 

@@ -8,8 +8,8 @@ UNKNOWN_KEY = kind(
     "RBX4101",
     """Unknown kind, option or modifier in a mission
 
-Every key of a mission node is a kind, an option of that kind, a modifier or a skill. Any other key would be ignored
-silently, so it is refused.
+Every key of a mission node is a kind, an option of that kind, a modifier or a skill. Any other key would have no
+effect, so it is refused.
 
 Bad:
 

@@ -8,8 +8,8 @@ WRONG_SHAPE = kind(
     "RBX4110",
     """A part of a mission has the wrong form
 
-A step is a word (a skill without arguments), a list of steps with dashes (a sequence), or a word with a colon, and its
-settings below it. Where several values are asked for, they stand in brackets: `[dock, window]`.
+A step is a word (a skill without arguments), a list of steps with dashes (a sequence), or a word with a colon and its
+settings below it. Write several values in brackets: `[dock, window]`.
 
 Bad:
 
