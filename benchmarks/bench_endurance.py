@@ -54,7 +54,7 @@ def _load(name: str, path: str, folder: str) -> Row:
     return Row(
         name=f"load of the patrol robot while it {name}",
         unit="% of a core",
-        how=f"processor time of all of its processes over {WATCHED:.0f} s; its simulated base publishes odometry at 50 Hz",
+        how=f"processor time of all its processes over {WATCHED:.0f} s; its simulated base publishes odometry at 50 Hz",
         ours=100 * taken / WATCHED,
         most=3 if name == "waits" else None,
     )

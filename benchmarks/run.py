@@ -23,8 +23,8 @@ PAGE = ROOT / "docs" / "benchmarks.md"
 ONE = "--one"
 ABOUT = """# Benchmarks
 
-`make bench` writes this page. Times are medians, with the 99th percentile where there are many samples: wall time for whole
-commands, processor time within a process. A peer and ours are measured in turns, in the same run. So ratios hold
+`make bench` writes this page. Times are medians, with the 99th percentile where there are many samples: wall time for
+whole commands, processor time within a process. A peer and ours are measured in turns, in the same run. So ratios hold
 where times do not: times differ between machines by a factor of two or three.
 
 {table}

@@ -16,12 +16,12 @@ examples), `make soak` the numbers in the table. A failure becomes a file that e
 - **Mutants of manifests** (`tests/mutate`): changes one file of the shipped robots, missions and parts up to three
   times: bytes, lines, keys, values, branches of the tree. Each mutant must either be refused, in every format and with
   places that lie in its texts, or be a robot. Its plan, written and read again, must then be the same plan.
-- **Random expressions** (`tests/properties`): none may raise an undeclared exception, reach into an object or the system,
-  give a value beyond the limits, or take half a second; each batch has 200 MB.
+- **Random expressions** (`tests/properties`): none may raise an undeclared exception, reach into an object or the
+  system, give a value beyond the limits, or take half a second; each batch has 200 MB.
 - **Hostile manifests** (`tests/hostile`): written to take time or memory, to read what they may not, or to write to the
   terminal. Each must be refused with a place, within 2 s (times 3 for slow machines) and 200 MB.
-- **Storms over simulated robots** (`tests/simulated_faults`): runs the patrol robot with its real conductor and processes,
-  in virtual time, over a network that delays, loses, duplicates and reorders. Processes are killed and hang, links
+- **Storms over simulated robots** (`tests/simulated_faults`): runs the patrol robot with its real conductor and
+  processes, in virtual time, over a network that delays, loses, duplicates and reorders. Processes are killed and hang, links
   break, components raise, commands make no sense, people stop, release and set parameters, all from one seed.
   `rbxcompose/testing/invariants.py` defines what is safe and judges the record of the run.
 - **Disks that fail** (`tests/io`): each system call of a writer fails once, in each way that a disk can
