@@ -26,36 +26,36 @@ MADE_OF_SECTIONS: Mapping[str, str] = {
 """The types that nobody writes under `components`: the compiler makes their instances."""
 
 DIRECTIONS = {
-    "in": "reads",
-    "out": "writes",
+    "in": "subscribes",
+    "out": "publishes",
     "serves": "serves",
     "calls": "calls",
     "serves_action": "skill",
     "serves_topic": "skill",
-    "calls_action": "uses",
+    "calls_action": "sends goals",
     "looks": "looks up",
 }
 QOS = {
-    Qos.COMMAND: "only the newest counts; rather dropped than late",
-    Qos.STATE: "the newest counts, a few are kept",
-    Qos.LATCHED: "the last one is kept for who comes later",
-    Qos.EVENT: "none may be lost",
+    Qos.COMMAND: "only the newest message counts; dropped rather than late",
+    Qos.STATE: "the newest message counts, a few are kept",
+    Qos.LATCHED: "the last message is kept for late subscribers",
+    Qos.EVENT: "no message may be lost",
     Qos.BULK: "large, with the lowest priority",
 }
 PORTS = """## Ports
-**writes** and **reads** are messages on a topic, **serves** and **calls** a service, **skill** an action or a topic of
-orders that missions may use, **uses** an action of somebody else, **looks up** a pose among the frames. Ports of one
-topic and type are connected; `connect` gives a port another topic. A skill that *claims* something has it for itself
-while it runs.
+A port **publishes** on a topic or **subscribes** to one, **serves** or **calls** a service, **sends goals** to an
+action of another component, or **looks up** a pose among the frames. A **skill** is an action, or a topic of orders,
+that missions may use. Ports of the same topic and type are connected; `connect` gives a port another topic. A skill
+that *claims* something has it to itself while it runs.
 
-The class of a topic (QoS) says what counts:
+The class of a topic (QoS) says what matters:
 
 """
 
 
 def whole_page() -> str:
     """Return the page."""
-    classes = PORTS + table(("class", "what counts"), [(code(qos), words) for qos, words in QOS.items()])
+    classes = PORTS + table(("class", "what matters"), [(code(qos), words) for qos, words in QOS.items()])
     return page("Components", classes, *(of_type(name) for name in sorted(PLUGINS.shipped)))
 
 
@@ -64,7 +64,7 @@ def of_type(name: str) -> str:
     cls = component_type(name)
     parts = [f"## {code(name)}\n{about(cls)}\n"]
     if name in MADE_OF_SECTIONS:
-        parts.append(f"{MADE_OF_SECTIONS[name]} It does not stand under `components`.\n")
+        parts.append(f"{MADE_OF_SECTIONS[name]} It is not listed under `components`.\n")
     else:
         parts.append(f"{facts(cls)}\n")
         parts.append(example(f"components:\n{indented(example_of(cls))}", "yaml robot"))
@@ -109,7 +109,7 @@ def remarks(port: Port[Any]) -> str:
         return ""
     words = [f"takes {', '.join(map(code, arguments))}"] if (arguments := arguments_of(port)) else []
     words += [f"claims the {port.claims}"] if port.claims else []
-    words += [] if port.restartable else ["cannot be started again"]
+    words += [] if port.restartable else ["cannot be restarted"]
     return "; ".join(words)
 
 

@@ -11,8 +11,8 @@ from rbxcompose.schema.scalars import units_of
 from rbxcompose.units import DIMENSIONS, Dimension, bare_number_help, example
 
 UNITS = """## Types and units
-A quantity is a number with a unit. The first unit of a row is the one that a bare number counts in; where the row says
-*must have its unit*, a bare number is a mistake. These are the types of arguments and inputs, too.
+A quantity is a number with a unit. A bare number is in the first unit of its row; where the row says
+*must have its unit*, a bare number is an error. Arguments and inputs have these types, too.
 
 """
 OTHER_TYPES = {
@@ -20,10 +20,10 @@ OTHER_TYPES = {
     "text": "text; in an expression it has quotes",
     "flag": "`true` or `false`",
     "place": "the name of a place",
-    "pose": "a place, or a pose that comes while the robot runs",
+    "pose": "a place, or a pose that arrives while the robot runs",
     "list": "several values in order: `[1, 2]`",
     "map": "values by name",
-    "choice": "one of some words, told by `choices`",
+    "choice": "one of the words in `choices`",
 }
 OPERANDS = """## Operands
 | written | is |
@@ -64,7 +64,7 @@ def of_dimension(dimension: Dimension) -> tuple[str, str, str]:
 def operators() -> str:
     """Return the operators."""
     rows = [(" ".join(map(code, one.symbols)), one.about, code(one.example)) for one in OPERATORS]
-    return "## Operators\nFrom the one that binds weakest to the one that binds strongest.\n\n" + table(
+    return "## Operators\nFrom weakest to strongest binding.\n\n" + table(
         ("operators", "what they give", "example"), rows
     )
 

@@ -8,8 +8,8 @@ from rbxcompose.pages import all_kinds, family_of, markdown_of, title_of
 
 INTRODUCTION = """# Findings
 
-What `rbxcompose check` may say, by code. `rbxcompose explain CODE` shows the same pages without a network.
-Those marked *fix* are cured by `rbxcompose check --fix`, where the cure is certain.
+What `rbxcompose check` may report, by code. `rbxcompose explain CODE` shows the same pages without a network.
+`rbxcompose check --fix` corrects those marked *fix* where the correction is certain.
 """
 
 

@@ -30,11 +30,11 @@ A node is a word (a skill without arguments), a list (a `sequence`), or a map wi
 options and [modifiers](#modifiers). Any node may have a `name`. Each ends in success, in failure, or skipped.
 """
 SKILLS = """## Skills
-Every action of a component of the robot is a skill, named after the last word of its topic. Those of the types that
-ship; the first argument is the one that a single value is.
+Every action of a component of the robot is a skill, named after the last word of its topic. These are the
+skills of the shipped types; a single value is the first argument.
 
 """
-ORDER = "## Modifiers\nAny node may have them. They work from the outside in, in this order:"
+ORDER = "## Modifiers\nAny node may have modifiers. They apply from the outside in, in this order:"
 _HEAD = ("key", "takes", "what it is")
 
 
@@ -158,7 +158,7 @@ def whole_page() -> str:
 def described(properties: Mapping[str, Schema], required: list[str]) -> str:
     """Return a table of keys with what they are for."""
     rows = [(code(key), "yes" if key in required else "", one["description"]) for key, one in properties.items()]
-    return table(("key", "must be there", "what it is"), rows)
+    return table(("key", "required", "what it is"), rows)
 
 
 def of_kind(kind: Kind) -> str:
@@ -177,7 +177,7 @@ def of_kind(kind: Kind) -> str:
 
 def takes(told: Told, key: str) -> str:
     """Return what a key takes, and whether it may be missing."""
-    return told.words[key] + ("; may be missing" if key in told.optional and key != told.key else "")
+    return told.words[key] + ("; optional" if key in told.optional and key != told.key else "")
 
 
 def of_modifier(name: str) -> str:

@@ -13,8 +13,8 @@ from rbxcompose.manifest.models import ComponentOptions, Header, OverlayFile, Pa
 from rbxcompose.schema.robot import SECTION_TYPES
 
 FILES: dict[str, type[Config]] = {"Robot": RobotFile, "Part": PartFile, "Overlay": OverlayFile}
-COMPONENTS = "\nBeside these, each type has settings of its own: see [components](components.md).\n"
-PROFILES = "Each profile has the sections of a robot but `profiles`; what it says is laid over the robot.\n"
+COMPONENTS = "\nEach type also has settings of its own: see [components](components.md).\n"
+PROFILES = "Each profile has the sections of a robot except `profiles`, and is laid over the robot.\n"
 
 
 def whole_page() -> str:

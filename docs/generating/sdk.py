@@ -10,7 +10,7 @@ from docs.generating.markdown import code, page, table
 from rbxcompose import sdk
 from rbxcompose.sdk import Component, Port
 
-HEAD = """All that the author of a component imports, from `rbxcompose.sdk`. How it is used is told in
+HEAD = """Everything that the author of a component imports, from `rbxcompose.sdk`. For how to use it, see
 [a component of your own](../sdk.md).
 """
 
@@ -28,7 +28,7 @@ def whole_page() -> str:
         _section("Ports", ports),
         _section("Methods of a component", methods),
         _section("The rest", others),
-        f"## Types of fields\n{fields}; besides them, all that pydantic knows.\n",
+        f"## Types of fields\n{fields}; and all types that pydantic knows.\n",
     )
 
 

@@ -105,9 +105,9 @@ def limits(field: FieldInfo, dimension: Dimension | None) -> list[str]:
 
 
 def default_of(field: FieldInfo, dimension: Dimension | None) -> str:
-    """Return the default of a field; '*must be there*' for one without."""
+    """Return the default of a field; '*required*' for one without."""
     if field.is_required():
-        return "*must be there*"
+        return "*required*"
     value = field.get_default(call_default_factory=True)
     value = value.when if isinstance(value, Restart) else value  # the word that stands for it
     return code(_shown(value, dimension)) if value not in (None, {}, (), [], "") else ""
