@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from xdist.scheduler import LoadScopeScheduling
 
 from rbxcompose.testing.golden import Golden
-from tests.side_by_side import ByFile
+from tests.side_by_side import scope_of
 from tests.soak import Soak
 
 ROOT = Path(__file__).parents[1]
@@ -20,9 +21,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--soak", action="store_true", help="try many more random examples, and keep the figures")
 
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> ByFile:
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
     """Say how tests are given to the workers of `pytest -n`."""
-    return ByFile(config, log)
+    scheduling = LoadScopeScheduling(config, log)
+    scheduling._split_scope = scope_of
+    return scheduling
 
 
 @pytest.fixture

@@ -1,8 +1,6 @@
-"""Which tests may run side by side: those of one file never do, nor do those that judge real processes by real time."""
+"""Which tests may run side by side: those of one file never do, nor do those with deadlines in real time."""
 
 from __future__ import annotations
-
-from xdist.scheduler import LoadScopeScheduling
 
 REAL_TIME = (
     "tests/exposure/",
@@ -13,12 +11,10 @@ REAL_TIME = (
     "tests/runtime/test_lifeline",
     "tests/runtime/test_real_processes",
 )
-"""Tests with deadlines in real time. One process runs them all, so that they leave each other the processors."""
+"""Tests of real processes with deadlines. One worker runs them all, so that they leave each other the processors."""
 
 
-class ByFile(LoadScopeScheduling):
-    """Gives each worker whole files, so that what a file's tests share is made once."""
-
-    def _split_scope(self, nodeid: str) -> str:
-        file = nodeid.partition("::")[0]
-        return "real time" if file.startswith(REAL_TIME) else file
+def scope_of(nodeid: str) -> str:
+    """Return the name of the tests that one worker runs together with this one, so that what they share is made once."""
+    file = nodeid.partition("::")[0]
+    return "real time" if file.startswith(REAL_TIME) else file

@@ -69,6 +69,7 @@ ABOVE = {
     "trials": "compiler components.mission diagnostics.levels executive.world manifest missions model plan.model sdk "
     "testing.bench",
 }
+CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}  # pure: no bus, thread or clock
 TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
