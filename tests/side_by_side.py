@@ -15,6 +15,6 @@ REAL_TIME = (
 
 
 def scope_of(nodeid: str) -> str:
-    """Return the name of the tests that one worker runs together with this one, so that what they share is made once."""
+    """Return what one worker runs together: tests of one file share what is costly to make."""
     file = nodeid.partition("::")[0]
     return "real time" if file.startswith(REAL_TIME) else file
