@@ -29,7 +29,7 @@ soak: $(VENV)/.test  ## Try many more random manifests and expressions, and fuzz
 bench: $(VENV)/.test  ## Measure, beside peers where they are installed, and write docs/benchmarks.md
 	$(BIN)/python -m benchmarks.run
 
-docs: $(VENV)/.test  ## Write the generated pages and the picture of docs/, and schemas/, anew
+docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the picture of docs/
 	$(BIN)/python -m docs.generate
 	$(BIN)/python -m benchmarks.misconfig --write
 	$(BIN)/python docs/draw_patrol.py

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -132,3 +133,9 @@ def test_the_table_has_no_circle() -> None:
 def test_types_are_rarely_imported_for_the_type_checker_alone() -> None:
     blocks = sum(path.read_text(encoding="utf-8").count("\nif TYPE_CHECKING:") for path in files())
     assert blocks <= TYPE_CHECKING_BLOCKS
+
+
+def test_the_page_for_contributors_tells_the_home_of_every_core() -> None:
+    page = (PACKAGE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    table = page.partition("| package | decides |")[2].partition("\n\n")[0]
+    assert set(re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)) == CORES
