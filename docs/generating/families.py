@@ -10,7 +10,7 @@ import rbxcompose
 from docs.generating.markdown import table
 from rbxcompose.pages import FAMILIES
 
-_DECLARED = re.compile(r"(?:kind|check)\(\s*\"(RBX\d{4})\"")
+_DECLARED = re.compile(r"\w\(\s*\"(RBX\d{4})\"")
 
 
 def families() -> str:
