@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 ROBOT ?= robots/turtlebot/robot.yaml
+PYTEST ?= -n auto
 
 .PHONY: up test lint types unit soak bench docs messages lock clean
 
@@ -18,8 +19,8 @@ lint: $(VENV)/.test
 types: $(VENV)/.test
 	$(BIN)/mypy
 
-unit: $(VENV)/.test
-	$(BIN)/python -m pytest -q
+unit: $(VENV)/.test  ## On all cores; `make unit PYTEST="-n 0 tests/bus"` runs some tests in one process
+	$(BIN)/python -m pytest -q $(PYTEST)
 
 soak: $(VENV)/.test  ## Try many more random manifests and expressions, and fuzz if atheris is installed
 	$(BIN)/python -m pytest -q --soak tests/mutate tests/properties tests/hostile tests/fuzz tests/simulated_faults tests/io tests/net tests/exposure tests/faults
@@ -28,7 +29,7 @@ soak: $(VENV)/.test  ## Try many more random manifests and expressions, and fuzz
 bench: $(VENV)/.test  ## Measure, beside peers where they are installed, and write docs/benchmarks.md
 	$(BIN)/python -m benchmarks.run
 
-docs: $(VENV)/.test  ## Write the generated pages and the picture of docs/, and schemas/, anew
+docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the picture of docs/
 	$(BIN)/python -m docs.generate
 	$(BIN)/python -m benchmarks.misconfig --write
 	$(BIN)/python docs/draw_patrol.py

@@ -1,13 +1,14 @@
-"""Writes the generated pages of the documentation: findings and reference, from models, registries and docstrings.
+"""Writes what is generated in the documentation, from models, registries and docstrings.
 
-Run it with `make docs`; a test fails when a page is out of date.
+Whole pages: findings and reference. In pages that people write: tables between two comments. Run it with `make docs`; a
+test fails when a page is out of date.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from docs.generating import commands, components, expressions, findings, missions, robot, sdk
+from docs.generating import commands, components, expressions, findings, missions, robot, sdk, tables
 
 DOCS = Path(__file__).parent
 FOLDERS = ("findings", "reference")  # in them is nothing else
@@ -26,12 +27,14 @@ def pages() -> dict[str, str]:
     return {
         **{f"findings/{name}": text for name, text in findings.pages().items()},
         **{f"reference/{name}.md": text for name, text in reference.items()},
+        **{name: tables.filled((DOCS / name).read_text(encoding="utf-8")) for name in tables.PAGES},
     }
 
 
 def written() -> dict[str, str]:
     """Return the path below `docs/` -> text of the pages that are there."""
-    there = (page for folder in FOLDERS for page in (DOCS / folder).glob("*.md"))
+    whole = (page for folder in FOLDERS for page in (DOCS / folder).glob("*.md"))
+    there = [*whole, *(DOCS / name for name in tables.PAGES)]
     return {page.relative_to(DOCS).as_posix(): page.read_text(encoding="utf-8") for page in there}
 
 

@@ -18,8 +18,6 @@ FAMILIES = {
     "12": "filling in",
     "13": "files and composition",
     "20": "body",
-    "21": "body",
-    "22": "claims",
     "30": "wiring",
     "31": "muxes",
     "35": "rates and units",

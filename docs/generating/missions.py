@@ -163,8 +163,7 @@ def described(properties: Mapping[str, Schema], required: list[str]) -> str:
 
 def of_kind(kind: Kind) -> str:
     """Return what is known of a kind: what it does, its keys, an example."""
-    told = Told(kind.name)
-    kind.task.read(told)
+    told = told_by(kind)
     rows = [(code(key), takes(told, key), kind.options.get(key, "")) for key in told.words]
     return "\n".join(
         [
@@ -173,6 +172,13 @@ def of_kind(kind: Kind) -> str:
             example(example_of(kind.task), "yaml mission"),
         ]
     )
+
+
+def told_by(kind: Kind) -> Told:
+    """Return what each key of a kind takes."""
+    told = Told(kind.name)
+    kind.task.read(told)
+    return told
 
 
 def takes(told: Told, key: str) -> str:

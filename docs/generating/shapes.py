@@ -54,6 +54,16 @@ def keys_table(model: type[Config]) -> str:
     return table(("key", "takes", "default", "what it is"), rows)
 
 
+def with_default(model: type[Config]) -> list[str]:
+    """Return the keys of a model, each with its default in brackets if it has one."""
+    hints = get_type_hints(model, include_extras=True)
+    fields = (
+        (field.alias or name, default_of(field, dimension_of(hints[name])))
+        for name, field in model.model_fields.items()
+    )
+    return [f"{code(key)} ({default})" if default else code(key) for key, default in fields]
+
+
 def _row(key: str, field: FieldInfo, hint: object) -> tuple[str, str, str, str]:
     takes = ", ".join([takes_of(hint), *limits(field, dimension_of(hint))])
     return code(key), takes, default_of(field, dimension_of(hint)), field.description or ""

@@ -30,7 +30,7 @@ MOST_PLACES = 20
 
 _SPEED = 0.3  # [m/s] of the template
 _USED = ("battery", "place", "pose", "low", "go_to", "recharge")  # by the robot and its mission
-_WORDS = ("and", "or", "not", "in", "do", "else", "then")
+_WORDS = ("and", "or", "not", "in", "is", "lambda", "do", "else", "then")
 _BASE_SETTINGS = {"max_speed": "0.5 m/s", "max_turn_rate": "90 deg/s", "command_timeout": "0.5 s"}
 
 

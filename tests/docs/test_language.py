@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 import re
 
 import pytest
 
-from docs.generating.components import MADE_OF_SECTIONS
-from rbxcompose.cli.main import load, verbs
 from rbxcompose.config import Config
 from rbxcompose.expressions.functions import FUNCTIONS
 from rbxcompose.expressions.types import TYPES
@@ -31,8 +28,6 @@ from rbxcompose.missions.header import INPUT_KEYS
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program import AFTERWARDS
 from rbxcompose.missions.reading import INTERRUPT_KEYS, KEYS
-from rbxcompose.missions.registry import kinds
-from rbxcompose.sdk.registry import PLUGINS, component_type
 from rbxcompose.units import UNITS
 from tests.docs.examples import ROOT
 
@@ -67,17 +62,6 @@ def test_it_has_every_option_of_components() -> None:
     assert all(row(option) for option in ComponentOptions.model_fields)
 
 
-@pytest.mark.parametrize("name", sorted(PLUGINS.shipped - MADE_OF_SECTIONS.keys()))
-def test_it_has_every_component_type_with_its_settings(name: str) -> None:
-    settings = component_type(name).config_type().model_fields
-    assert [setting for setting in settings if f"`{setting}`" not in row(name)] == []
-
-
-@pytest.mark.parametrize("name", sorted(kinds()))
-def test_it_has_every_kind_of_node_with_its_options(name: str) -> None:
-    assert [option for option in kinds()[name].options if f"`{option}" not in row(name)] == []
-
-
 def test_it_has_the_modifiers_in_their_order() -> None:
     first = [cells[0].strip("`") for cells in ROWS]
     places = [first.index(name) for name in modifiers()]
@@ -86,11 +70,3 @@ def test_it_has_the_modifiers_in_their_order() -> None:
 
 def test_it_has_every_key_of_a_mission() -> None:
     assert {*KEYS, *INTERRUPT_KEYS, *INPUT_KEYS, *AFTERWARDS} - WORDS == set()
-
-
-@pytest.mark.parametrize("verb", verbs())
-def test_it_has_every_command_with_its_options(verb: str) -> None:
-    parser = argparse.ArgumentParser(verb)
-    load(verb).add_arguments(parser)
-    options = re.findall(r"--[a-z]+", parser.format_help())
-    assert [option for option in {*options} - {"--help"} if option not in row(verb)] == []

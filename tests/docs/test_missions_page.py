@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.cli import main as command
-from rbxcompose.missions.registry import kinds
 from rbxcompose.testing import check_file, run_robot
 from tests.docs.examples import ROOT, Block, blocks_of
 
@@ -111,13 +110,6 @@ def test_every_block_of_the_page_is_one_that_the_walk_knows() -> None:
     assert {block.language for block in BLOCKS} == {"sh", "text", "yaml"}
     manifests = [block for block in BLOCKS if block.language == "yaml"]
     assert [str(block) for block in manifests if len(block.words) < 2] == []
-
-
-def test_every_kind_of_step_has_its_line() -> None:
-    table = TEXT.partition("## 12.")[2]
-    told = {name for row in re.findall(r"^\| (.*?) \|", table, re.MULTILINE) for name in re.findall(r"`(\w+)`", row)}
-    assert set(kinds()) <= told
-    assert told - set(kinds()) == {"go_to", "recharge", "say"}
 
 
 def test_the_whole_mission_is_told_line_by_line() -> None:

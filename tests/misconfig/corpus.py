@@ -20,6 +20,7 @@ import yaml
 
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import Finding
+from rbxcompose.pages import all_kinds, title_of
 
 HERE = Path(__file__).parent
 EXPECT = re.compile(r"# expect(-next)?: ([A-Z0-9, ]+)$")
@@ -93,10 +94,31 @@ def cases() -> list[Case]:
     return [*wrong, *right]
 
 
-def kinds() -> dict[str, str]:
-    """Return what each kind of wrong robot is about."""
+def described() -> dict[str, str]:
+    """Return what those kinds of wrong robots are about that have words of their own."""
     read: dict[str, str] = yaml.safe_load((HERE / "kinds.yaml").read_text(encoding="utf-8"))
     return read
+
+
+def kinds() -> dict[str, str]:
+    """Return what each kind of wrong robot is about: its own words, or the title of the only code that it expects.
+
+    Raises:
+        ValueError: if it has neither.
+    """
+    words, pages = described(), all_kinds()
+    codes: dict[str, set[str]] = {case.kind: set() for case in cases() if case.kind}
+    for case in cases():
+        if case.kind:
+            codes[case.kind] |= {code for _, _, code in case.expected}
+    for kind in codes.keys() - words.keys():
+        if len(codes[kind]) != 1:
+            raise ValueError(f"'{kind}' expects {len(codes[kind])} codes: say in kinds.yaml what it is about")
+    return {kind: words.get(kind) or _in_a_cell(title_of(pages[min(codes[kind])])) for kind in codes}
+
+
+def _in_a_cell(title: str) -> str:
+    return title if title[1:2].isupper() else f"{title[:1].lower()}{title[1:]}"
 
 
 def _case(path: Path, kind: str) -> Case:

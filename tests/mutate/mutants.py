@@ -35,8 +35,9 @@ class Mutant:
 
 
 def originals() -> dict[str, bytes]:
-    """Return the manifests that ship, by path; parts are taken from the project, so that they can be changed too."""
-    paths = [path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.yaml"))]
+    """Return the manifests of robots that ship, by path; parts are taken from the project, so that they change too."""
+    found = (path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.yaml")))
+    paths = [path for path in found if not path.name.endswith(".test.yaml")]
     return {
         str(path.relative_to(ROOT)): path.read_bytes().replace(
             b"rbx:parts/", b"../" * (len(path.relative_to(ROOT).parts) - 1) + b"parts/"

@@ -47,6 +47,12 @@ class Project:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
         self.robots = [name for name in self.files if name.endswith("robot.yaml")]
+        self.read: dict[str, set[str]] = {name: self.read_by(name) for name in self.robots}
+
+    def read_by(self, robot: str) -> set[str]:
+        """Return the files that a robot is made of, itself included."""
+        sources = compile_robot(str(self.folder / robot), environment={}).sources
+        return {str(Path(source).relative_to(self.folder)) for source in sources}
 
     def judge(self, changed: dict[str, bytes]) -> list[Compilation]:
         """Compile every robot that the change may concern.
@@ -57,8 +63,7 @@ class Project:
         for name, data in changed.items():
             (self.folder / name).write_bytes(data)
         try:
-            mine = [robot for robot in self.robots if robot in changed] or self.robots
-            return [self.compile(robot) for robot in mine]
+            return [self.compile(robot) for robot, files in self.read.items() if not files.isdisjoint(changed)]
         finally:
             for name in changed:
                 (self.folder / name).write_bytes(self.files[name])

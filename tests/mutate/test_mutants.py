@@ -15,12 +15,21 @@ from tests.mutate.project import Found, Project
 from tests.soak import Soak
 
 FOUND = Path(__file__).parent / "found"
-QUICK, MANY = 500, 20_000
+QUICK, MANY = 200, 20_000
 
 
 def try_seeds(seeds: range) -> Found:
     with TemporaryDirectory() as folder:
         return Project(Path(folder)).try_all(seeds)
+
+
+def try_on_all_cores(count: int) -> Found:
+    found, cores = Found(), os.cpu_count() or 1
+    # Fresh processes: this one may have threads, with which it must not fork.
+    with ProcessPoolExecutor(cores, mp_context=get_context("spawn")) as pool:
+        for part in pool.map(try_seeds, [range(first, count, cores) for first in range(cores)]):
+            found.add(part)
+    return found
 
 
 def keep(found: Found) -> None:
@@ -34,12 +43,7 @@ def keep(found: Found) -> None:
 @pytest.mark.timeout(0)
 def test_a_mutant_is_refused_with_a_place_or_is_a_robot(soak: Soak) -> None:
     count = soak.examples(QUICK, MANY)
-    found = Found()
-    cores = os.cpu_count() or 1
-    # Processes that are made anew: this one may have threads, with which it must not fork.
-    with ProcessPoolExecutor(cores, mp_context=get_context("spawn")) as pool:
-        for part in pool.map(try_seeds, [range(first, count, cores) for first in range(cores)]):
-            found.add(part)
+    found = try_on_all_cores(count) if soak.is_on else try_seeds(range(count))
     keep(found)
     soak.tell(
         "mutants of manifests", found.examples, len(found.failures), f"{found.refused:,} refused, the rest robots"

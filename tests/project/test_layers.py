@@ -3,66 +3,79 @@
 from __future__ import annotations
 
 import ast
+import re
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rbxcompose"
 
-# Each part may import those before it in its row, the rows of BASE, and itself.
-BASE = {
-    "units",
-    "expressions",
-    "findings",
-    "formats",
-    "clock",
-    "config",
-    "edits",
-    "geometry",
-    "msgs",
-    "plain",
-    "plugins",
-    "qos",
-    "replacing",
-    "restarts",
-    "rules",
-    "scheduler",
+# What everything else may import, each with what it imports itself.
+GROUND = {
+    "clock": "",
+    "config": "units",
+    "edits": "findings",
+    "expressions": "findings units",
+    "findings": "",
+    "formats": "findings plugins",
+    "geometry": "",
+    "msgs": "findings",
+    "plain": "",
+    "plugins": "findings plain",
+    "qos": "",
+    "replacing": "",
+    "restarts": "config",
+    "rules": "findings",
+    "scheduler": "",
+    "units": "findings",
 }
-CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}
-MAY_IMPORT: dict[str, set[str]] = {
-    **dict.fromkeys(BASE, BASE),
-    **{core: BASE | {core} for core in CORES},
-    "missions": BASE | {"missions", "manifest.brackets", "manifest.scalars", "manifest.tree", "diagnostics.levels"},
-    "sim": BASE | {"sim", "diagnostics.levels"},
-    "sdk": BASE | {"sdk", "diagnostics.levels"},
-    "skills": BASE | {"sdk"},
-    "executive": BASE | CORES | {"executive", "sdk"},
-    "components": BASE | CORES | {"executive", "sdk"},
-    "bus": BASE | {"bus", "sdk.bound"},
-    "manifest": BASE | {"manifest", "sdk"},
-    "recording": BASE
-    | {
-        "recording",
-        "bus.attachment",
-        "bus.classes",
-        "bus.names",
-        "bus.tokens",
-        "bus.transport",
-        "bus.witness",
-    },
-    "rendering": BASE | {"rendering"},
-    "model": BASE | CORES | {"model", "manifest", "sdk"},
-    "checking": BASE | {"missions", "model"},
-    "checks": BASE | CORES | {"checks", "checking", "model", "manifest", "sdk"},
-    "plan": BASE | CORES | {"plan", "model", "manifest.shapes", "manifest.tree", "manifest.validate", "sdk"},
-    "scaffold": BASE | {"missions", "scaffold", "manifest.files", "sdk"},
-    "seeing": BASE | CORES | {"seeing", "plan", "model", "manifest", "schema", "sdk", "bus.names", "bus.wire"},
-    "schema": BASE | {"missions", "schema", "manifest", "sdk"},
+# What the others import beside the ground and themselves. A row may be that of a package, a module or what lies deeper.
+ABOVE = {
+    "__main__": "cli.main",
+    "body": "",
+    "bus": "sdk.bound",
+    "checking": "missions.checking model.robot",
+    "checks": "checking diagnostics.core manifest missions model sdk",
+    "cli": "body.transforms bus compiler diagnostics.levels doctor lsp.server manifest missions model.robot pages "
+    "params plan recording rendering runtime scaffold schema.documents sdk seeing trials",
+    "cli.common": "bus cli.main compiler diagnostics.levels executive.words manifest missions model plan recording "
+    "rendering rerun runtime scaffold sdk seeing trials.exploring",
+    "compiler": "checking manifest model plan",
+    "components": "diagnostics executive missions mux.core navigation.go_to sdk sim",
+    "diagnostics": "",
+    "doctor": "bus.graph manifest model.robot runtime.folder runtime.processes sdk",
+    "executive": "diagnostics.levels missions sdk",
+    "lsp": "compiler manifest missions model.robot schema",
+    "manifest": "sdk",
+    "missions": "diagnostics.levels manifest.brackets manifest.scalars manifest.tree",
+    "model": "diagnostics.levels manifest missions sdk",
+    "mux": "",
+    "navigation": "",
+    "pages": "checking missions.checking",
+    "params": "",
+    "plan": "diagnostics.levels manifest.shapes manifest.tree manifest.validate missions model sdk",
+    "recording": "bus.attachment bus.classes bus.names bus.tokens bus.transport bus.witness",
+    "rendering": "",
+    "rerun": "bus diagnostics.levels plan.model recording runtime.host runtime.records sdk",
+    "runtime": "body.transforms bus diagnostics.levels missions.sources params plan recording sdk",
+    "scaffold": "manifest.files missions sdk",
+    "schema": "manifest missions sdk",
+    "sdk": "diagnostics.levels",
+    "seeing": "bus.names bus.wire diagnostics.levels manifest missions model plan schema sdk",
+    "sim": "diagnostics.levels",
+    "skills": "sdk",
+    "testing": "bus compiler components diagnostics.levels model.wiring plan.model recording.message rendering.text "
+    "runtime.host runtime.records sdk",
+    "trials": "compiler components.mission diagnostics.levels executive.world manifest missions model plan.model sdk "
+    "testing.bench",
 }
-
-
-def part_of(module: str) -> str:
-    return module.split(".")[1] if "." in module else ""
+CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}  # pure: no bus, thread or clock
+TABLE = {
+    **{name: frozenset(row.split()) for name, row in GROUND.items()},
+    **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
+}
+TYPE_CHECKING_BLOCKS = 49
 
 
 def imports(path: Path) -> set[str]:
@@ -72,47 +85,57 @@ def imports(path: Path) -> set[str]:
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    return {name for name in found if name.startswith("rbxcompose.")}
+    ours = (name.removeprefix("rbxcompose.") for name in found if name.startswith("rbxcompose."))
+    return {name for name in ours if not name.startswith("__")}
 
 
 def files() -> list[Path]:
     return sorted(PACKAGE.rglob("*.py"))
 
 
-def allowed(name: str, permitted: set[str]) -> bool:
-    path = name.removeprefix("rbxcompose.")
-    return any(path == one or path.startswith(f"{one}.") or one.startswith(f"{path}.") for one in permitted)
+def module_of(path: Path) -> str:
+    return ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+
+
+def row_of(module: str) -> str | None:
+    """Return the row that a module belongs to: that of its deepest part that has one."""
+    parts = module.split(".")
+    names = (".".join(parts[:length]) for length in range(len(parts), 0, -1))
+    return next((name for name in names if name in TABLE), None)
+
+
+def is_within(name: str, permitted: str) -> bool:
+    return f"{name}.".startswith(f"{permitted}.") or permitted.startswith(f"{name}.")
 
 
 @pytest.mark.parametrize("path", files(), ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_a_module_imports_only_from_the_layers_below_it(path: Path) -> None:
-    part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-    if part not in MAY_IMPORT:
-        return  # the upper layers may import everything; what they are is tested below
-    wrong = {name for name in imports(path) if not allowed(name, MAY_IMPORT[part] | {part})}
+    if path == PACKAGE / "__init__.py":
+        assert imports(path) == set()
+        return
+    row = row_of(module_of(path))
+    assert row, "it has no row in the table above"
+    wrong = {name for name in imports(path) if not any(is_within(name, one) for one in (row, *TABLE[row]))}
     assert wrong == set()
 
 
-def test_every_part_has_its_place() -> None:
-    upper = {
-        "compiler",
-        "doctor",
-        "pages",
-        "rerun",
-        "runtime",
-        "cli",
-        "lsp",
-        "testing",
-        "trials",
-        "__init__",
-        "__main__",
-    }
-    parts = {path.name.removesuffix(".py") for path in PACKAGE.iterdir() if path.suffix == ".py" or path.is_dir()}
-    parts -= {"__pycache__", "py.typed"}
-    assert parts - set(MAY_IMPORT) - upper == set()
+def test_no_row_is_left_of_what_is_gone() -> None:
+    modules = {module_of(path).removesuffix(".__init__") for path in files()}
+    named = {*TABLE, *(name for row in TABLE.values() for name in row)}
+    assert named - modules == set()
 
 
-def test_only_the_command_line_imports_the_command_line() -> None:
-    others = [path for path in files() if "cli" not in path.relative_to(PACKAGE).parts]
-    importing = {path for path in others if any(name.startswith("rbxcompose.cli") for name in imports(path))}
-    assert importing <= {PACKAGE / "__main__.py"}
+def test_the_table_has_no_circle() -> None:
+    tops = {name: {one.partition(".")[0] for one in row} for name, row in TABLE.items() if "." not in name}
+    TopologicalSorter({name: row - {name} for name, row in tops.items()}).prepare()
+
+
+def test_types_are_rarely_imported_for_the_type_checker_alone() -> None:
+    blocks = sum(path.read_text(encoding="utf-8").count("\nif TYPE_CHECKING:") for path in files())
+    assert blocks <= TYPE_CHECKING_BLOCKS
+
+
+def test_the_page_for_contributors_tells_the_home_of_every_core() -> None:
+    page = (PACKAGE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    table = page.partition("| package | decides |")[2].partition("\n\n")[0]
+    assert set(re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)) == CORES

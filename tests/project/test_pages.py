@@ -7,10 +7,12 @@ import sys
 
 from docs import generate
 from docs.generating.components import MADE_OF_SECTIONS
+from docs.generating.families import declared, next_code
 from docs.generating.sections import SECTIONS
+from rbxcompose.checking import OWN
 from rbxcompose.expressions.types import TYPES
 from rbxcompose.manifest.models import Header, RobotFile
-from rbxcompose.pages import all_kinds, family_of
+from rbxcompose.pages import FAMILIES, all_kinds, family_of
 from rbxcompose.sdk.registry import PLUGINS
 
 
@@ -38,6 +40,11 @@ def test_only_types_that_ship_are_made_of_sections() -> None:
 
 def test_every_code_belongs_to_a_family() -> None:
     assert [code for code, kind in all_kinds().items() if family_of(kind) == "other"] == []
+
+
+def test_the_table_of_families_counts_every_kind_and_the_next_code_is_free() -> None:
+    assert {code for _, code in declared()} == {code for code in all_kinds() if code.startswith(OWN)}
+    assert {next_code(family) for family in FAMILIES}.isdisjoint(all_kinds())
 
 
 def test_no_kind_is_left_out_by_looking_for_declarations() -> None:

@@ -16,7 +16,8 @@ from rbxcompose.scaffold.answers import AnswerError
 from rbxcompose.scaffold.robot import DOCK, MOST_PLACES, RobotAnswers, read_places, robot_files
 from rbxcompose.testing import Checked, Golden, check_file, run_robot
 
-WORDS = ["and", "or", "not", "in", "do", "then", "else", "when", "place", "battery", "pose", "base", "dock", "low", "m"]
+WORDS = ["and", "or", "not", "in", "is", "lambda", "do", "then", "else", "when", "m"]
+WORDS += ["place", "battery", "pose", "base", "dock", "low"]
 number = st.floats(-50, 50).map(lambda x: f"{x:.2f}")
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from rbxcompose import checking
-from rbxcompose.findings import KINDS
 from rbxcompose.plugins import GROUP, Plugins
 from rbxcompose.sdk import registry
 
@@ -52,5 +51,3 @@ def see(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "_TYPES", dict(registry._TYPES))
     monkeypatch.setattr(checking, "PLUGINS", Plugins("check", "rbxcompose.checks"))
     monkeypatch.setattr(checking, "CHECKS", dict(checking.CHECKS))
-    for code in set(KINDS):
-        monkeypatch.setitem(KINDS, code, KINDS[code])

@@ -1,0 +1,101 @@
+"""The generated tables of pages that people write, each between two comments that name it."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import re
+from collections.abc import Callable, Iterator, Mapping
+
+from docs.generating.commands import parsers, written
+from docs.generating.components import MADE_OF_SECTIONS
+from docs.generating.families import families
+from docs.generating.markdown import about, code, lowered, table
+from docs.generating.missions import told_by
+from docs.generating.shapes import with_default
+from rbxcompose.missions.registry import Kind, kinds
+from rbxcompose.sdk.registry import PLUGINS, component_type
+
+PAGES = ("architecture.md", "language.md", "missions.md")
+BLOCK = re.compile(r"(<!-- made by `make docs`: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+"""Words between such comments are written by a program."""
+
+
+def filled(text: str) -> str:
+    """Return a page with its tables as they should be.
+
+    Raises:
+        KeyError: if it asks for a table that nobody makes.
+    """
+    return BLOCK.sub(lambda block: f"{block[1]}\n{TABLES[block[2]]()}\n{block[3]}", text)
+
+
+def components() -> str:
+    """Return the component types that stand under `components`, with their settings."""
+    types = {name: component_type(name) for name in sorted(PLUGINS.shipped - MADE_OF_SECTIONS.keys())}
+    rows = [(name, one, with_default(one.config_type())) for name, one in types.items()]
+    linked = [
+        (f"[{code(name)}](reference/components.md#{name})", title(one), ", ".join(keys)) for name, one, keys in rows
+    ]
+    return table(("type", "what it is", "settings (default)"), linked)
+
+
+def title(documented: object) -> str:
+    """Return the first paragraph of a docstring as words behind a colon."""
+    return lowered(about(documented).partition("\n\n")[0]).rstrip(".")
+
+
+def commands() -> str:
+    """Return every command."""
+    return table(("command", "what it does"), (row for parser in parsers() for row in leaves(parser)))
+
+
+def leaves(parser: argparse.ArgumentParser, words: str = "") -> Iterator[tuple[str, str]]:
+    """Give the row of a command, or those of the commands below it."""
+    below = [one for one in parser._actions if isinstance(one, argparse._SubParsersAction)]
+    for one in below:
+        helps = {choice.dest: choice.help or "" for choice in one._choices_actions}
+        for name, inner in one.choices.items():
+            yield from leaves(inner, helps[name])
+    if not below:
+        values = [written(one).strip("`") for one in parser._actions if not one.option_strings]
+        name = " ".join([parser.prog.partition(" ")[2], *values])
+        does = words or (parser.description or "").strip().partition("\n")[0].rstrip(".")
+        yield f"[{code(name)}](reference/commands.md#{parser.prog.replace(' ', '-')})", lowered(does)
+
+
+def nodes() -> str:
+    """Return every kind of mission node with its options."""
+    return table(("kind", "takes", "options", "what it does"), map(of_node, kinds().values()))
+
+
+def of_node(kind: Kind) -> tuple[str, str, str, str]:
+    """Return the row of a kind."""
+    told = told_by(kind)
+    options = [f"{code(key)}: {words}" for key, words in told.words.items() if key != kind.name]
+    return linked(kind), told.words.get(kind.name, ""), "; ".join(options), about(kind.task).partition("\n\n")[0]
+
+
+def steps() -> str:
+    """Return every kind of mission node in a few words."""
+    rows = [(linked(kind), few_words(kind)) for kind in kinds().values()]
+    return table(("step", "what it does"), rows)
+
+
+def linked(kind: Kind) -> str:
+    """Return the name of a kind, which leads to its reference."""
+    return f"[{code(kind.name)}](reference/missions.md#{kind.name})"
+
+
+def few_words(kind: Kind) -> str:
+    """Return what the first line of a kind's file says of it."""
+    return (inspect.getdoc(inspect.getmodule(kind.task)) or "").partition(": ")[2].partition("\n")[0].rstrip(".")
+
+
+TABLES: Mapping[str, Callable[[], str]] = {
+    "commands": commands,
+    "components": components,
+    "families": families,
+    "nodes": nodes,
+    "steps": steps,
+}

@@ -1,0 +1,20 @@
+"""Which tests may run side by side: those of one file never do, nor do those with deadlines in real time."""
+
+from __future__ import annotations
+
+REAL_TIME = (
+    "tests/exposure/",
+    "tests/faults/",
+    "tests/net/",
+    "tests/runtime/test_apply_for_real",
+    "tests/runtime/test_external_clock",
+    "tests/runtime/test_lifeline",
+    "tests/runtime/test_real_processes",
+)
+"""Tests of real processes with deadlines. One worker runs them all, so that they leave each other the processors."""
+
+
+def scope_of(nodeid: str) -> str:
+    """Return what one worker runs together: tests of one file share what is costly to make."""
+    file = nodeid.partition("::")[0]
+    return "real time" if file.startswith(REAL_TIME) else file
