@@ -85,7 +85,7 @@ class _Group:
             clock,
             bus,
             lambda record: None,
-            lambda event, data: None,
+            lambda notice: None,
             post=inbox.put,
         )
         host.configure()

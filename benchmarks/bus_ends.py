@@ -90,9 +90,7 @@ class OurEcho(Ours):
         self.bus.serve("echo", "ask", SetBool, lambda request: SetBool.Response(success=request.data))
         battery = instance("battery", "battery_sim", {"runtime": "45 s"})
         plan = Plan("bench", "bench.yaml", (battery,))
-        host = Host(
-            plan, [battery], self.scheduler, self.clock, self.bus, lambda record: None, lambda event, data: None
-        )
+        host = Host(plan, [battery], self.scheduler, self.clock, self.bus, lambda record: None, lambda notice: None)
         host.configure()
         host.activate(["battery"])
         host.start()

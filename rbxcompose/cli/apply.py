@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 1
     try:
         proposal = Proposal.of(compilation.plan, compilation.robot)
-        tell(json.dumps(proposal.found) if arguments.json else proposal.text())
+        tell(json.dumps(proposal.data) if arguments.json else proposal.text())
         return _carry_out(proposal, arguments)
     except NotDoneError as error:
         return refuse(error.finding)

@@ -73,7 +73,7 @@ def rerun(
     stage = Stage(scheduler, services.is_served)
     tape = Tape(clock, lambda topic: None, sent)
     bus = StageBus(scheduler, clock, alone, only.name, stage, tape)
-    host = Host(alone, [only], scheduler, clock, bus, log, lambda event, data: None)
+    host = Host(alone, [only], scheduler, clock, bus, log, lambda notice: None)
     feed = Feed(iter(records), only.name, alone.bus.domain, stage, services, aliases, comparison.expect)
     host.configure()
     feed.begin(scheduler, host)

@@ -14,9 +14,9 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.missions.sources import PAUSE
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.plan.model import Instance
+from rbxcompose.requests import Refused
 from rbxcompose.runtime.frames import Frames, Lookup
 from rbxcompose.runtime.worker import Call, Worker
-from rbxcompose.sdk.bound import Refused
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import (
     Calls,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
 from rbxcompose.config import HIDDEN, Config, Live, Secret
 from rbxcompose.plan.diff import WHOLE, Change, difference
@@ -98,26 +97,6 @@ class Changes:
         old = {one.name: one for one in self.before.instances}
         touched = (one.instance for one in self.fated if one.stops or one.starts)
         return [one.name for one in touched if is_commanding(one) or (one.name in old and is_commanding(old[one.name]))]
-
-    def data(self) -> dict[str, Any]:
-        """Return it for programs."""
-        return {
-            "robot": self.before.robot,
-            "components": [_data(one) for one in self.fated],
-            "impossible": list(self.impossible),
-        }
-
-
-def _data(one: Fated) -> dict[str, Any]:
-    reasons = [{"key": each.key, "before": each.before, "after": each.after} for each in one.reasons]
-    instance = one.instance
-    return {
-        "name": instance.name,
-        "type": instance.type,
-        "process": instance.process,
-        "fate": str(one.fate),
-        "reasons": reasons,
-    }
 
 
 def changes(before: Plan, after: Plan, failed: Collection[str] = ()) -> Changes:

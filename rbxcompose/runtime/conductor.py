@@ -8,9 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import takewhile
+from typing import Any
 
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Plan
+from rbxcompose.robot_events import MissionOver
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.blocking import blocked_by, blocked_text, is_commanding
 from rbxcompose.runtime.changes import WORLD, Changes
@@ -45,7 +47,7 @@ class Conductor:
         self.plan = plan
         self.generation = 0  # of the plan: how often it was changed
         self._changing: Changing | None = None
-        self._commands: dict[str, list[str]] = {}  # what a component is told again after its process has come back
+        self._repeated: dict[str, list[dict[str, Any]]] = {}  # what components are told again after a restart
         self._options, self._router = options, router
         self._scheduler, self._effects = scheduler, effects
         names = [*([router] if router else []), *plan.groups]
@@ -116,8 +118,8 @@ class Conductor:
             member.is_started = True
             self._effects.send(member.name, say.Start())
             again = [one.name for one in self.plan.of_group(member.name) if member.restarts]
-            for one, words in ((name, words) for name in again for words in self._commands.get(name, ())):
-                self._effects.send(member.name, say.Command(0, one, words))  # nobody waits for the answer
+            for one, request in ((name, request) for name in again for request in self._repeated.get(name, ())):
+                self._effects.send(member.name, say.Ask(0, one, request))  # nobody waits for the answer
 
     # What processes say
 
@@ -129,16 +131,24 @@ class Conductor:
             case say.Configured(endpoint):
                 self._configured(member, endpoint)
             case say.States(states):
-                self._are({one: (state, restarts) for one, (state, restarts) in states.items()})
+                self._are(states)
                 self._proceed()
-            case say.Notify(event, data):
-                self._notified(event, data)
+            case say.Failed(instance, text):
+                self._failed(instance, text)
+            case say.Repeated(instance, requests):
+                self._repeated[instance] = requests
+            case MissionOver():
+                self._mission_over(message)
+            case say.TimeIsUp():
+                self.go_down(FINE, "the time is up")
             case say.AtRest():
                 member.is_at_rest = True
                 if self._closing:
                     self._closing.close_when_at_rest()
-            case say.Answer(number, text, is_refused):
-                self._effects.answer(number, text, is_refused=is_refused)
+            case say.Answered(number, answer):
+                self._effects.answer(number, answer)
+            case say.Refusal(number, reason):
+                self._effects.refuse(number, reason)
             case say.Summary(time, facts):
                 self.time = max(self.time, time)
                 self.facts.update(facts)
@@ -165,25 +175,12 @@ class Conductor:
                     self._effects.send(group, say.Configure(endpoint))
         self._proceed()
 
-    def _notified(self, event: str, data: Mapping[str, object]) -> None:
-        match event:
-            case "state":
-                self._are({str(data["instance"]): (str(data["state"]), int(str(data["restarts"])))})
-                self._proceed()
-            case "failed":
-                self._failed(str(data["instance"]), str(data["message"]))
-            case "commands":
-                self._commands[str(data["instance"])] = str(data["commands"]).splitlines()
-            case "mission_ended":
-                self._mission_ended(str(data["mission"]), str(data["outcome"]), str(data["message"]))
-            case "time_is_up":
-                self.go_down(FINE, "the time is up")
-
-    def _mission_ended(self, mission: str, outcome: str, message: str) -> None:
-        if self._options.is_detached or mission != self.plan.start:
+    def _mission_over(self, over: MissionOver) -> None:
+        if self._options.is_detached or over.mission != self.plan.start:
             return
-        because = f": {message}" if message else ""
-        self.go_down(FINE if outcome == "success" else MISSION_FAILED, f"mission {mission}: {outcome}{because}")
+        because = f": {over.message}" if over.message else ""
+        exit_code = FINE if over.outcome == "success" else MISSION_FAILED
+        self.go_down(exit_code, f"mission {over.mission}: {over.outcome}{because}")
 
     # Faults
 

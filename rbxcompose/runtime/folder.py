@@ -9,11 +9,12 @@ import os
 import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from rbxcompose.replacing import TEMPORARY, replace_file
 from rbxcompose.runtime.processes import Process, boot_id
+from rbxcompose.typed_json import UnreadableError, from_data, to_data
 
 STATE, LOCK, SOCKET = "state.json", "lock", "control.sock"
 _VERSION = 1
@@ -62,7 +63,7 @@ class State:
 
     def to_text(self) -> str:
         """Return the text of the state file: a checksum, then JSON."""
-        body = json.dumps({"version": _VERSION, **asdict(self)})
+        body = json.dumps({"version": _VERSION, **to_data(self)})
         return f"{_checksum(body)}\n{body}"
 
     @classmethod
@@ -78,10 +79,11 @@ class State:
         fields = json.loads(body)
         if fields.pop("version") != _VERSION:
             raise BrokenStateError("another version of rbxcompose wrote it")
-        fields["supervisor"] = Process(**fields["supervisor"])
-        fields["processes"] = {name: Process(**one) for name, one in fields["processes"].items()}
-        fields["components"] = tuple(ComponentState(**one) for one in fields["components"])
-        return cls(**fields)
+        try:
+            state: State = from_data(cls, fields)
+        except UnreadableError as error:
+            raise BrokenStateError(f"another version of rbxcompose wrote it: {error}") from error
+        return state
 
     def alive(self) -> dict[str, Process]:
         """Return those of its processes that still run, by name, without the supervisor."""

@@ -8,7 +8,7 @@ import math
 import os
 import signal
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from types import FrameType
 from typing import TYPE_CHECKING
 
@@ -20,18 +20,20 @@ from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.plan.dump import load
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
+from rbxcompose.requests import Command, Refused
+from rbxcompose.robot_events import MissionOver, MissionWaits
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.capture import Capture, take_printed
 from rbxcompose.runtime.connection import open_bus
 from rbxcompose.runtime.driver import Driver, ExternalDriver, RealTimeDriver, SteppedDriver
-from rbxcompose.runtime.host import Host
+from rbxcompose.runtime.host import Host, Notice
 from rbxcompose.runtime.inbox import Inbox
 from rbxcompose.runtime.lifeline import Lifeline
 from rbxcompose.runtime.log import LogFile
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
-from rbxcompose.sdk.bound import Refused
+from rbxcompose.typed_json import to_data
 
 if TYPE_CHECKING:
     from rbxcompose.runtime.taping import Taping
@@ -105,8 +107,8 @@ class Group:
 
     def handle(self, message: say.Message) -> None:
         """Carry out a message from the supervisor."""
-        if isinstance(message, say.Stop | say.Release | say.Command):
-            self._mind_outside(message)
+        if isinstance(message, say.Stop | say.Release):
+            self._mind_outside(type(message).__name__.lower())
         match message:
             case say.Configure(str(router), time):
                 self._configure(router, time)
@@ -122,10 +124,8 @@ class Group:
                 self._is_ending = True
             case say.Lost(names, cause):
                 self._made_host().lost(names, cause)
-            case say.Command(number, instance, verb):
-                self._answer(number, lambda host: host.command(instance, verb))
-            case say.Query(number, instance, words):
-                self._answer(number, lambda host: host.query(instance, words))
+            case say.Ask():
+                self._channel.send(self._answer(self._made_host(), message))
             case say.Adopt(plan):
                 self._plan = load(plan)
             case say.Retire() | say.Prepare() | say.Reconfigure():
@@ -163,7 +163,7 @@ class Group:
         """Look whether the run is to end, whether it has come to rest, and whether nobody leads it any more."""
         if self._time_is_up():
             self._is_ending = True
-            self._notify("time_is_up", {})
+            self._channel.send(say.TimeIsUp())
         if self._is_ending and self._rest_deadline is None and self._host is not None:
             self._brake(self._host)
         if self._rest_deadline is not None and not self._is_settled:
@@ -219,11 +219,14 @@ class Group:
         if isinstance(self._driver, SteppedDriver):
             self._driver.go(self._options.duration)
 
-    def _answer(self, number: int, ask: Callable[[Host], str]) -> None:
+    def _answer(self, host: Host, asked: say.Ask) -> say.Answered | say.Refusal:
         try:
-            self._channel.send(say.Answer(number, ask(self._made_host())))
+            request = host.request(asked.instance, asked.request)
+            if isinstance(request, Command):
+                self._mind_outside(f"{asked.instance} {request.words}")
+            return say.Answered(asked.number, to_data(host.ask(asked.instance, request)))
         except Refused as refusal:
-            self._channel.send(say.Answer(number, str(refusal), is_refused=True))
+            return say.Refusal(asked.number, str(refusal))
 
     def _change(self, host: Host, message: say.Retire | say.Prepare | say.Reconfigure) -> None:
         self._watch(LONGEST_CONFIGURE)
@@ -247,10 +250,9 @@ class Group:
             self._host.shutdown()
         self.is_over = True
 
-    def _mind_outside(self, message: say.Stop | say.Release | say.Command) -> None:
+    def _mind_outside(self, words: str) -> None:
         if self._options.is_stepped:
-            words = f"{message.instance} {message.verb}" if isinstance(message, say.Command) else ""
-            text = f"from outside: {words or type(message).__name__.lower()}; this run is not reproducible"
+            text = f"from outside: {words}; this run is not reproducible"
             self._log.write(Record(self._clock.now(), Level.WARN, "robot", text))
 
     # Coming to rest
@@ -326,13 +328,13 @@ class Group:
             raise RuntimeError("the process group has not been configured")
         return self._host
 
-    def _notify(self, event: str, data: dict[str, object]) -> None:
-        if event == "mission_waits":  # on a stepped clock nothing comes from outside: it would wait for ever
+    def _notify(self, notice: Notice) -> None:
+        if isinstance(notice, MissionWaits):  # on a stepped clock nothing comes from outside: it would wait for ever
             if self._options.is_stepped:
-                self._notify("mission_ended", {**data, "outcome": "failure"})
+                self._notify(MissionOver(notice.mission, "failure", notice.message))
             return
-        self._channel.send(say.Notify(event, data))
-        is_the_end = event == "mission_ended" and data["mission"] == self._plan.start
+        self._channel.send(notice)
+        is_the_end = isinstance(notice, MissionOver) and notice.mission == self._plan.start
         if is_the_end and self._options.is_stepped and not self._options.is_detached:
             self._is_ending = True  # here and not by a message, which would come at another instant in each run
 

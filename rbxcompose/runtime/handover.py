@@ -6,12 +6,14 @@ touches it, and what comes back is handed over as any other call.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 from rbxcompose.clock import Clock
 from rbxcompose.diagnostics.levels import Level
+from rbxcompose.requests import Command, Query
+from rbxcompose.robot_events import RobotEvent
 from rbxcompose.runtime.worker import Worker
 from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.component import Context
@@ -158,11 +160,15 @@ class HandedOver:
         """Call the component's `wake` at robot time `time` [s]."""
         self._worker.send(lambda: self._context.wake_at(time))
 
-    def notify(self, event: str, **data: object) -> None:
+    def notify(self, event: RobotEvent) -> None:
         """Tell the supervisor of something that concerns the whole robot."""
-        self._worker.send(lambda: self._context.notify(event, **data))
+        self._worker.send(lambda: self._context.notify(event))
 
-    def window(self, path: str, question: str) -> Window:
+    def repeat(self, requests: Sequence[Command]) -> None:
+        """Have the component told these again after it was restarted."""
+        self._worker.send(lambda: self._context.repeat(requests))
+
+    def window(self, path: str, question: Query[Any]) -> Window:
         """Open a window for tools outside at `path`."""
         return _Window(self._context, self._worker, path, question)
 
@@ -170,7 +176,7 @@ class HandedOver:
 class _Window:
     """A window that the scheduler's thread opens as soon as it comes to it."""
 
-    def __init__(self, context: Context, worker: Worker, path: str, question: str) -> None:
+    def __init__(self, context: Context, worker: Worker, path: str, question: Query[Any]) -> None:
         self._worker = worker
         self._window: Window | None = None
         worker.send(lambda: self._open(context, path, question))
@@ -182,7 +188,7 @@ class _Window:
     def put(self, value: object, /) -> None:
         self._worker.send(lambda: self._put(value))
 
-    def _open(self, context: Context, path: str, question: str) -> None:
+    def _open(self, context: Context, path: str, question: Query[Any]) -> None:
         self._window = context.window(path, question)
 
     def _put(self, value: object) -> None:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import Clock
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.requests import Command, Refused, Request, as_data
+from rbxcompose.robot_events import RobotEvent
+from rbxcompose.runtime.channel import Failed, Repeated, States
 from rbxcompose.runtime.deliveries import Deliveries
 from rbxcompose.runtime.faults import RestartPolicy, explain
 from rbxcompose.runtime.frames import Frames
@@ -20,18 +23,20 @@ from rbxcompose.runtime.rosout import Rosout
 from rbxcompose.runtime.statuses import Statuses
 from rbxcompose.runtime.worker import Post, Worker
 from rbxcompose.scheduler import Scheduler
-from rbxcompose.sdk.bound import Refused
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Looks
 from rbxcompose.sdk.registry import component_type
+from rbxcompose.typed_json import UnreadableError
+
+A = TypeVar("A")
 
 SLOW = 0.005  # [s] in one callback, after which diagnostics name it: meanwhile nothing else of the process runs
 
-Notify = Callable[[str, dict[str, object]], None]
+Notice = States | Failed | Repeated | RobotEvent  # what a host tells the supervisor by itself
 Told = Callable[..., None]  # takes the name of a method of the host, and words
 
 
-def _nobody(verb: str, *words: str) -> None:
+def _nobody(verb: str, *words: object) -> None:
     """Keep no record of orders."""
 
 
@@ -46,7 +51,7 @@ class Host:
         clock: Clock,
         bus: Bus,
         log: Log,
-        notify: Notify,
+        notify: Callable[[Notice], None],
         *,
         is_stopped: bool = False,
         is_restart: bool = False,
@@ -155,22 +160,28 @@ class Host:
         self._told("lost", cause, *names)
         self._each_active("lost", tuple(names), cause)
 
-    def command(self, instance: str, verb: str) -> str:
-        """Give a person's command to a component and return its answer.
+    def request(self, instance: str, data: object) -> Request[Any]:
+        """Return the request that data stand for.
+
+        Raises:
+            Refused: if the component does not take such a request, or the data cannot be read.
+        """
+        if (hosted := self.hosted.get(instance)) is None:
+            raise Refused(f"'{instance}' is not active")
+        try:
+            return component_type(hosted.instance.type).requests().from_data(data)
+        except UnreadableError as error:
+            raise Refused(f"the request cannot be read: {error}") from error
+
+    def ask(self, instance: str, request: Request[A]) -> A:
+        """Return a component's answer to a request.
 
         Raises:
             Refused: if it cannot be carried out, with the reason.
         """
-        self._told("command", instance, verb)
-        return self._idle(instance).command(verb)
-
-    def query(self, instance: str, words: str) -> str:
-        """Return a component's answer to a question, which changes nothing.
-
-        Raises:
-            Refused: if it has none, with the reason.
-        """
-        return self._idle(instance).query(words)
+        if isinstance(request, Command):
+            self._told("command", instance, as_data(request))
+        return self._idle(instance).handle(request)
 
     def _idle(self, instance: str) -> Component[Any]:
         """Return a component that can be asked now."""
@@ -274,8 +285,7 @@ class Host:
 
     def changed(self, name: str) -> None:
         """Tell the supervisor of a new state."""
-        state, restarts = self.states()[name]
-        self.notify("state", {"instance": name, "state": state, "restarts": restarts})
+        self.notify(States({name: self.states()[name]}))
 
     # Who works
 
@@ -331,7 +341,7 @@ class Host:
         """Leave a component as it is; one that failed too often, unlike one that is never restarted, ends the robot."""
         self.hosted[name].state = State.FAILED
         if self._policies[name].is_allowed:  # told first: a robot that starts would go on without what has failed
-            self.notify("failed", {"instance": name, "message": f"'{name}' failed too often: {text}"})
+            self.notify(Failed(name, f"'{name}' failed too often: {text}"))
         else:
             self.log(name, Level.WARN, "stays failed: it is never restarted")
         self.changed(name)

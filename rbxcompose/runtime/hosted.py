@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,13 +13,17 @@ from rbxcompose.clock import Clock
 from rbxcompose.config import Config
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Instance
+from rbxcompose.requests import Command, Query, Refused, as_data
+from rbxcompose.robot_events import RobotEvent
 from rbxcompose.runtime.binding import bind
+from rbxcompose.runtime.channel import Repeated
 from rbxcompose.runtime.handover import HandedOver, handed_over
 from rbxcompose.runtime.worker import Worker
-from rbxcompose.sdk.bound import Refused, Window
+from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Port, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
+from rbxcompose.typed_json import to_data
 
 if TYPE_CHECKING:
     from rbxcompose.runtime.host import Host
@@ -48,7 +52,7 @@ class Hosted:
         self.worker: Worker | None = None  # the thread of a component that may block
         self._ends: dict[str, Any] = {}  # of the ports, on the bus
         self._claiming: list[Any] = []  # those of them that serve an action which claims a part of the robot
-        self._commands: list[str] = []  # what it is told again after it was restarted in its place
+        self._repeated: Sequence[Command] = ()  # what it is told again after it was restarted in its place
         self._wakes: set[float] = set()  # robot times [s] at which the component is to be woken
 
     @property
@@ -114,8 +118,8 @@ class Hosted:
             self.do("hold", component.hold)
         if self.host.has_started:
             self.do("start", component.start)
-            for words in self._commands:
-                self.do("command", partial(self._say_again, component, words))
+            for request in self._repeated:
+                self.do("command", partial(self._repeat, component, request))
         self.host.bus.open(self.instance.name)  # who found it before it was active has waited
 
     def close(self) -> None:
@@ -237,23 +241,26 @@ class Hosted:
         self._wakes.discard(time)
         self.do("wake", self._made().wake)
 
-    def notify(self, event: str, **data: object) -> None:
+    def notify(self, event: RobotEvent) -> None:
         """Tell the supervisor of something that concerns the whole robot."""
-        if event == "commands":
-            self._commands = str(data["commands"]).splitlines()
-        self.host.notify(event, data)
+        self.host.notify(event)
 
-    def window(self, path: str, question: str) -> Window:
+    def repeat(self, requests: Sequence[Command]) -> None:
+        """Have the component told these again after it, or its process, was restarted."""
+        self._repeated = requests
+        self.host.notify(Repeated(self.instance.name, [as_data(one) for one in requests]))
+
+    def window(self, path: str, question: Query[Any]) -> Window:
         """Open a window for tools outside at `path` of the robot's own keys."""
         name = self.instance.name
         key = admin_key(self.host.plan.robot, path)
-        return self.host.bus.window(name, key, lambda: self.host.query(name, question))
+        return self.host.bus.window(name, key, lambda: to_data(self.host.ask(name, question)))
 
-    def _say_again(self, component: Component[Any], words: str) -> None:
+    def _repeat(self, component: Component[Any], request: Command) -> None:
         try:
-            component.command(words)
+            component.handle(request)
         except Refused as refusal:
-            self.log(Level.WARN, f"{words}: {refusal}")
+            self.log(Level.WARN, f"{request.words}: {refusal}")
 
 
 def _in_turn(*calls: Callable[[], None]) -> None:

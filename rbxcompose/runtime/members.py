@@ -47,8 +47,12 @@ class Effects(Protocol):
         """Keep for later what `ps` tells, which has changed."""
         ...
 
-    def answer(self, number: int, text: str, *, is_refused: bool) -> None:
-        """Answer a command."""
+    def answer(self, number: int, answer: object) -> None:
+        """Answer a request, with data."""
+        ...
+
+    def refuse(self, number: int, reason: str) -> None:
+        """Refuse a request."""
         ...
 
 

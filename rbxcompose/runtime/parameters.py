@@ -13,8 +13,8 @@ from rbxcompose.msgs.stamps import to_time
 from rbxcompose.params import core
 from rbxcompose.params.values import from_message
 from rbxcompose.qos import Qos
+from rbxcompose.requests import Refused
 from rbxcompose.runtime.hosted import Hosted
-from rbxcompose.sdk.bound import Refused
 from rbxcompose.units import format_quantity
 
 EVENTS = "/parameter_events"

@@ -79,7 +79,7 @@ class Router:
         reason = f"no port is free for the router, from {ports[0]} to {ports[-1]}"
         if endpoint is not None:
             raise OSError(reason)  # another try may find it free again
-        self._channel.send(say.Notify("failed", {"message": reason}))
+        self._channel.send(say.Failed("", reason))
 
 
 def _end(number: int, frame: FrameType | None) -> None:

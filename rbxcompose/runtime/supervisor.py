@@ -24,7 +24,7 @@ from rbxcompose.runtime.members import Phase
 from rbxcompose.runtime.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
 from rbxcompose.runtime.records import Record
-from rbxcompose.runtime.requests import Requests
+from rbxcompose.runtime.request_handler import RequestHandler
 from rbxcompose.runtime.silence import DEAD, LOOK
 from rbxcompose.scheduler import Scheduler
 
@@ -76,7 +76,7 @@ class Supervisor:
         self._selector.register(self._parent, selectors.EVENT_READ, self._hear_parent)
         self._selector.register(self._wakened, selectors.EVENT_READ, self._hear_signals)
         self._control = ControlServer(self._folder, self._selector)
-        self._control.handle = Requests(self, self._control, is_stepped=self._launch.options.is_stepped).handle
+        self._control.handle = RequestHandler(self, is_stepped=self._launch.options.is_stepped).handle
         self._write_state()
         try:
             self.conductor.begin()
@@ -176,12 +176,13 @@ class Supervisor:
         """Have the state file written at the end of this turn, once."""
         self._is_state_old = True
 
-    def answer(self, number: int, text: str, *, is_refused: bool) -> None:
-        """Answer a command."""
-        if is_refused:
-            self._control.refuse(number, text)
-        else:
-            self._control.answer(number, text)
+    def answer(self, number: int, answer: object) -> None:
+        """Answer a request, with data."""
+        self._control.answer(number, answer)
+
+    def refuse(self, number: int, reason: str) -> None:
+        """Refuse a request."""
+        self._control.refuse(number, reason)
 
     # What happens
 

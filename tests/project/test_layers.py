@@ -24,9 +24,12 @@ BASE = {
     "plugins",
     "qos",
     "replacing",
+    "requests",
     "restarts",
+    "robot_events",
     "rules",
     "scheduler",
+    "typed_json",
 }
 CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}
 MAY_IMPORT: dict[str, set[str]] = {

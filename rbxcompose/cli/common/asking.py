@@ -1,12 +1,13 @@
-"""Verbs that pass one request to a running robot and print what it answers."""
+"""Verbs that pass one command to a running robot and print what it answers."""
 
 from __future__ import annotations
 
 import argparse
 import json
 
-from rbxcompose.cli.common.robots import NotDoneError, add_robot_option, find_robot, request
+from rbxcompose.cli.common.robots import NotDoneError, add_robot_option, answer_of, find_robot
 from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.requests import Command
 
 
 def add_asking_options(parser: argparse.ArgumentParser) -> None:
@@ -15,12 +16,12 @@ def add_asking_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="answer in JSON")
 
 
-def pass_on(arguments: argparse.Namespace, fields: dict[str, object]) -> int:
-    """Send a request, print the answer, return the exit code."""
+def pass_on(arguments: argparse.Namespace, command: Command) -> int:
+    """Send a command, print the answer, return the exit code."""
     try:
         folder = find_robot(arguments.robot)
-        answer = request(folder, fields)
+        answer = answer_of(folder, command)
     except NotDoneError as error:
         return refuse(error.finding)
-    tell(json.dumps({"robot": folder.path.name, "answer": answer}) if arguments.json else str(answer))
+    tell(json.dumps({"robot": folder.path.name, "answer": answer}) if arguments.json else answer)
     return 0

@@ -11,11 +11,11 @@ from rbxcompose.cli.common.answering import misused
 from rbxcompose.cli.common.mission_files import mission_in, robot_of
 from rbxcompose.cli.common.robots import NotDoneError
 from rbxcompose.cli.common.telling import FINDINGS, tell
-from rbxcompose.executive.words import joined
+from rbxcompose.executive.requests import settings
 from rbxcompose.expressions.values import Value
 from rbxcompose.missions.inputs import bind_texts
 from rbxcompose.model.robot import Robot
-from rbxcompose.sdk.bound import Refused
+from rbxcompose.requests import Refused
 from rbxcompose.trials.exploring import Limits, text_of
 from rbxcompose.trials.exploring import explore as explore_program
 
@@ -27,7 +27,7 @@ def explore(arguments: argparse.Namespace) -> int:
         return FINDINGS
     program = mission_in(robot, arguments.name)
     try:
-        inputs = _inputs(robot, arguments.name, joined(arguments.sets))
+        inputs = _inputs(robot, arguments.name, settings(arguments.sets))
     except Refused as refusal:
         return misused("mission explore", str(refusal))
     explored = explore_program(program, robot.names, inputs, Limits(arguments.states, arguments.depth))

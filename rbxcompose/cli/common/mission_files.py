@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.cli.common.mission_watch import Ask
 from rbxcompose.cli.common.nouns import table
-from rbxcompose.cli.common.robots import NotDoneError, find_robot, known_state
+from rbxcompose.cli.common.robots import NotDoneError, answer_of, find_robot, known_state
 from rbxcompose.cli.common.telling import FINDINGS, refuse, tell, tell_report
 from rbxcompose.compiler import compile_robot
+from rbxcompose.executive.requests import ListMissions, LookAtAll
 from rbxcompose.findings import kind, suggest
 from rbxcompose.missions.mirror import joined, status_list
 from rbxcompose.missions.picture import Picture, picture_from_data, picture_of
@@ -60,10 +60,10 @@ def robot_of(path: str | None) -> Robot | None:
     return None if out.report.has_errors else out.robot
 
 
-def show(arguments: argparse.Namespace, ask: Ask) -> int:
+def show(arguments: argparse.Namespace) -> int:
     """Write the picture of a mission; without a path that of the robot that runs, with how each node stands."""
     try:
-        picture, statuses = (None if arguments.path else _live(arguments.name, ask)) or (None, ())
+        picture, statuses = (None if arguments.path else _live(arguments.name)) or (None, ())
         if picture is None:
             robot = robot_of(arguments.path)
             if robot is None:
@@ -83,11 +83,12 @@ def show(arguments: argparse.Namespace, ask: Ask) -> int:
     return 0
 
 
-def _live(name: str, ask: Ask) -> tuple[Picture, Sequence[int]] | None:
+def _live(name: str) -> tuple[Picture, Sequence[int]] | None:
     """Return the picture of a mission that has been running, and how its nodes stand or ended."""
-    if not any(one["name"] == name and one["state"] != NAMES[IDLE] for one in ask("ls")):
+    folder = find_robot(None)
+    if not any(one.name == name and one.state != NAMES[IDLE] for one in answer_of(folder, ListMissions())):
         return None
-    seen = ask(f"whole {name}")
+    seen = answer_of(folder, LookAtAll(name))
     picture = picture_from_data(seen["picture"])
     return picture, status_list(joined({}, seen), picture.count)
 

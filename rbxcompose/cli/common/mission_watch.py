@@ -8,23 +8,24 @@ import select
 import shutil
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
+from rbxcompose.cli.common.robots import answer_of
 from rbxcompose.cli.common.telling import has_colour, tell
 from rbxcompose.cli.common.terminal import full_screen, raw, show
+from rbxcompose.executive.requests import LookAtMission, ShowPicture
 from rbxcompose.expressions.text import show_value
 from rbxcompose.expressions.values import NOT_ARRIVED
 from rbxcompose.missions.mirror import ACTIVE, joined, status_list
 from rbxcompose.missions.picture import Picture, picture_from_data
 from rbxcompose.missions.snapshot import from_plain
 from rbxcompose.plain import fitted, plain
+from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.seeing.mission_text import mission_lines
 
 MOST = 5  # transitions that are shown
 _WIDTH = 120  # of a picture for no terminal
-
-Ask = Callable[[str], Any]
 
 
 def lines_of(picture: Picture, seen: Mapping[str, Any], width: int, *, colour: bool = False) -> list[str]:
@@ -46,9 +47,9 @@ def _value(value: Any) -> str:
     return show_value("", value) or "(empty)"
 
 
-def follow(ask: Ask, name: str, period: float) -> int:
+def follow(folder: RobotFolder, name: str, period: float) -> int:
     """Tell a mission as JSON until it ends, or until Ctrl-C: at first the whole, then a line with what has changed."""
-    seen = ask(f"state {name} 0")
+    seen = answer_of(folder, LookAtMission(name))
     told: Mapping[str, Any] = {}
     try:
         while True:
@@ -58,15 +59,15 @@ def follow(ask: Ask, name: str, period: float) -> int:
                 return 0
             told = seen
             time.sleep(period)
-            seen = ask(f"state {name} {seen['version']}")
+            seen = answer_of(folder, LookAtMission(name, seen["version"]))
     except KeyboardInterrupt:
         return 0
 
 
-def watch(ask: Ask, name: str, period: float) -> int:
+def watch(folder: RobotFolder, name: str, period: float) -> int:
     """Show a mission until it ends, or until q or Ctrl-C; without a terminal once."""
-    picture = picture_from_data(ask(f"picture {name}"))
-    seen = joined({"statuses": {}, "data": {}}, ask(f"state {name} 0"))
+    picture = picture_from_data(answer_of(folder, ShowPicture(name)))
+    seen = joined({"statuses": {}, "data": {}}, answer_of(folder, LookAtMission(name)))
     colour = has_colour(sys.stdout)
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         tell("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))
@@ -79,7 +80,7 @@ def watch(ask: Ask, name: str, period: float) -> int:
                 show(sys.stdout, lines_of(picture, seen, size.columns, colour=colour)[: size.lines])
                 if select.select([keyboard], [], [], period)[0] and os.read(keyboard, 100).lower().count(b"q"):
                     return 0
-                seen = joined(seen, ask(f"state {name} {seen['version']}"))
+                seen = joined(seen, answer_of(folder, LookAtMission(name, seen["version"])))
     except KeyboardInterrupt:
         return 0
     tell("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))

@@ -5,10 +5,14 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Iterable
+from typing import TypeVar
 
 from rbxcompose.findings import Finding, kind, suggest
-from rbxcompose.runtime.control import ANSWER, NoAnswerError, RefusedError, ask
+from rbxcompose.requests import Refused, Request
+from rbxcompose.runtime.control import ANSWER, NoAnswerError, ask
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, State, all_folders
+
+A = TypeVar("A")
 
 ALREADY_UP = kind(
     "RBX9001",
@@ -112,16 +116,16 @@ def known_state(folder: RobotFolder) -> State | None:
         return None
 
 
-def request(folder: RobotFolder, fields: dict[str, object], *, timeout: float = ANSWER) -> object:
-    """Ask a robot's supervisor and return the answer, which may take `timeout` [s].
+def answer_of(folder: RobotFolder, request: Request[A], *, timeout: float = ANSWER) -> A:
+    """Return a robot's answer to a request, which may take `timeout` [s].
 
     Raises:
         NotDoneError: if it refuses or does not answer.
     """
     name = folder.path.name
     try:
-        return ask(folder, fields, timeout=timeout)
-    except RefusedError as refusal:
+        return ask(folder, request, timeout=timeout)
+    except Refused as refusal:
         raise NotDoneError(REFUSED.at(None, f"'{name}' refuses: {refusal}")) from refusal
     except NoAnswerError as error:
         raise NotDoneError(no_answer(folder)) from error

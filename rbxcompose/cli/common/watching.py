@@ -55,7 +55,7 @@ class Watching:
             return
         try:
             proposal = Proposal.of(self._newest.plan, self._newest.robot)
-            is_impossible = bool(proposal.found["impossible"])
+            is_impossible = bool(proposal.found.impossible)
             self._is_pending = bool(proposal.why_not) and not is_impossible
             if proposal.is_empty:
                 tell("the files have changed, the robot stays the same")
