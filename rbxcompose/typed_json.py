@@ -17,8 +17,6 @@ from typing import Any, Generic, TypeVar, Union, get_args, get_origin, get_type_
 T = TypeVar("T")
 TYPE = "type"  # the key that tells types apart
 
-_Read = Callable[[Any], Any]
-
 
 class UnreadableError(ValueError):
     """Raised for data that do not have the wanted shape; its text says where and why."""
@@ -38,7 +36,7 @@ def to_data(value: object) -> Any:
     return value
 
 
-def from_data(wanted: Any, data: object) -> Any:
+def from_data(wanted: Any, data: Any) -> Any:
     """Return the value of type `wanted` that plain data stand for.
 
     `wanted` is a dataclass, a scalar, an enumeration, `Any`, or a union, sequence, tuple or mapping of such.
@@ -46,7 +44,24 @@ def from_data(wanted: Any, data: object) -> Any:
     Raises:
         UnreadableError: if the data have another shape.
     """
-    return _reader(wanted)(data)
+    origin, arguments = get_origin(wanted), get_args(wanted)
+    if wanted is Any:
+        return data
+    if wanted in _SCALARS:
+        return _checked(data, *_SCALARS[wanted])
+    if origin in (Union, UnionType):
+        return _first(arguments, data)
+    if origin is None:
+        return _members(wanted, data) if issubclass(wanted, Enum) else _fields(wanted, data)
+    if issubclass(origin, Mapping):
+        return {key: _at(key, arguments[1], one) for key, one in _checked(data, *_OBJECT).items()}
+    items = _checked(data, (list, tuple), "is no list")
+    if origin is tuple and arguments[-1] is not Ellipsis:
+        if len(items) != len(arguments):
+            raise UnreadableError(f"is no list of {len(arguments)}")
+        return tuple(_at(str(index), *one) for index, one in enumerate(zip(arguments, items, strict=True)))
+    made = list if origin is list else tuple
+    return made(_at(str(index), arguments[0], one) for index, one in enumerate(items))
 
 
 class Family(Generic[T]):
@@ -87,28 +102,8 @@ def name_in(data: object) -> str:
     return name if isinstance(name, str) else ""
 
 
-@cache
-def _reader(wanted: Any) -> _Read:
-    """Return what reads data of a type."""
-    origin, arguments = get_origin(wanted), get_args(wanted)
-    if wanted is Any or wanted is object:
-        return lambda data: data
-    if origin in (Union, UnionType):
-        return _union(arguments)
-    if origin is tuple and arguments[1:] != (Ellipsis,):
-        return _tuple(arguments)
-    if isinstance(origin, type) and issubclass(origin, Mapping):
-        return _mapping(_reader(arguments[1]))
-    if isinstance(origin, type) and issubclass(origin, Sequence):
-        return _sequence(list if origin is list else tuple, _reader(arguments[0]))
-    if is_dataclass(wanted):
-        return _dataclass(wanted)
-    if issubclass(wanted, Enum):
-        return _enum(wanted)
-    return _scalar(wanted)
-
-
-_SCALARS: Mapping[type, tuple[tuple[type, ...], str]] = {
+_OBJECT = (dict,), "is no object"
+_SCALARS: Mapping[Any, tuple[tuple[type, ...], str]] = {
     str: ((str,), "is no text"),
     bool: ((bool,), "is neither true nor false"),
     int: ((int,), "is no whole number"),
@@ -117,92 +112,49 @@ _SCALARS: Mapping[type, tuple[tuple[type, ...], str]] = {
 }
 
 
-def _scalar(wanted: type) -> _Read:
-    taken, problem = _SCALARS[wanted]
-
-    def read(data: Any) -> Any:
-        if not isinstance(data, taken) or (isinstance(data, bool) and wanted is not bool):
-            raise UnreadableError(problem)
-        return data
-
-    return read
+def _checked(data: Any, types: tuple[type, ...], problem: str) -> Any:
+    if type(data) not in types:  # a bool is no int here
+        raise UnreadableError(problem)
+    return data
 
 
-def _enum(wanted: type[Enum]) -> _Read:
-    def read(data: Any) -> Any:
-        try:
-            return wanted(data)
-        except ValueError:
-            raise UnreadableError(f"is none of {', '.join(str(one.value) for one in wanted)}") from None
-
-    return read
-
-
-def _union(wanted: Iterable[Any]) -> _Read:
-    readers = [_reader(one) for one in wanted]
-
-    def read(data: Any) -> Any:
-        for one in readers:
-            try:
-                return one(data)
-            except UnreadableError as error:
-                problem = error
-        raise problem
-
-    return read
-
-
-def _at(place: str, read: _Read, data: Any) -> Any:
+def _at(place: str, wanted: Any, data: Any) -> Any:
     try:
-        return read(data)
+        return from_data(wanted, data)
     except UnreadableError as error:
         raise UnreadableError(error.problem, place, *error.path) from None
 
 
-def _sequence(made: Callable[[Iterable[Any]], Any], read_item: _Read) -> _Read:
-    def read(data: Any) -> Any:
-        if not isinstance(data, list | tuple):
-            raise UnreadableError("is no list")
-        return made(_at(str(index), read_item, one) for index, one in enumerate(data))
-
-    return read
-
-
-def _tuple(wanted: Sequence[Any]) -> _Read:
-    readers = [_reader(one) for one in wanted]
-
-    def read(data: Any) -> Any:
-        if not isinstance(data, list | tuple) or len(data) != len(readers):
-            raise UnreadableError(f"is no list of {len(readers)}")
-        return tuple(_at(str(index), one, data[index]) for index, one in enumerate(readers))
-
-    return read
+def _first(wanted: Iterable[Any], data: Any) -> Any:
+    """Return the value of the first type that fits."""
+    for one in wanted:
+        try:
+            return from_data(one, data)
+        except UnreadableError as error:
+            problem = error
+    raise problem
 
 
-def _mapping(read_value: _Read) -> _Read:
-    def read(data: Any) -> Any:
-        return {key: _at(str(key), read_value, one) for key, one in _object(data).items()}
+def _members(wanted: type[Enum], data: Any) -> Enum:
+    try:
+        return wanted(data)
+    except ValueError:
+        raise UnreadableError(f"is none of {', '.join(str(one.value) for one in wanted)}") from None
 
-    return read
+
+def _fields(wanted: Any, data: Any) -> Any:
+    hints, needed = _shape(wanted)
+    given = _checked(data, *_OBJECT)
+    if unknown := next((key for key in given if key not in hints), None):
+        raise UnreadableError("is not known here", unknown)
+    if missing := next((key for key in needed if key not in given), None):
+        raise UnreadableError("is missing", missing)
+    return wanted(**{key: _at(key, hints[key], one) for key, one in given.items()})
 
 
-def _dataclass(wanted: Any) -> _Read:
+@cache
+def _shape(wanted: Any) -> tuple[Mapping[str, Any], Sequence[str]]:
+    """Return the types of a dataclass's fields, and those of them that have no default."""
     hints = get_type_hints(wanted)
-    readers = {one.name: _reader(hints[one.name]) for one in fields(wanted)}
     needed = [one.name for one in fields(wanted) if one.default is MISSING and one.default_factory is MISSING]
-
-    def read(data: Any) -> Any:
-        given = _object(data)
-        if unknown := next((key for key in given if key not in readers), None):
-            raise UnreadableError("is not known here", unknown)
-        if missing := next((key for key in needed if key not in given), None):
-            raise UnreadableError("is missing", missing)
-        return wanted(**{key: _at(key, readers[key], one) for key, one in given.items()})
-
-    return read
-
-
-def _object(data: Any) -> Mapping[str, Any]:
-    if not isinstance(data, dict):
-        raise UnreadableError("is no object")
-    return data
+    return {one.name: hints[one.name] for one in fields(wanted)}, needed

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
-import json
 import os
 import select
 import signal
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import FrameType
-from typing import NoReturn, TextIO
+from typing import NoReturn, TextIO, get_args
 
 import setproctitle
 
@@ -29,6 +27,7 @@ from rbxcompose.runtime.prefork import Launch
 from rbxcompose.runtime.processes import end_with
 from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.supervisor import Supervisor
+from rbxcompose.typed_json import Family
 
 FINDINGS = 1  # exit code: nothing was started
 
@@ -64,7 +63,7 @@ class Unsafe:
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
+class RunEnded:
     """The robot is down."""
 
     exit_code: int
@@ -73,8 +72,8 @@ class Ended:
     facts: dict[str, dict[str, str]] = field(default_factory=dict)
 
 
-Report = Begun | Up | AlreadyUp | Unsafe | Ended
-_REPORTS: dict[str, type[Report]] = {one.__name__: one for one in (Begun, Up, AlreadyUp, Unsafe, Ended)}
+Report = Begun | Up | AlreadyUp | Unsafe | RunEnded
+_REPORTS: Family[Report] = Family(get_args(Report))
 
 
 class Started:
@@ -100,8 +99,7 @@ class Started:
                 raise EOFError("the supervisor has ended")
             self._received += chunk
         line, _, self._received = self._received.partition(b"\n")
-        name, fields = json.loads(line)
-        return _REPORTS[name](**fields)
+        return _REPORTS.from_line(line)
 
     def let_go(self) -> None:
         """Leave it to itself."""
@@ -196,7 +194,7 @@ def _supervisor_of(folder: RobotFolder) -> int | None:
     return state.supervisor.pid if state else None
 
 
-def _run(launch: Launch, folder: RobotFolder, reports: TextIO) -> Ended:
+def _run(launch: Launch, folder: RobotFolder, reports: TextIO) -> RunEnded:
     plan, clock = launch.plan, launch.clock
 
     def tell_up() -> None:
@@ -209,13 +207,12 @@ def _run(launch: Launch, folder: RobotFolder, reports: TextIO) -> Ended:
         text, detail = explain(error)
         launch.log.write(Record(clock.now(), Level.ERROR, "robot", f"the supervisor failed: {text}", detail))
         end_leftovers(folder)
-        return Ended(ROBOT_FAILED, f"the supervisor failed: {text}", clock.now())
+        return RunEnded(ROBOT_FAILED, f"the supervisor failed: {text}", clock.now())
     conductor = supervisor.conductor
     time = clock.now() if conductor.is_real_time else conductor.time
-    return Ended(conductor.exit_code, conductor.reason, time, conductor.facts)
+    return RunEnded(conductor.exit_code, conductor.reason, time, conductor.facts)
 
 
 def _report(reports: TextIO, report: Report) -> None:
-    fields = {one.name: getattr(report, one.name) for one in dataclasses.fields(report)}
     with contextlib.suppress(BrokenPipeError):  # a detached robot outlives who started it
-        reports.write(json.dumps([type(report).__name__, fields]) + "\n")
+        reports.write(_REPORTS.to_line(report).decode())

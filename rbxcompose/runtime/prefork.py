@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import array
 import gc
-import json
 import os
 import selectors
 import signal
@@ -16,7 +15,7 @@ import socket
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import setproctitle
@@ -28,6 +27,7 @@ from rbxcompose.runtime.log import LogFile
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.processes import Process, end_with
 from rbxcompose.sdk.registry import component_type
+from rbxcompose.typed_json import Family
 
 ROUTER = "router"  # the process that is in no plan
 _MOST = 4096  # [B] of one message
@@ -64,11 +64,11 @@ class Fork:
 
 @dataclass(frozen=True, slots=True)
 class Forked:
-    """A process group has been forked; `descriptor` is its pidfd."""
+    """A process group has been forked; `descriptor` is its pidfd, which goes beside the message."""
 
     group: str
     process: Process
-    descriptor: int
+    descriptor: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +77,10 @@ class Exited:
 
     pid: int
     status: int
+
+
+_ORDERS: Family[Fork] = Family((Fork,))
+_EVENTS: Family[Forked | Exited] = Family((Forked, Exited))
 
 
 class Parent:
@@ -108,8 +112,7 @@ class Parent:
         """
         ours, theirs = socket.socketpair()
         with theirs:
-            text = json.dumps([order.group, order.is_restart, order.is_stopped]).encode()
-            socket.send_fds(self._connection, [text], [theirs.fileno()])
+            socket.send_fds(self._connection, [_ORDERS.to_line(order)], [theirs.fileno()])
         return Channel(ours)
 
     def receive(self) -> Forked | Exited | None:
@@ -126,10 +129,8 @@ class Parent:
             text, descriptors = b"", []
         if not text:
             raise EOFError("the pre-fork parent has ended")
-        fields = json.loads(text)
-        if "group" in fields:
-            return Forked(fields["group"], Process(fields["pid"], fields["started"]), descriptors[0])
-        return Exited(fields["pid"], fields["status"])
+        event = _EVENTS.from_line(text)
+        return replace(event, descriptor=descriptors[0]) if isinstance(event, Forked) else event
 
     def end(self) -> None:
         """End the parent, which has nothing left to do, and wait for it."""
@@ -175,12 +176,12 @@ class _Forking:
         text, descriptors, _, _ = socket.recv_fds(self._connection, _MOST, 1)
         if not text:
             os._exit(0)
-        order = Fork(*json.loads(text))
+        order = _ORDERS.from_line(text)
         pid = self._fork(order, descriptors[0])
         os.close(descriptors[0])
         process, descriptor = Process.of(pid), os.pidfd_open(pid)  # not waited for yet: the id is still its own
         self._selector.register(descriptor, selectors.EVENT_READ, pid)
-        self._tell({"group": order.group, "pid": pid, "started": process.started}, [descriptor])
+        self._tell(Forked(order.group, process), [descriptor])
 
     def _fork(self, order: Fork, channel: int) -> int:
         parent = os.getpid()
@@ -202,12 +203,12 @@ class _Forking:
     def _reap(self, descriptor: int, pid: int) -> None:
         self._selector.unregister(descriptor)
         os.close(descriptor)
-        self._tell({"pid": pid, "status": os.waitpid(pid, 0)[1]}, [])
+        self._tell(Exited(pid, os.waitpid(pid, 0)[1]), [])
 
-    def _tell(self, fields: dict[str, object], descriptors: Sequence[int]) -> None:
+    def _tell(self, event: Forked | Exited, descriptors: Sequence[int]) -> None:
         rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", descriptors))] if descriptors else []
         try:
-            self._connection.sendmsg([json.dumps(fields).encode()], rights)
+            self._connection.sendmsg([_EVENTS.to_line(event)], rights)
         except (BrokenPipeError, ConnectionResetError):
             os._exit(0)
 

@@ -15,7 +15,7 @@ from rbxcompose.plan.model import Plan, extent
 from rbxcompose.runtime.conductor import ROBOT_FAILED
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.follow import Follower
-from rbxcompose.runtime.launch import AlreadyUp, Begun, Ended, Report, Started, Unsafe, Up, start_supervisor
+from rbxcompose.runtime.launch import AlreadyUp, Begun, Report, RunEnded, Started, Unsafe, Up, start_supervisor
 from rbxcompose.runtime.log import NAME
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.records import Record
@@ -98,7 +98,7 @@ class _Watch:
             case Unsafe(reason):
                 self._started.wait()
                 return refuse(UNSAFE.at(None, reason))
-            case Ended(exit_code, reason, time, facts):
+            case RunEnded(exit_code, reason, time, facts):
                 tell(summary(name, reason, time, facts))
                 self._started.wait()
                 return exit_code
