@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 
-from rbxcompose.cli.common.robots import NO_ANSWER, NotDoneError, add_robot_option, find_robot, known_state
-from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.robots.lookup import NO_ANSWER, NotDoneError, add_robot_option, find_robot, known_state
 from rbxcompose.requests import Refused
 from rbxcompose.runtime.control import NoAnswerError, ask
 from rbxcompose.runtime.folder import RobotFolder

@@ -11,9 +11,9 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from rbxcompose.cli.common.asking import add_asking_options, pass_on
-from rbxcompose.cli.common.robots import REFUSED, WHICH, NotDoneError, answer_of, find_robot
-from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.robots.commands import add_asking_options, pass_on
+from rbxcompose.cli.robots.lookup import REFUSED, WHICH, NotDoneError, answer_of, find_robot
 from rbxcompose.executive.requests import (
     CancelMission,
     ListedMission,
@@ -153,14 +153,14 @@ def _status(arguments: argparse.Namespace) -> int:
 
 
 def _drawn(name: str, robot: str | None, seen: Seen, width: int, *, colour: bool = False) -> list[str]:
-    from rbxcompose.cli.common.mission_watch import lines_of
+    from rbxcompose.cli.missions.live_view import lines_of
     from rbxcompose.missions.picture import picture_from_data
 
     return lines_of(picture_from_data(ask(robot, ShowPicture(name))), seen, width, colour=colour)
 
 
 def _watch(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.mission_watch import follow, watch
+    from rbxcompose.cli.missions.live_view import follow, watch
 
     name = _chosen(arguments)
     do = follow if arguments.json else watch
@@ -187,24 +187,24 @@ def _log(arguments: argparse.Namespace) -> int:
 
 
 def _replay(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.mission_replay import replay_log
+    from rbxcompose.cli.missions.replay import replay_log
 
     return replay_log(arguments)
 
 
 def _show(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.mission_files import show
+    from rbxcompose.cli.missions.files import show
 
     return show(arguments)
 
 
 def _skills(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.mission_files import skills
+    from rbxcompose.cli.missions.files import skills
 
     return skills(arguments)
 
 
 def _explore(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.mission_explore import explore
+    from rbxcompose.cli.missions.exploration import explore
 
     return explore(arguments)

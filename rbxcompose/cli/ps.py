@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from rbxcompose.cli.common.robots import NotDoneError, add_robot_option, answer_of, find_robot, known_state
-from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot, known_state
 from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, State
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import RobotStatus

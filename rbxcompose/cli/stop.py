@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.common.asking import add_asking_options, pass_on
+from rbxcompose.cli.robots.commands import add_asking_options, pass_on
 from rbxcompose.runtime.requests import StopRobot
 
 

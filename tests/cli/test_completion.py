@@ -13,10 +13,10 @@ import pytest
 
 from rbxcompose.bus.graph import Graph, Name
 from rbxcompose.cli import main as command
-from rbxcompose.cli.common.bus_place import BusPlace
-from rbxcompose.cli.common.completing import candidates, for_shell
-from rbxcompose.cli.common.known_values import KnownValues, files
+from rbxcompose.cli.bus.place import BusPlace
 from rbxcompose.cli.completion import SCRIPTS
+from rbxcompose.cli.completions.candidates import candidates, for_shell
+from rbxcompose.cli.completions.known_values import KnownValues, files
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, State
 from rbxcompose.runtime.processes import Process, boot_id
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.cli import main as command
-from rbxcompose.cli.common.mission_watch import lines_of
+from rbxcompose.cli.missions.live_view import lines_of
 from rbxcompose.executive.requests import CancelMission, LookAtAll
 from rbxcompose.missions.picture import picture_from_data
 from rbxcompose.requests import Request, as_data
@@ -67,8 +67,8 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Robot:
         there = made.mission.requests().from_data(json.loads(json.dumps(as_data(request))))
         return from_data(request.answer_type(), json.loads(json.dumps(to_data(made.mission.handle(there)))))
 
-    monkeypatch.setattr("rbxcompose.cli.common.robots.ask", ask)
-    monkeypatch.setattr("rbxcompose.cli.common.robots.all_folders", lambda: [RobotFolder(tmp_path / "bot")])
+    monkeypatch.setattr("rbxcompose.cli.robots.lookup.ask", ask)
+    monkeypatch.setattr("rbxcompose.cli.robots.lookup.all_folders", lambda: [RobotFolder(tmp_path / "bot")])
     return made
 
 
@@ -132,7 +132,7 @@ def test_watch_tells_programs_the_whole_and_then_what_changes(
         lambda: arrive(robot),
         lambda: robot.mission.handle(CancelMission()),
     ]
-    monkeypatch.setattr("rbxcompose.cli.common.mission_watch.time.sleep", lambda seconds: steps.pop(0)())
+    monkeypatch.setattr("rbxcompose.cli.missions.live_view.time.sleep", lambda seconds: steps.pop(0)())
     lines = [json.loads(line) for line in told(capsys, "watch", "--json").splitlines()]
     assert [(one["whole"], one["state"]) for one in lines] == [(True, "running"), (False, "running"), (False, "halted")]
     assert len(lines[1]["statuses"]) < len(lines[0]["statuses"])

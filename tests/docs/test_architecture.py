@@ -63,7 +63,7 @@ def test_up_compiles_and_then_runs_the_plan() -> None:
         "compile_robot",
         "run_plan",
     ]
-    assert "start_supervisor" in calls_of("cli/common/watch.py", "run_plan")
+    assert "start_supervisor" in calls_of("cli/robots/run_view.py", "run_plan")
 
 
 def test_every_family_of_codes_is_told_and_every_one_that_is_told_exists() -> None:

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from rbxcompose.cli import main as command
-from rbxcompose.cli.common.fixing import fix
+from rbxcompose.cli.project.fixes import fix
 from rbxcompose.clock import SteppedClock
 from rbxcompose.compiler import compile_robot
 from rbxcompose.diagnostics.levels import Level

@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 
-from rbxcompose.cli.common.watch import run_plan
+from rbxcompose.cli.robots.run_view import run_plan
 from rbxcompose.plan.model import BusPlan, Instance, Plan
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.sdk import Component, Config, MissionOver, MissionWaits, component
