@@ -10,7 +10,7 @@ from typing import Any
 
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot, known_state
-from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, State
+from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import RobotStatus
 
@@ -55,7 +55,7 @@ def _shown(folder: RobotFolder) -> dict[str, Any]:
     return _data(state, state.supervisor.pid)
 
 
-def _data(state: State, supervisor: int | None) -> dict[str, Any]:
+def _data(state: RobotState, supervisor: int | None) -> dict[str, Any]:
     return {
         "robot": state.robot,
         "supervisor": {"pid": supervisor},
@@ -72,7 +72,7 @@ def _component(one: ComponentState) -> dict[str, object]:
     return {**fields, "state": _BLOCKED if one.state == "active" else one.state, "waits_for": one.waits_for}
 
 
-def _last_known(state: State) -> dict[str, Any]:
+def _last_known(state: RobotState) -> dict[str, Any]:
     alive = state.alive()
     pids = {name: process.pid for name, process in alive.items()}
     components = tuple(replace(one, state=_state(one, alive), pid=pids.get(one.process)) for one in state.components)

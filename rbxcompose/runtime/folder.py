@@ -49,7 +49,7 @@ class ComponentState:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class RobotState:
     """What is known of a robot from outside, also when its supervisor is dead."""
 
     robot: str
@@ -67,7 +67,7 @@ class State:
         return f"{_checksum(body)}\n{body}"
 
     @classmethod
-    def from_text(cls, text: str) -> State:
+    def from_text(cls, text: str) -> RobotState:
         """Read what `to_text` wrote.
 
         Raises:
@@ -80,7 +80,7 @@ class State:
         if fields.pop("version") != _VERSION:
             raise BrokenStateError("another version of rbxcompose wrote it")
         try:
-            state: State = from_data(cls, fields)
+            state: RobotState = from_data(cls, fields)
         except UnreadableError as error:
             raise BrokenStateError(f"another version of rbxcompose wrote it: {error}") from error
         return state
@@ -156,18 +156,18 @@ class RobotFolder:
         except FileNotFoundError:
             return False
 
-    def read_state(self) -> State | None:
+    def read_state(self) -> RobotState | None:
         """Return the state, or None if there is none.
 
         Raises:
             BrokenStateError: if the file is not what was written.
         """
         try:
-            return State.from_text((self.path / STATE).read_text(encoding="utf-8"))
+            return RobotState.from_text((self.path / STATE).read_text(encoding="utf-8"))
         except FileNotFoundError:
             return None
 
-    def write_state(self, state: State) -> None:
+    def write_state(self, state: RobotState) -> None:
         """Replace the state file: whole or not at all, whatever happens meanwhile."""
         replace_file(self.path / STATE, state.to_text().encode(), mode=0o600)
 

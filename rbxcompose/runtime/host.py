@@ -16,7 +16,7 @@ from rbxcompose.runtime.channel import Failed, Repeated, States
 from rbxcompose.runtime.deliveries import Deliveries
 from rbxcompose.runtime.faults import RestartPolicy, explain
 from rbxcompose.runtime.frames import Frames
-from rbxcompose.runtime.hosted import Hosted, State
+from rbxcompose.runtime.hosted import Hosted, Lifecycle
 from rbxcompose.runtime.parameters import Parameters
 from rbxcompose.runtime.records import Log, Record
 from rbxcompose.runtime.rosout import Rosout
@@ -104,7 +104,7 @@ class Host:
         self._told("activate", *names)
         for name in names:
             self._wanted.add(name)
-            if self.hosted[name].state is State.INACTIVE:
+            if self.hosted[name].state is Lifecycle.INACTIVE:
                 self._guarded(name, self.hosted[name].activate)
 
     def start(self) -> None:
@@ -186,7 +186,7 @@ class Host:
     def _idle(self, instance: str) -> Component[Any]:
         """Return a component that can be asked now."""
         hosted = self.hosted.get(instance)
-        if hosted is None or hosted.component is None or hosted.state is not State.ACTIVE:
+        if hosted is None or hosted.component is None or hosted.state is not Lifecycle.ACTIVE:
             raise Refused(f"'{instance}' is not active")
         if hosted.is_busy:
             raise Refused(f"'{instance}' is busy")
@@ -200,7 +200,7 @@ class Host:
             if (hosted := self.hosted.get(name)) is None:
                 continue
             hosted.cancel_claimed()
-            if hosted.component is not None and hosted.state is State.ACTIVE:
+            if hosted.component is not None and hosted.state is Lifecycle.ACTIVE:
                 self._guarded(name, hosted.component.brake)
             if hosted.component is not None:
                 self._retired[name] = hosted.component
@@ -255,7 +255,7 @@ class Host:
                 runs[name] = hosted.component.occupation
 
         for name, hosted in self.hosted.items():
-            if hosted.state is State.ACTIVE:
+            if hosted.state is Lifecycle.ACTIVE:
                 self._guarded(name, lambda name=name, hosted=hosted: look(name, hosted))  # type: ignore[misc]
         return moves, runs
 
@@ -339,7 +339,7 @@ class Host:
 
     def _give_up(self, name: str, text: str) -> None:
         """Leave a component as it is; one that failed too often, unlike one that is never restarted, ends the robot."""
-        self.hosted[name].state = State.FAILED
+        self.hosted[name].state = Lifecycle.FAILED
         if self._policies[name].is_allowed:  # told first: a robot that starts would go on without what has failed
             self.notify(Failed(name, f"'{name}' failed too often: {text}"))
         else:
@@ -351,7 +351,7 @@ class Host:
             return  # another one may have taken its place
         self.log(name, Level.WARN, "restarted")
         self._guarded(name, hosted.configure)
-        if name in self._wanted and hosted.state is State.INACTIVE:
+        if name in self._wanted and hosted.state is Lifecycle.INACTIVE:
             self._guarded(name, hosted.activate)
 
     def _guarded(self, name: str, action: Callable[[], None]) -> None:
@@ -363,5 +363,5 @@ class Host:
     def _each_active(self, method: str, *arguments: object) -> None:
         for name, hosted in self.hosted.items():
             component = hosted.component
-            if component is not None and hosted.state is State.ACTIVE:
+            if component is not None and hosted.state is Lifecycle.ACTIVE:
                 self._guarded(name, partial(hosted.do, method, partial(getattr(component, method), *arguments)))

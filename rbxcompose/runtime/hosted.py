@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 LONGEST_GOODBYE = 0.3  # [s] to wait for a component's own thread when it is to end
 
 
-class State(StrEnum):
+class Lifecycle(StrEnum):
     """Lifecycle states, as `ps` shows them."""
 
     UNCONFIGURED = "unconfigured"
@@ -46,7 +46,7 @@ class Hosted:
     def __init__(self, host: Host, instance: Instance) -> None:
         self.host, self.instance = host, instance
         self.clock: Clock = host.clock
-        self.state = State.UNCONFIGURED
+        self.state = Lifecycle.UNCONFIGURED
         self.config = instance.config  # as it is now: parameters may have changed it
         self.component: Component[Any] | None = None
         self.worker: Worker | None = None  # the thread of a component that may block
@@ -80,7 +80,7 @@ class Hosted:
         self.do("configure", made.configure, then=self._configured)
 
     def _configured(self) -> None:
-        self._enter(State.INACTIVE)
+        self._enter(Lifecycle.INACTIVE)
         self.host.statuses.set(self.instance.name, Level.OK, "ready", {})
         if self.worker is not None:
             self.host.ready(self.instance.name)
@@ -106,7 +106,7 @@ class Hosted:
 
     def _activated(self) -> None:
         component = self._made()
-        self._enter(State.ACTIVE)
+        self._enter(Lifecycle.ACTIVE)
         if component.rate:
             step = component.step
             self.host.scheduler.every(
@@ -127,9 +127,9 @@ class Hosted:
         self.host.scheduler.remove(self.instance.name)
         component, state = self.component, self.state
         try:
-            if component and self._taken_back(component) and state is State.ACTIVE:
+            if component and self._taken_back(component) and state is Lifecycle.ACTIVE:
                 component.deactivate()
-            if component and self.worker is None and state in (State.ACTIVE, State.INACTIVE):
+            if component and self.worker is None and state in (Lifecycle.ACTIVE, Lifecycle.INACTIVE):
                 component.cleanup()
         finally:
             self.abandon()
@@ -142,7 +142,7 @@ class Hosted:
         self.component = self.worker = None
         self._claiming = []
         self._wakes.clear()
-        self.state = State.UNCONFIGURED
+        self.state = Lifecycle.UNCONFIGURED
 
     def _taken_back(self, component: Component[Any]) -> bool:
         """Let the scheduler's thread use the component itself again; tell whether its own thread has let go of it."""
@@ -180,7 +180,7 @@ class Hosted:
     def moves(self) -> str:
         """Return in words what of it moves the robot or is about to; empty if nothing."""
         component = self.component
-        if component is None or self.state is not State.ACTIVE:
+        if component is None or self.state is not Lifecycle.ACTIVE:
             return ""
         if not component.is_at_rest:
             return f"'{self.instance.name}' moves"
@@ -195,7 +195,7 @@ class Hosted:
 
     def refusal(self, port: Port[Any]) -> str:
         """Return why a message, request or goal cannot be taken now; empty if it can."""
-        if self.state is not State.ACTIVE:
+        if self.state is not Lifecycle.ACTIVE:
             return f"'{self.instance.name}' is not active"
         is_claiming = isinstance(port, ServesAction | ServesTopic) and bool(port.claims)
         if is_claiming and self.host.is_braking:
@@ -211,7 +211,7 @@ class Hosted:
             raise RuntimeError(f"'{self.instance.name}' is not configured")
         return self.component
 
-    def _enter(self, state: State) -> None:
+    def _enter(self, state: Lifecycle) -> None:
         self.state = state
         self.host.changed(self.instance.name)
 

@@ -11,7 +11,7 @@ from rbxcompose.requests import Command, Refused, Request, as_data, requests
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.changes import Changes, changes
 from rbxcompose.runtime.conductor import FINE, Conductor
-from rbxcompose.runtime.folder import State
+from rbxcompose.runtime.folder import RobotState
 from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
 from rbxcompose.runtime.requests import ROBOT, BringDown, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.sdk.registry import component_type
@@ -25,7 +25,7 @@ class Supervised(Protocol):
 
     conductor: Conductor
 
-    def state(self) -> State:
+    def state(self) -> RobotState:
         """Return what is known from outside."""
         ...
 
@@ -76,7 +76,7 @@ class RequestHandler:
             case _:
                 self._supervisor.answer(number, to_data(self._answer(request)))
 
-    def _answer(self, request: Request[Any]) -> State | PlanComparison | str:
+    def _answer(self, request: Request[Any]) -> RobotState | PlanComparison | str:
         match request:
             case RobotStatus():
                 return self._supervisor.state()

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rbxcompose.requests import Command, Query
-from rbxcompose.runtime.folder import State
+from rbxcompose.runtime.folder import RobotState
 
 ROBOT = "robot"
 
 
 @dataclass(frozen=True, slots=True)
-class RobotStatus(Query[State]):
+class RobotStatus(Query[RobotState]):
     """Ask what is known of the robot from outside."""
 
     about = ROBOT

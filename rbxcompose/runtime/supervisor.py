@@ -19,7 +19,7 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
 from rbxcompose.runtime.control import ControlServer
-from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFolder, State
+from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.members import Phase
 from rbxcompose.runtime.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
@@ -275,11 +275,11 @@ class Supervisor:
 
     # What is known from outside
 
-    def state(self) -> State:
+    def state(self) -> RobotState:
         """Return what the state file and `ps` tell."""
         running = {name: child.process for name, child in self._children.items() if child.process is not None}
         components = tuple(self._component(one.name, one.type, one.process) for one in self.conductor.plan.instances)
-        return State(
+        return RobotState(
             robot=self._launch.plan.robot,
             file=os.path.realpath(self.conductor.plan.file),
             supervisor=Process.of(os.getpid()),

@@ -25,7 +25,7 @@ from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import RecordingReader
 from rbxcompose.recording.topics import Topic
 from rbxcompose.replacing import replace_file
-from rbxcompose.runtime.folder import ComponentState, RobotFolder, State
+from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.follow import read_log
 from rbxcompose.runtime.log import NAME, PREVIOUS, LogFile, start_new
 from rbxcompose.runtime.processes import Process, boot_id
@@ -117,10 +117,10 @@ def _prepare_graph(run: Run) -> None:
 # State
 
 
-def _state(robot: str) -> State:
+def _state(robot: str) -> RobotState:
     process = Process.of(os.getpid())
     one = ComponentState("base", "toy", "active", "robot", process.pid, 0)
-    return State(robot, "/robot.yaml", process, {"robot": process}, (one,), "tcp/x", boot_id())
+    return RobotState(robot, "/robot.yaml", process, {"robot": process}, (one,), "tcp/x", boot_id())
 
 
 def _prepare_state(run: Run) -> None:

@@ -11,7 +11,7 @@ from rbxcompose.executive.requests import PauseMission, ResumeMission
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.restarts import Restart
-from rbxcompose.runtime.hosted import State
+from rbxcompose.runtime.hosted import Lifecycle
 from rbxcompose.sdk import Component, Config, Out, Refused, component
 from rbxcompose.testing import Bench, instance
 from tests.manifests import turtlebot
@@ -137,7 +137,7 @@ def test_who_is_blocked_is_not_well_whatever_it_says() -> None:
     one.host.statuses.block({})
     one.advance(0.0)
     assert {status.level for status in heard[-1].status} == {Level.OK}
-    assert one.host.hosted["counter"].state is State.ACTIVE
+    assert one.host.hosted["counter"].state is Lifecycle.ACTIVE
 
 
 def test_a_mux_that_was_exchanged_during_a_stop_lets_through_what_comes_after_the_release() -> None:

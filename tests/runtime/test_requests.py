@@ -19,7 +19,7 @@ from rbxcompose.restarts import Restart
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.changes import Fate
 from rbxcompose.runtime.conductor import Conductor
-from rbxcompose.runtime.folder import State
+from rbxcompose.runtime.folder import RobotState
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
 from rbxcompose.runtime.processes import Process
@@ -48,8 +48,8 @@ class Desk:
         self.conductor.states["patrol"] = ("active", 0)
         self.conductor.members["mission"].is_configured = True
 
-    def state(self) -> State:
-        return State("toys", "/toys.yaml", Process.of(os.getpid()), {}, ())
+    def state(self) -> RobotState:
+        return RobotState("toys", "/toys.yaml", Process.of(os.getpid()), {}, ())
 
     def send(self, process: str, message: say.Order) -> None:
         self.sent.append((process, message))

@@ -10,7 +10,7 @@ from typing import TypeVar
 from rbxcompose.findings import Finding, kind, suggest
 from rbxcompose.requests import Refused, Request
 from rbxcompose.runtime.control import ANSWER, NoAnswerError, ask
-from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, State, all_folders
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, all_folders
 
 A = TypeVar("A")
 
@@ -108,7 +108,7 @@ def _possible_files(path: str) -> Iterable[str]:
     yield os.path.realpath(os.path.join(path, "robot.yaml"))
 
 
-def known_state(folder: RobotFolder) -> State | None:
+def known_state(folder: RobotFolder) -> RobotState | None:
     """Return the state that the folder tells, or None if it tells none that can be read."""
     try:
         return folder.read_state()

@@ -16,7 +16,7 @@ from rbxcompose.missions.mirror import ACTIVE, status_list
 from rbxcompose.missions.picture import picture_from_data
 from rbxcompose.msgs.cdr import CdrError, decode
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
-from rbxcompose.runtime.folder import ComponentState, RobotFolder, State
+from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.follow import Follower
 from rbxcompose.runtime.log import NAME
 from rbxcompose.runtime.processes import Process
@@ -76,7 +76,7 @@ class Sampler:
                 self._listened.add(topic.name)
                 self._guest.listen(topic, self._healthy if topic.name == _HEALTH else self._count)
 
-    def _trees(self, state: State) -> list[Tree]:
+    def _trees(self, state: RobotState) -> list[Tree]:
         """Follow the missions of a robot that has some, and return those that run, if their process lives."""
         alive = state.alive()
         if not any(one.type == _MISSION and one.process in alive for one in state.components):
@@ -111,7 +111,7 @@ class Sampler:
         self._counts.clear()
         return rates
 
-    def _loads(self, state: State, elapsed: float | None) -> list[Load]:
+    def _loads(self, state: RobotState, elapsed: float | None) -> list[Load]:
         loads, times = [], {}
         for name, process in {_SUPERVISOR: state.supervisor, **state.processes}.items():
             usage = process.usage
@@ -123,7 +123,7 @@ class Sampler:
         self._times = times
         return loads
 
-    def _picture(self, state: State, rates: Mapping[str, float], loads: list[Load]) -> Picture:
+    def _picture(self, state: RobotState, rates: Mapping[str, float], loads: list[Load]) -> Picture:
         leaves = {name.rpartition("/")[2]: one for name, one in self._statuses.items() if name.count("/") > 1}
         alive = state.alive()
         parts = [_part(one, one.process in alive, rates, leaves.get(one.name)) for one in state.components]
