@@ -28,8 +28,8 @@ from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterValue, SetParamet
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.host import Host
-from rbxcompose.runtime.inbox import Inbox
+from rbxcompose.runtime.process_group.host import Host
+from rbxcompose.runtime.process_group.inbox import Inbox
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.testing.bench import instance
 

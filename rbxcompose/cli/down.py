@@ -10,9 +10,9 @@ from rbxcompose.cli.robots.lookup import NO_ANSWER, NotDoneError, add_robot_opti
 from rbxcompose.requests import Refused
 from rbxcompose.runtime.control import NoAnswerError, ask
 from rbxcompose.runtime.folder import RobotFolder
-from rbxcompose.runtime.leftovers import end_leftovers, kill_supervisor
 from rbxcompose.runtime.processes import wait_until_ended
 from rbxcompose.runtime.requests import BringDown
+from rbxcompose.runtime.supervision.leftovers import end_leftovers, kill_supervisor
 
 _ANSWER = 1.0  # [s]
 _ORDERLY = 4.0  # [s] for a supervisor to bring everything down

@@ -26,7 +26,7 @@ from rbxcompose.requests import Refused
 from rbxcompose.rerun.aliases import Aliases
 from rbxcompose.rerun.services import Known, Services
 from rbxcompose.rerun.stage import Fed, Stage
-from rbxcompose.runtime.host import Host
+from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.scheduler import Scheduler
 
 LAST = "\U0010ffff"  # an owner whose events come after those of all others

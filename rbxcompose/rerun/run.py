@@ -16,7 +16,7 @@ from rbxcompose.rerun.comparison import Comparison, Difference
 from rbxcompose.rerun.feed import Feed
 from rbxcompose.rerun.services import Services
 from rbxcompose.rerun.stage import Stage, StageBus
-from rbxcompose.runtime.host import Host
+from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.ports import In, Looks

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from rbxcompose.plan.diff import Change
 from rbxcompose.requests import Command, Query
-from rbxcompose.runtime.changes import Changes, Fate
 from rbxcompose.runtime.requests import ROBOT
+from rbxcompose.runtime.supervision.changes import Changes, Fate
 
 
 @dataclass(frozen=True, slots=True)

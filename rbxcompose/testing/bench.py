@@ -13,7 +13,7 @@ from rbxcompose.model.wiring import ends_of
 from rbxcompose.msgs.types import Message
 from rbxcompose.plan.model import Instance, Plan, Wire
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.host import Host, Notice
+from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.component import Component

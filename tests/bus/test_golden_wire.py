@@ -28,7 +28,7 @@ from rbxcompose.msgs.types import Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.host import Host
+from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.testing import Golden, instance
 

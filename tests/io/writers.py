@@ -28,10 +28,10 @@ from rbxcompose.replacing import replace_file
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.follow import read_log
 from rbxcompose.runtime.log import NAME, PREVIOUS, LogFile, start_new
+from rbxcompose.runtime.process_group.taping import Taping
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.runtime.records import Record
-from rbxcompose.runtime.supervisor import Supervisor
-from rbxcompose.runtime.taping import Taping
+from rbxcompose.runtime.supervision.supervisor import Supervisor
 from rbxcompose.scaffold.writing import write_new
 
 OLD, NEW = b"old: 1\n" * 3000, b"new: 2\n" * 4000

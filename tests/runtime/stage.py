@@ -7,8 +7,8 @@ from dataclasses import replace
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.conductor import Conductor
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.testing.bench import instance
 

@@ -10,8 +10,8 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.dump import load
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.changes import changes
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.supervision.changes import changes
 from tests.runtime.stage import Stage, placed, robot
 from tests.runtime.test_giving_up import with_never
 

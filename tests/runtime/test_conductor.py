@@ -11,8 +11,8 @@ from rbxcompose.plan.model import BusPlan, Plan
 from rbxcompose.requests import as_data
 from rbxcompose.robot_events import MissionOver
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.members import Phase
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.supervision.members import Phase
 from tests.runtime.stage import ENDPOINT, Stage, robot
 
 # The beginning

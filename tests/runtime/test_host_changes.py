@@ -11,7 +11,7 @@ from rbxcompose.executive.requests import PauseMission, ResumeMission
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.restarts import Restart
-from rbxcompose.runtime.hosted import Lifecycle
+from rbxcompose.runtime.process_group.hosted import Lifecycle
 from rbxcompose.sdk import Component, Config, Out, Refused, component
 from rbxcompose.testing import Bench, instance
 from tests.manifests import turtlebot

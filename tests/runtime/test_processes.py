@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import pytest
 
 from rbxcompose.runtime.folder import RobotFolder, RobotState
-from rbxcompose.runtime.leftovers import end_leftovers
 from rbxcompose.runtime.processes import Process, boot_id, describe_exit, titled, wait_until_ended
+from rbxcompose.runtime.supervision.leftovers import end_leftovers
 
 
 @pytest.fixture

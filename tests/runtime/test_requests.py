@@ -17,14 +17,14 @@ from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.requests import Command, Request, as_data
 from rbxcompose.restarts import Restart
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.changes import Fate
-from rbxcompose.runtime.conductor import Conductor
 from rbxcompose.runtime.folder import RobotState
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
 from rbxcompose.runtime.processes import Process
-from rbxcompose.runtime.request_handler import RequestHandler
 from rbxcompose.runtime.requests import BringDown, ReleaseRobot, RobotStatus, StopRobot
+from rbxcompose.runtime.supervision.changes import Fate
+from rbxcompose.runtime.supervision.conductor import Conductor
+from rbxcompose.runtime.supervision.request_handler import RequestHandler
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.typed_json import from_data
 

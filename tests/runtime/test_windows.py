@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rbxcompose.executive.requests import ListMissions
-from rbxcompose.runtime.handover import HandedOver
+from rbxcompose.runtime.process_group.handover import HandedOver
 
 
 class Later:

@@ -19,10 +19,10 @@ from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Command, answers
-from rbxcompose.runtime.host import Host
-from rbxcompose.runtime.inbox import Inbox
+from rbxcompose.runtime.process_group.host import Host
+from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.worker import LONGEST
 from rbxcompose.runtime.records import Record
-from rbxcompose.runtime.worker import LONGEST
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk import Calls, Component, Config, In, Out, Refused, Reply, Serves, component
 from rbxcompose.testing import Bench, instance

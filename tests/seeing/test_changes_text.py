@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rbxcompose.runtime.changes import changes
 from rbxcompose.runtime.plan_requests import PlanComparison
+from rbxcompose.runtime.supervision.changes import changes
 from rbxcompose.seeing.changes_text import changes_text, with_places
 from rbxcompose.testing import Golden
 from rbxcompose.typed_json import to_data

@@ -12,7 +12,7 @@ from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.members import Phase
+from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.testing.invariants import Laws, Violation, violations
 from rbxcompose.testing.stories import laws_of
 from tests.simulated_faults.whole_robot import Guest, WholeRobot

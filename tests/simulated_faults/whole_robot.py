@@ -15,12 +15,12 @@ from rbxcompose.recording.tape import Tape
 from rbxcompose.requests import Command, Refused, as_data
 from rbxcompose.robot_events import MissionWaits
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.conductor import Conductor
-from rbxcompose.runtime.driver import BEAT
-from rbxcompose.runtime.host import Host, Notice
-from rbxcompose.runtime.members import Phase
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.process_group.driver import BEAT
+from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.records import Record
+from rbxcompose.runtime.supervision.conductor import Conductor
+from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.testing.invariants import ROBOT, Event, Ordered
 from rbxcompose.testing.stories import events_of, laws_of

@@ -28,7 +28,7 @@ from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.findings import kind
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import Inbox
 from rbxcompose.scheduler import Scheduler
 
 if TYPE_CHECKING:

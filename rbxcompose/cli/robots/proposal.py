@@ -9,10 +9,10 @@ from rbxcompose.cli.robots.lookup import answer_of, find_robot
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.dump import dump
 from rbxcompose.plan.model import Plan
-from rbxcompose.runtime.changes import Fate
-from rbxcompose.runtime.changing import LONGEST
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
+from rbxcompose.runtime.supervision.changes import Fate
+from rbxcompose.runtime.supervision.changing import LONGEST
 from rbxcompose.seeing.changes_text import changes_text, with_places
 from rbxcompose.typed_json import to_data
 

@@ -11,13 +11,22 @@ from rbxcompose.cli.robots.lookup import ALREADY_UP, UNSAFE
 from rbxcompose.cli.robots.story import Story, summary
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Plan, extent
-from rbxcompose.runtime.conductor import ROBOT_FAILED
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.follow import Follower
-from rbxcompose.runtime.launch import AlreadyUp, Begun, Report, RunEnded, Started, Unsafe, Up, start_supervisor
 from rbxcompose.runtime.log import NAME
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.records import Record
+from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
+from rbxcompose.runtime.supervision.launch import (
+    AlreadyUp,
+    Begun,
+    Report,
+    RunEnded,
+    Started,
+    Unsafe,
+    Up,
+    start_supervisor,
+)
 
 _LOOK = 0.05  # [s] between looks at the log
 

@@ -13,15 +13,15 @@ from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.requests import Command, Refused, Request, as_data
 from rbxcompose.robot_events import RobotEvent
 from rbxcompose.runtime.channel import Failed, Repeated, States
-from rbxcompose.runtime.deliveries import Deliveries
 from rbxcompose.runtime.faults import RestartPolicy, explain
-from rbxcompose.runtime.frames import Frames
-from rbxcompose.runtime.hosted import Hosted, Lifecycle
-from rbxcompose.runtime.parameters import Parameters
+from rbxcompose.runtime.process_group.deliveries import Deliveries
+from rbxcompose.runtime.process_group.frames import Frames
+from rbxcompose.runtime.process_group.hosted import Hosted, Lifecycle
+from rbxcompose.runtime.process_group.parameters import Parameters
+from rbxcompose.runtime.process_group.rosout import Rosout
+from rbxcompose.runtime.process_group.statuses import Statuses
+from rbxcompose.runtime.process_group.worker import Post, Worker
 from rbxcompose.runtime.records import Log, Record
-from rbxcompose.runtime.rosout import Rosout
-from rbxcompose.runtime.statuses import Statuses
-from rbxcompose.runtime.worker import Post, Worker
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Looks

@@ -13,8 +13,8 @@ from itertools import groupby
 from rbxcompose.plan.dump import dump
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.changes import Changes, Fate
-from rbxcompose.runtime.members import Effects, Member
+from rbxcompose.runtime.supervision.changes import Changes, Fate
+from rbxcompose.runtime.supervision.members import Effects, Member
 
 LONGEST = 20.0  # [s] until all that is new must be active
 

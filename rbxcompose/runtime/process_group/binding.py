@@ -15,8 +15,8 @@ from rbxcompose.missions.sources import PAUSE
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.plan.model import Instance
 from rbxcompose.requests import Refused
-from rbxcompose.runtime.frames import Frames, Lookup
-from rbxcompose.runtime.worker import Call, Worker
+from rbxcompose.runtime.process_group.frames import Frames, Lookup
+from rbxcompose.runtime.process_group.worker import Call, Worker
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import (
     Calls,

@@ -9,11 +9,11 @@ from rbxcompose.plan.dump import PlanTextError, load
 from rbxcompose.plan.model import Instance
 from rbxcompose.requests import Command, Refused, Request, as_data, requests
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.changes import Changes, changes
-from rbxcompose.runtime.conductor import FINE, Conductor
 from rbxcompose.runtime.folder import RobotState
 from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
 from rbxcompose.runtime.requests import ROBOT, BringDown, ReleaseRobot, RobotStatus, StopRobot
+from rbxcompose.runtime.supervision.changes import Changes, changes
+from rbxcompose.runtime.supervision.conductor import FINE, Conductor
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.typed_json import UnreadableError, name_in, to_data
 

@@ -17,7 +17,7 @@ import zenoh
 from rbxcompose.bus.probe import Heard, Probe, probe_key
 from rbxcompose.bus.renewal import RenewableTransport
 from rbxcompose.bus.transport import Answer, Question, Transport
-from rbxcompose.runtime.driver import BEAT
+from rbxcompose.runtime.process_group.driver import BEAT
 
 BEATS = 3  # of the process between two probes: three that are missed, and the change, take less than 4 s
 LONGEST_CLOSE = 1.0  # [s] for closing a session; Zenoh may hang in it

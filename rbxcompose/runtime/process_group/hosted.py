@@ -15,10 +15,10 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Instance
 from rbxcompose.requests import Command, Query, Refused, as_data
 from rbxcompose.robot_events import RobotEvent
-from rbxcompose.runtime.binding import bind
 from rbxcompose.runtime.channel import Repeated
-from rbxcompose.runtime.handover import HandedOver, handed_over
-from rbxcompose.runtime.worker import Worker
+from rbxcompose.runtime.process_group.binding import bind
+from rbxcompose.runtime.process_group.handover import HandedOver, handed_over
+from rbxcompose.runtime.process_group.worker import Worker
 from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Port, ServesAction, ServesTopic
@@ -26,7 +26,7 @@ from rbxcompose.sdk.registry import component_type
 from rbxcompose.typed_json import to_data
 
 if TYPE_CHECKING:
-    from rbxcompose.runtime.host import Host
+    from rbxcompose.runtime.process_group.host import Host
 
 LONGEST_GOODBYE = 0.3  # [s] to wait for a component's own thread when it is to end
 

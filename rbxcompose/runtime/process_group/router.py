@@ -13,9 +13,9 @@ from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.driver import RealTimeDriver
-from rbxcompose.runtime.inbox import Inbox
-from rbxcompose.runtime.lifeline import answer
+from rbxcompose.runtime.process_group.driver import RealTimeDriver
+from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.lifeline import answer
 from rbxcompose.scheduler import Scheduler
 
 TRIES = 20  # ports from `bus.port` on

@@ -14,7 +14,7 @@ from rbxcompose.clock import Clock
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.requests import Command, Query
 from rbxcompose.robot_events import RobotEvent
-from rbxcompose.runtime.worker import Worker
+from rbxcompose.runtime.process_group.worker import Worker
 from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.component import Context
 from rbxcompose.sdk.ports import Calls, CallsAction, Out, Port, ServesAction

@@ -13,8 +13,8 @@ from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import Clock
 from rbxcompose.plan.model import Plan
-from rbxcompose.runtime.inbox import Inbox
-from rbxcompose.runtime.lifeline import Lifeline
+from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.lifeline import Lifeline
 from rbxcompose.scheduler import Scheduler
 
 if TYPE_CHECKING:

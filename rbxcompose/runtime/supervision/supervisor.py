@@ -17,15 +17,15 @@ from types import FrameType
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
 from rbxcompose.runtime.control import ControlServer
 from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFolder, RobotState
-from rbxcompose.runtime.members import Phase
-from rbxcompose.runtime.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
 from rbxcompose.runtime.records import Record
-from rbxcompose.runtime.request_handler import RequestHandler
-from rbxcompose.runtime.silence import DEAD, LOOK
+from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
+from rbxcompose.runtime.supervision.members import Phase
+from rbxcompose.runtime.supervision.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
+from rbxcompose.runtime.supervision.request_handler import RequestHandler
+from rbxcompose.runtime.supervision.silence import DEAD, LOOK
 from rbxcompose.scheduler import Scheduler
 
 _TAIL = 8000  # [B] of what a process printed that go into the log

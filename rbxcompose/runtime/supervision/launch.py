@@ -17,16 +17,16 @@ from rbxcompose.bus import shared_memory
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Plan
-from rbxcompose.runtime.conductor import ROBOT_FAILED
 from rbxcompose.runtime.faults import explain
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder
-from rbxcompose.runtime.leftovers import end_leftovers
 from rbxcompose.runtime.log import start_new
 from rbxcompose.runtime.options import RunOptions
-from rbxcompose.runtime.prefork import Launch
 from rbxcompose.runtime.processes import end_with
 from rbxcompose.runtime.records import Record
-from rbxcompose.runtime.supervisor import Supervisor
+from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
+from rbxcompose.runtime.supervision.leftovers import end_leftovers
+from rbxcompose.runtime.supervision.prefork import Launch
+from rbxcompose.runtime.supervision.supervisor import Supervisor
 from rbxcompose.typed_json import Family
 
 FINDINGS = 1  # exit code: nothing was started

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.members import Effects, Member, Phase
+from rbxcompose.runtime.supervision.members import Effects, Member, Phase
 
 REST_BOUND = 1.0  # [s] to come to rest
 DOWN_BOUND = 1.9  # [s] for all of going down; what is left then is killed

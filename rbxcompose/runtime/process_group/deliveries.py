@@ -10,7 +10,7 @@ from rbxcompose.bus.refusals import sentence
 from rbxcompose.bus.topics import Subscription
 from rbxcompose.clock import Clock
 from rbxcompose.diagnostics.levels import Level
-from rbxcompose.runtime.statuses import Statuses
+from rbxcompose.runtime.process_group.statuses import Statuses
 from rbxcompose.scheduler import Scheduler
 
 PERIOD = 1.0  # [s] between two looks

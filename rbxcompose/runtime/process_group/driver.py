@@ -9,7 +9,7 @@ from typing import Protocol
 
 from rbxcompose.clock import Clock, ExternalClock, MonotonicClock, SteppedClock, Turn
 from rbxcompose.runtime.channel import Channel, Message
-from rbxcompose.runtime.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import Inbox
 from rbxcompose.scheduler import Scheduler
 
 BEAT = 0.25  # [s] of real time between signs of life

@@ -14,7 +14,7 @@ from rbxcompose.params import core
 from rbxcompose.params.values import from_message
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Refused
-from rbxcompose.runtime.hosted import Hosted
+from rbxcompose.runtime.process_group.hosted import Hosted
 from rbxcompose.units import format_quantity
 
 EVENTS = "/parameter_events"

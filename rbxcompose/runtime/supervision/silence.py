@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from rbxcompose.runtime.members import Effects, Member
+from rbxcompose.runtime.supervision.members import Effects, Member
 
 SILENT = 1.0  # [s] without a sign of life after which the others are told
 DEAD = 2.0  # [s] without a sign of life after which a process is killed

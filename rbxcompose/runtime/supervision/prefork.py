@@ -216,11 +216,11 @@ class _Forking:
 def run_process(launch: Launch, order: Fork, channel: Channel) -> None:
     """Run the main of a process group, or of the router, until it ends."""
     if order.group == ROUTER:
-        from rbxcompose.runtime.router import Router
+        from rbxcompose.runtime.process_group.router import Router
 
         Router(launch.plan, launch.clock, channel).run()
         return
-    from rbxcompose.runtime.group import Group
+    from rbxcompose.runtime.process_group.group import Group
 
     Group(
         launch.plan,
@@ -238,8 +238,8 @@ def _import_what_is_common(plan: Plan) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its threads would not survive the fork
     import numpy  # noqa: F401 - messages with arrays need it, and importing it later would hold up what runs
 
-    import rbxcompose.runtime.group
-    import rbxcompose.runtime.router  # noqa: F401
+    import rbxcompose.runtime.process_group.group
+    import rbxcompose.runtime.process_group.router  # noqa: F401
 
     for name in {instance.type for instance in plan.instances}:
         component_type(name)

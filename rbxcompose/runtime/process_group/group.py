@@ -23,20 +23,20 @@ from rbxcompose.qos import Qos
 from rbxcompose.requests import Command, Refused
 from rbxcompose.robot_events import MissionOver, MissionWaits
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.capture import Capture, take_printed
-from rbxcompose.runtime.connection import open_bus
-from rbxcompose.runtime.driver import Driver, ExternalDriver, RealTimeDriver, SteppedDriver
-from rbxcompose.runtime.host import Host, Notice
-from rbxcompose.runtime.inbox import Inbox
-from rbxcompose.runtime.lifeline import Lifeline
 from rbxcompose.runtime.log import LogFile
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.process_group.capture import Capture, take_printed
+from rbxcompose.runtime.process_group.connection import open_bus
+from rbxcompose.runtime.process_group.driver import Driver, ExternalDriver, RealTimeDriver, SteppedDriver
+from rbxcompose.runtime.process_group.host import Host, Notice
+from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.lifeline import Lifeline
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.typed_json import to_data
 
 if TYPE_CHECKING:
-    from rbxcompose.runtime.taping import Taping
+    from rbxcompose.runtime.process_group.taping import Taping
 
 HANG = 2.0  # [s] without a turn of the loop after which the process ends itself
 LONGEST_CONFIGURE = 30.0  # [s]
@@ -180,7 +180,7 @@ class Group:
             self._scheduler.advance(time)
         instances = self._plan.of_group(self._name)
         if self._options.record is not None:
-            from rbxcompose.runtime.taping import Taping  # only a recorded run needs MCAP
+            from rbxcompose.runtime.process_group.taping import Taping  # only a recorded run needs MCAP
 
             self._taping = Taping(
                 self._options.record, self._plan, self._clock, lambda text: self._complain("robot", text)
