@@ -14,7 +14,7 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.executive.requests import ListMissions, PauseMission
 from rbxcompose.plan.dump import dump
 from rbxcompose.plan.model import Instance, Plan
-from rbxcompose.requests import Command, Request, as_data
+from rbxcompose.requests import Command, Request, answers, as_data
 from rbxcompose.restarts import Restart
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.folder import RobotState
@@ -26,6 +26,8 @@ from rbxcompose.runtime.supervision.changes import Fate
 from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
 from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk import Component, Config, component
+from rbxcompose.testing.bench import Bench, instance
 from rbxcompose.typed_json import from_data
 
 PLAN = Plan("toys", "toys.yaml", (Instance("patrol", "mission", MissionConfig(), "mission"),))
@@ -34,16 +36,26 @@ PLAN = Plan("toys", "toys.yaml", (Instance("patrol", "mission", MissionConfig(),
 @dataclass(frozen=True, slots=True)
 class Juggle(Command):
     about = "juggler"
+    balls: int = 3
+
+
+@component("toy_juggler")
+class Juggler(Component[Config]):
+    """A component of a stranger, with a request of its own."""
+
+    @answers(Juggle)
+    def juggle(self, request: Juggle) -> str:
+        return f"{request.balls} balls"
 
 
 class Desk:
     """A supervisor without processes: everything that it would do is noted."""
 
-    def __init__(self, *, is_stepped: bool = False) -> None:
+    def __init__(self, plan: Plan = PLAN, *, is_stepped: bool = False) -> None:
         self.sent: list[tuple[str, say.Order]] = []
         self.texts: list[str] = []
         self.replies: list[tuple[int, object, bool]] = []
-        self.conductor = Conductor(PLAN, RunOptions(is_stepped=is_stepped), Scheduler(), self, router=None)
+        self.conductor = Conductor(plan, RunOptions(is_stepped=is_stepped), Scheduler(), self, router=None)
         self.handler = RequestHandler(self, is_stepped=is_stepped)
         self.conductor.states["patrol"] = ("active", 0)
         self.conductor.members["mission"].is_configured = True
@@ -122,6 +134,16 @@ def test_a_command_goes_to_the_component_that_takes_it_which_answers() -> None:
     desk.handler.handle(as_data(PauseMission()), 5)
     assert desk.sent == [("mission", say.Ask(5, "patrol", as_data(PauseMission())))]
     assert desk.replies == []
+
+
+def test_a_component_of_a_stranger_brings_requests_of_its_own() -> None:
+    desk = Desk(replace(PLAN, instances=(*PLAN.instances, Instance("clown", "toy_juggler", Config(), "ring"))))
+    desk.conductor.states["clown"] = ("active", 0)
+    desk.handler.handle(as_data(Juggle(5)), 5)
+    ((process, asked),) = desk.sent
+    assert (process, asked) == ("ring", say.Ask(5, "clown", as_data(Juggle(5))))
+    host = Bench(instance("clown", "toy_juggler")).host
+    assert host.ask("clown", host.request("clown", as_data(Juggle(5)))) == "5 balls"
 
 
 def test_a_command_that_nobody_can_take_is_refused() -> None:
