@@ -15,8 +15,8 @@ from rbxcompose.clock import MonotonicClock
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.host import Host
-from rbxcompose.runtime.inbox import Inbox
+from rbxcompose.runtime.process_group.host import Host
+from rbxcompose.runtime.process_group.inbox import Inbox
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk import Component, Config, In, component
 from rbxcompose.testing import instance
@@ -85,7 +85,7 @@ class _Group:
             clock,
             bus,
             lambda record: None,
-            lambda event, data: None,
+            lambda notice: None,
             post=inbox.put,
         )
         host.configure()

@@ -28,8 +28,8 @@ from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterValue, SetParamet
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.host import Host
-from rbxcompose.runtime.inbox import Inbox
+from rbxcompose.runtime.process_group.host import Host
+from rbxcompose.runtime.process_group.inbox import Inbox
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.testing.bench import instance
 
@@ -90,9 +90,7 @@ class OurEcho(Ours):
         self.bus.serve("echo", "ask", SetBool, lambda request: SetBool.Response(success=request.data))
         battery = instance("battery", "battery_sim", {"runtime": "45 s"})
         plan = Plan("bench", "bench.yaml", (battery,))
-        host = Host(
-            plan, [battery], self.scheduler, self.clock, self.bus, lambda record: None, lambda event, data: None
-        )
+        host = Host(plan, [battery], self.scheduler, self.clock, self.bus, lambda record: None, lambda notice: None)
         host.configure()
         host.activate(["battery"])
         host.start()

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from rbxcompose.compiler import compile_robot
 from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.robot_events import MissionOver
 from rbxcompose.testing.bench import Bench
 
 ROOT = Path(__file__).parents[1]
@@ -62,7 +63,7 @@ def drive() -> Drive:
         sys.exit("the patrol robot has findings: see rbxcompose check robots/turtlebot")
     bench = Bench(plan=plan)
     odometry = bench.collect("/odom", Odometry)
-    bench.run_until(lambda: any(event == "mission_ended" for event, _ in bench.events))
+    bench.run_until(lambda: any(isinstance(event, MissionOver) for event in bench.events))
     told = [(record.time, record.text) for record in bench.records if record.source == "mission"]
     left, words = next((time, text) for time, text in told if text.startswith("interrupt battery_low:"))
     resumed = next(time for time, text in told if text.startswith("interrupt battery_low done"))

@@ -155,7 +155,7 @@ class Bus:
         self._node(owner).keep(watched)
         return writers
 
-    def window(self, owner: str, key: str, answer: Callable[[], str]) -> Window:
+    def window(self, owner: str, key: str, answer: Callable[[], object]) -> Window:
         """Let tools outside see something of a component at a key; `answer` returns the whole as JSON."""
         node = self._node(owner)
         return _kept(node, Window(node, key, answer))

@@ -18,8 +18,9 @@ from rbxcompose.bus.transport import Answer, Closable, Question
 from rbxcompose.bus.witness import Call, Witness
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.types import Message, Service
+from rbxcompose.requests import Refused
 from rbxcompose.scheduler import Event
-from rbxcompose.sdk.bound import Refused, Reply
+from rbxcompose.sdk.bound import Reply
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)

@@ -15,16 +15,16 @@ from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.local import Node
 from rbxcompose.bus.transport import Question
 from rbxcompose.qos import Qos
-from rbxcompose.sdk.bound import Refused
+from rbxcompose.requests import Refused
 
 SCHEMA = 1
 GRACE = 2.0  # [s] after a question in which somebody counts as listening: the transport may know of it later
 
 
 class Window:
-    """Tells news to those who listen; `answer` returns the whole as JSON, or raises Refused with the reason."""
+    """Tells news to those who listen; `answer` returns the whole as data for JSON, or raises Refused."""
 
-    def __init__(self, node: Node, key: str, answer: Callable[[], str]) -> None:
+    def __init__(self, node: Node, key: str, answer: Callable[[], object]) -> None:
         process, transport = node.process, node.process.transport
         self._source = f"{transport.session}/{next(process.ids)}"
         self._clock, self._answer = process.clock, answer
@@ -54,14 +54,14 @@ class Window:
     def _asked(self, question: Question) -> None:
         self._asked_at = self._clock.now()
         try:
-            value = json.loads(self._answer())
+            message = self._message(self._answer())
         except Refused as refusal:
             question.fail(str(refusal))
         except Exception as error:
             question.fail(f"{type(error).__name__}: {error}")
             raise
         else:
-            question.reply(self._message(value), b"")
+            question.reply(message, b"")
 
     def _message(self, value: object) -> bytes:
         message = {"schema": SCHEMA, "source": self._source, "sequence": self._sequence, "value": value}

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.common.guest import Guest
-from rbxcompose.cli.common.nouns import add_server_verbs, tell_list, visit
+from rbxcompose.cli.bus.entities import add_server_verbs, tell_list, visit
+from rbxcompose.cli.bus.guest import Guest
 
 _VERB = ("send", "send a goal, print feedback and result")
 
@@ -29,6 +29,6 @@ def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
 
 
 def _send(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.sending import send  # what messages need would slow down the list
+    from rbxcompose.cli.bus.action_send import send  # what messages need would slow down the list
 
     return send(guest, arguments)

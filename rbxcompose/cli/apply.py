@@ -10,11 +10,10 @@ import argparse
 import json
 import sys
 
-from rbxcompose.cli.common.answering import misused
-from rbxcompose.cli.common.applying import Proposal
-from rbxcompose.cli.common.robot_options import add_layer_options, compiled
-from rbxcompose.cli.common.robots import REFUSED, NotDoneError
-from rbxcompose.cli.common.telling import refuse, tell, tell_report
+from rbxcompose.cli.output.console import misused, refuse, tell, tell_report
+from rbxcompose.cli.project.robot_options import add_layer_options, compiled
+from rbxcompose.cli.robots.lookup import REFUSED, NotDoneError
+from rbxcompose.cli.robots.proposal import Proposal
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 1
     try:
         proposal = Proposal.of(compilation.plan, compilation.robot)
-        tell(json.dumps(proposal.found) if arguments.json else proposal.text())
+        tell(json.dumps(proposal.data) if arguments.json else proposal.text())
         return _carry_out(proposal, arguments)
     except NotDoneError as error:
         return refuse(error.finding)

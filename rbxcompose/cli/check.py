@@ -13,10 +13,10 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rbxcompose.cli.common.fixing import fix, only_ours
-from rbxcompose.cli.common.robot_options import add_layer_options, compiled
-from rbxcompose.cli.common.targets import Targets, projects_of, targets
-from rbxcompose.cli.common.telling import FINDINGS, has_colour, tell
+from rbxcompose.cli.output.console import FINDINGS, has_colour, tell
+from rbxcompose.cli.project.fixes import fix, only_ours
+from rbxcompose.cli.project.robot_options import add_layer_options, compiled
+from rbxcompose.cli.project.targets import Targets, projects_of, targets
 from rbxcompose.compiler import Compilation
 from rbxcompose.findings import Report
 from rbxcompose.formats import format_names, renderer

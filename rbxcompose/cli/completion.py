@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.common.telling import tell
+from rbxcompose.cli.output.console import tell
 
 # A script asks for what fits each time, so that it need not be written anew with each version.
 

@@ -12,12 +12,12 @@ import platform
 import sys
 import time
 
-from rbxcompose.cli.common.bus_place import place_of
-from rbxcompose.cli.common.guest import Guest, Heard
-from rbxcompose.cli.common.messages import to_json
-from rbxcompose.cli.common.nouns import add_json_option
-from rbxcompose.cli.common.robots import NotDoneError, add_robot_option, find_robot
-from rbxcompose.cli.common.telling import FINDINGS, has_colour, refuse, tell, tell_report
+from rbxcompose.cli.bus.entities import add_json_option
+from rbxcompose.cli.bus.guest import Guest, Heard
+from rbxcompose.cli.bus.messages import to_json
+from rbxcompose.cli.bus.place import place_of
+from rbxcompose.cli.output.console import FINDINGS, has_colour, refuse, tell, tell_report
+from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, find_robot
 from rbxcompose.compiler import compile_robot
 from rbxcompose.doctor import machine
 from rbxcompose.doctor.examining import Answer, examine_all, has_errors

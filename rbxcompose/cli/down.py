@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 
-from rbxcompose.cli.common.robots import NO_ANSWER, NotDoneError, add_robot_option, find_robot, known_state
-from rbxcompose.cli.common.telling import refuse, tell
-from rbxcompose.runtime.control import NoAnswerError, RefusedError, ask
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.robots.lookup import NO_ANSWER, NotDoneError, add_robot_option, find_robot, known_state
+from rbxcompose.requests import Refused
+from rbxcompose.runtime.control import NoAnswerError, ask
 from rbxcompose.runtime.folder import RobotFolder
-from rbxcompose.runtime.leftovers import end_leftovers, kill_supervisor
 from rbxcompose.runtime.processes import wait_until_ended
+from rbxcompose.runtime.requests import BringDown
+from rbxcompose.runtime.supervision.leftovers import end_leftovers, kill_supervisor
 
 _ANSWER = 1.0  # [s]
 _ORDERLY = 4.0  # [s] for a supervisor to bring everything down
@@ -62,7 +64,7 @@ def _end(folder: RobotFolder) -> list[str]:
 
 def _asked(folder: RobotFolder) -> bool:
     try:
-        ask(folder, {"verb": "down"}, timeout=_ANSWER)
-    except (NoAnswerError, RefusedError):
+        ask(folder, BringDown(), timeout=_ANSWER)
+    except (NoAnswerError, Refused):
         return False
     return True

@@ -15,13 +15,13 @@ from collections.abc import Iterable
 
 from rbxcompose.bus.graph import Name
 from rbxcompose.bus.topics import Publisher
-from rbxcompose.cli.common.bus_place import add_bus_options
-from rbxcompose.cli.common.dead_man import PERIOD, DeadMan, Velocity, is_end, keys
-from rbxcompose.cli.common.guest import NAME, Guest
-from rbxcompose.cli.common.nouns import NO_NAME, NOBODY, add_timeout_option, positive, visit
-from rbxcompose.cli.common.robots import NotDoneError
-from rbxcompose.cli.common.telling import refuse, tell
-from rbxcompose.cli.common.terminal import raw
+from rbxcompose.cli.bus.dead_man import PERIOD, DeadMan, Velocity, is_end, keys
+from rbxcompose.cli.bus.entities import NO_NAME, NOBODY, add_timeout_option, positive, visit
+from rbxcompose.cli.bus.guest import NAME, Guest
+from rbxcompose.cli.bus.place import add_bus_options
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.output.terminal import raw
+from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.findings import kind
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.qos import Qos

@@ -9,8 +9,8 @@ from __future__ import annotations
 import argparse
 import json
 
-from rbxcompose.cli.common.robot_options import add_layer_options, layers_of
-from rbxcompose.cli.common.telling import FINDINGS, tell, tell_report
+from rbxcompose.cli.output.console import FINDINGS, tell, tell_report
+from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
 from rbxcompose.seeing.expand import expand, expand_data
 

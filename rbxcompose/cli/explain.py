@@ -8,8 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from rbxcompose.cli.common.answering import misused
-from rbxcompose.cli.common.telling import tell
+from rbxcompose.cli.output.console import misused, tell
 from rbxcompose.findings import Kind, suggest
 from rbxcompose.pages import all_kinds, body_of, family_of, text_of, title_of
 

@@ -9,8 +9,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from rbxcompose.cli.common.robot_options import add_layer_options, layers_of
-from rbxcompose.cli.common.telling import FINDINGS, tell, tell_report
+from rbxcompose.cli.output.console import FINDINGS, tell, tell_report
+from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
 from rbxcompose.replacing import replace_file
 from rbxcompose.seeing.diagram import diagram_of

@@ -10,9 +10,9 @@ import sys
 import time
 from collections.abc import Iterable, Sequence
 
-from rbxcompose.cli.common.robots import NOT_UP, NotDoneError, add_robot_option, find_robot, known_state
-from rbxcompose.cli.common.story import Story
-from rbxcompose.cli.common.telling import has_colour, refuse, tell
+from rbxcompose.cli.output.console import has_colour, refuse, tell
+from rbxcompose.cli.robots.lookup import NOT_UP, NotDoneError, add_robot_option, find_robot, known_state
+from rbxcompose.cli.robots.story import Story
 from rbxcompose.diagnostics.levels import LOG_LEVELS
 from rbxcompose.findings import suggest
 from rbxcompose.runtime.folder import RobotFolder, base_folder

@@ -9,7 +9,7 @@ import argparse
 import os
 from importlib.util import find_spec
 
-from rbxcompose.cli.common.telling import refuse
+from rbxcompose.cli.output.console import refuse
 from rbxcompose.findings import kind
 
 NOT_INSTALLED = kind(

@@ -51,7 +51,7 @@ def load(verb: str) -> Verb:
 
 def parser_of(name: str, verb: Verb) -> argparse.ArgumentParser:
     """Return the parser of a verb."""
-    from rbxcompose.cli.common.answering import Parser  # help can do without
+    from rbxcompose.cli.output.console import Parser  # help can do without
 
     parser = Parser(f"rbxcompose {name}", description=verb.__doc__ or "", allow_abbrev=False)
     verb.add_arguments(parser)
@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.write(f"rbxcompose {rbxcompose.__version__}\n")
         return 0
     if words[0] == "__complete":  # what the scripts of `completion` ask
-        from rbxcompose.cli.common.known_values import complete
+        from rbxcompose.cli.completions.known_values import complete
 
         return complete(words[1:])
     if words[0] not in verbs():
@@ -89,7 +89,7 @@ def _interrupted(number: int, frame: FrameType | None) -> NoReturn:
 
 def _run(name: str, words: Sequence[str]) -> int:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # pydantic would search all that is installed for some
-    from rbxcompose.cli.common.answering import answered
+    from rbxcompose.cli.output.console import answered
 
     try:
         verb = load(name)

@@ -9,11 +9,28 @@ import argparse
 import json
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TypeVar
 
-from rbxcompose.cli.common.asking import add_asking_options, pass_on
-from rbxcompose.cli.common.robots import NotDoneError, find_robot, request
-from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.robots.commands import add_asking_options, pass_on
+from rbxcompose.cli.robots.lookup import REFUSED, WHICH, NotDoneError, answer_of, find_robot
+from rbxcompose.executive.requests import (
+    CancelMission,
+    ListedMission,
+    ListMissions,
+    LookAtMission,
+    PauseMission,
+    ReadLog,
+    ResumeMission,
+    RunMission,
+    Seen,
+    ShowPicture,
+    settings,
+)
+from rbxcompose.requests import Command, Query, Refused
+from rbxcompose.typed_json import to_data
+
+A = TypeVar("A")
 
 _PERIOD = 0.2  # [s] between two questions to a robot that is followed
 _FORMATS = "text", "mermaid", "dot", "html"
@@ -32,9 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     begin = _named(add("run", "begin a mission beside those that run", _run), needed=True)
     begin.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
     begin.add_argument("--from", dest="start", default="", metavar="STATE", help="begin in this state: 'outer.inner'")
-    _named(add("cancel", "end a mission for good", _say))
-    _named(add("pause", "hold a mission; its timers stand still", _say))
-    _named(add("resume", "go on where a mission was held", _say))
+    _named(add("cancel", "end a mission for good", _to(CancelMission)))
+    _named(add("pause", "hold a mission; its timers stand still", _to(PauseMission)))
+    _named(add("resume", "go on where a mission was held", _to(ResumeMission)))
     _named(add("status", "tell where a mission is, with its data", _status))
     _named(add("watch", "show a mission live", _watch))
     log = _named(add("log", "tell what missions did, as JSON, one line each", _log))
@@ -78,37 +95,34 @@ def run(arguments: argparse.Namespace) -> int:
         return refuse(error.finding)
 
 
-def ask(robot: str | None, words: str) -> Any:
+def ask(robot: str | None, query: Query[A]) -> A:
     """Return the answer of a robot's executive to a question."""
-    return json.loads(str(request(find_robot(robot), {"verb": "query", "to": "mission", "word": words})))
+    return answer_of(find_robot(robot), query)
 
 
-def _say(arguments: argparse.Namespace) -> int:
-    return _pass(arguments, arguments.action, arguments.name)
+def _to(command: Callable[[str], Command]) -> Callable[[argparse.Namespace], int]:
+    return lambda arguments: pass_on(arguments, command(arguments.name))
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    words = [word for one in arguments.sets for word in ("--set", one)]
-    return _pass(arguments, "run", arguments.name, *words, *(["--from", arguments.start] if arguments.start else []))
-
-
-def _pass(arguments: argparse.Namespace, *words: str) -> int:
-    import shlex
-
-    line = shlex.join(word for word in words if word)
-    return pass_on(arguments, {"verb": "command", "to": "mission", "word": line})
+    folder = find_robot(arguments.robot)
+    try:
+        inputs = settings(arguments.sets)
+    except Refused as refusal:
+        return refuse(REFUSED.at(None, f"'{folder.path.name}' refuses: {refusal}"))
+    return pass_on(arguments, RunMission(arguments.name, inputs, arguments.start))
 
 
 def _list(arguments: argparse.Namespace) -> int:
-    missions = ask(arguments.robot, "ls")
-    tell(json.dumps(missions) if arguments.json else _table(missions))
+    missions = ask(arguments.robot, ListMissions())
+    tell(json.dumps(to_data(missions)) if arguments.json else _table(missions))
     return 0
 
 
-def _table(missions: Sequence[dict[str, Any]]) -> str:
-    names = max((len(one["name"]) for one in missions), default=0)
-    states = max((len(one["state"]) for one in missions), default=0)
-    lines = [f"{one['name']:<{names}}  {one['state']:<{states}}  {one['about']}".rstrip() for one in missions]
+def _table(missions: Sequence[ListedMission]) -> str:
+    names = max((len(one.name) for one in missions), default=0)
+    states = max((len(one.state) for one in missions), default=0)
+    lines = [f"{one.name:<{names}}  {one.state:<{states}}  {one.about}".rstrip() for one in missions]
     return "\n".join(lines) or "this robot has no missions"
 
 
@@ -119,20 +133,18 @@ def _chosen(arguments: argparse.Namespace) -> str:
     from rbxcompose.missions.mirror import ACTIVE
     from rbxcompose.missions.statuses import IDLE, NAMES
 
-    known = [one for one in ask(arguments.robot, "ls") if one["state"] != NAMES[IDLE]]
-    active = [one for one in known if one["state"] in ACTIVE] or known
+    known = [one for one in ask(arguments.robot, ListMissions()) if one.state != NAMES[IDLE]]
+    active = [one for one in known if one.state in ACTIVE] or known
     if len(active) != 1:
-        from rbxcompose.cli.common.robots import WHICH
-
-        names = ", ".join(one["name"] for one in active)
+        names = ", ".join(one.name for one in active)
         words = f"which mission: {names}?" if active else "no mission is running"
         raise NotDoneError(WHICH.at(None, words, help="'rbxcompose mission ls' lists them"))
-    return str(active[0]["name"])
+    return active[0].name
 
 
 def _status(arguments: argparse.Namespace) -> int:
     name = _chosen(arguments)
-    seen = ask(arguments.robot, f"state {name} 0")
+    seen = ask(arguments.robot, LookAtMission(name))
     if arguments.json:
         tell(json.dumps(seen))
         return 0
@@ -140,19 +152,19 @@ def _status(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _drawn(name: str, robot: str | None, seen: dict[str, Any], width: int, *, colour: bool = False) -> list[str]:
-    from rbxcompose.cli.common.mission_watch import lines_of
+def _drawn(name: str, robot: str | None, seen: Seen, width: int, *, colour: bool = False) -> list[str]:
+    from rbxcompose.cli.missions.live_view import lines_of
     from rbxcompose.missions.picture import picture_from_data
 
-    return lines_of(picture_from_data(ask(robot, f"picture {name}")), seen, width, colour=colour)
+    return lines_of(picture_from_data(ask(robot, ShowPicture(name))), seen, width, colour=colour)
 
 
 def _watch(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.mission_watch import follow, watch
+    from rbxcompose.cli.missions.live_view import follow, watch
 
     name = _chosen(arguments)
     do = follow if arguments.json else watch
-    return do(lambda words: ask(arguments.robot, words), name, _PERIOD)
+    return do(find_robot(arguments.robot), name, _PERIOD)
 
 
 def _log(arguments: argparse.Namespace) -> int:
@@ -161,9 +173,9 @@ def _log(arguments: argparse.Namespace) -> int:
     number = 0
     try:
         while True:
-            news = ask(arguments.robot, f"log {number}")
-            number = news["next"]
-            for record in news["records"]:
+            news = ask(arguments.robot, ReadLog(number))
+            number = news.next
+            for record in news.records:
                 is_meant = not arguments.name or record["mission"] == arguments.name
                 if is_meant and (arguments.all or record["event"] not in INPUTS):
                     tell(json.dumps(record))
@@ -175,24 +187,24 @@ def _log(arguments: argparse.Namespace) -> int:
 
 
 def _replay(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.mission_replay import replay_log
+    from rbxcompose.cli.missions.replay import replay_log
 
     return replay_log(arguments)
 
 
 def _show(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.mission_files import show
+    from rbxcompose.cli.missions.files import show
 
-    return show(arguments, lambda words: ask(None, words))
+    return show(arguments)
 
 
 def _skills(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.mission_files import skills
+    from rbxcompose.cli.missions.files import skills
 
     return skills(arguments)
 
 
 def _explore(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.mission_explore import explore
+    from rbxcompose.cli.missions.exploration import explore
 
     return explore(arguments)

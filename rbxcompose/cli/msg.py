@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import rbxcompose
-from rbxcompose.cli.common.messages import NO_TYPE, to_json
-from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.cli.bus.messages import NO_TYPE, to_json
+from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.msgs.generate import all_structures
 from rbxcompose.msgs.hashes import type_hash

@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rbxcompose.cli.common.new_mission import MistakenRobotError, find_home
-from rbxcompose.cli.common.questions import Asker, CancelledError
-from rbxcompose.cli.common.telling import FINDINGS, refuse, tell, tell_report
+from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.cli.project.new_mission import MistakenRobotError, find_home
+from rbxcompose.cli.project.questions import Asker, CancelledError
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.plain import plain
 from rbxcompose.scaffold import component, mission, part, robot

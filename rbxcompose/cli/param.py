@@ -12,10 +12,7 @@ from typing import Any, TypeVar
 
 from rbxcompose.bus.graph import Name
 from rbxcompose.bus.services import Client
-from rbxcompose.cli.common.bus_place import add_bus_options
-from rbxcompose.cli.common.guest import NAME, Guest
-from rbxcompose.cli.common.messages import to_json, type_of
-from rbxcompose.cli.common.nouns import (
+from rbxcompose.cli.bus.entities import (
     NO_NAME,
     NOBODY,
     SAID_NO,
@@ -24,8 +21,11 @@ from rbxcompose.cli.common.nouns import (
     table,
     visit,
 )
-from rbxcompose.cli.common.robots import NotDoneError
-from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.cli.bus.guest import NAME, Guest
+from rbxcompose.cli.bus.messages import to_json, type_of
+from rbxcompose.cli.bus.place import add_bus_options
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping as MappingNode
 from rbxcompose.manifest.validate import to_plain

@@ -9,8 +9,8 @@ import argparse
 import json
 from pathlib import Path
 
-from rbxcompose.cli.common.robot_options import add_layer_options, layers_of
-from rbxcompose.cli.common.telling import FINDINGS, refuse, tell, tell_report
+from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.limits import ALL_BYTES

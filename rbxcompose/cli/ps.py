@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping
-from typing import Any, cast
+from dataclasses import replace
+from typing import Any
 
-from rbxcompose.cli.common.robots import NotDoneError, add_robot_option, find_robot, known_state, request
-from rbxcompose.cli.common.telling import refuse, tell
-from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, State
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot, known_state
+from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process
+from rbxcompose.runtime.requests import RobotStatus
 
 _COLUMNS = ("name", "type", "state", "process", "pid", "restarts")
 _ANSWER = 0.4  # [s] for a supervisor to answer; what it has written is as new as that, but for what died since
@@ -44,49 +46,39 @@ def _shown(folder: RobotFolder) -> dict[str, Any]:
     if written is not None and written.supervisor.is_stopped:
         return _last_known(written)  # it cannot answer
     try:
-        state = cast(dict[str, Any], request(folder, {"verb": "ps"}, timeout=_ANSWER))
+        state = answer_of(folder, RobotStatus(), timeout=_ANSWER)
     except NotDoneError:
         written = known_state(folder)
         if written is None:
             raise
         return _last_known(written)
-    return {
-        "robot": state["robot"],
-        "supervisor": {"pid": state["supervisor"]["pid"]},
-        "router": {"endpoint": state["router"]},
-        "components": [_component(**one) for one in state["components"]],
-    }
+    return _data(state, state.supervisor.pid)
 
 
-def _component(*, state: str, waits_for: str | None, **fields: object) -> dict[str, object]:
-    """Return one component; one that is blocked tells by whom."""
-    if waits_for is None:
-        return {**fields, "state": state}
-    return {**fields, "state": _BLOCKED if state == "active" else state, "waits_for": waits_for}
-
-
-def _last_known(state: State) -> dict[str, Any]:
-    alive = state.alive()
-    components = [
-        _component(
-            name=one.name,
-            type=one.type,
-            state=_state(one, alive),
-            process=one.process,
-            pid=alive[one.process].pid if one.process in alive else None,
-            restarts=one.restarts,
-            waits_for=one.waits_for,
-        )
-        for one in state.components
-    ]
-    supervisor = state.supervisor.pid if state.is_supervised else None
-    router = state.router if "router" in alive else None
+def _data(state: RobotState, supervisor: int | None) -> dict[str, Any]:
     return {
         "robot": state.robot,
         "supervisor": {"pid": supervisor},
-        "router": {"endpoint": router},
-        "components": components,
+        "router": {"endpoint": state.router},
+        "components": [_component(one) for one in state.components],
     }
+
+
+def _component(one: ComponentState) -> dict[str, object]:
+    """Return one component; one that is blocked tells by whom."""
+    fields = {"name": one.name, "type": one.type, "process": one.process, "pid": one.pid, "restarts": one.restarts}
+    if one.waits_for is None:
+        return {**fields, "state": one.state}
+    return {**fields, "state": _BLOCKED if one.state == "active" else one.state, "waits_for": one.waits_for}
+
+
+def _last_known(state: RobotState) -> dict[str, Any]:
+    alive = state.alive()
+    pids = {name: process.pid for name, process in alive.items()}
+    components = tuple(replace(one, state=_state(one, alive), pid=pids.get(one.process)) for one in state.components)
+    router = state.router if "router" in alive else None
+    supervisor = state.supervisor.pid if state.is_supervised else None
+    return _data(replace(state, components=components, router=router), supervisor)
 
 
 def _state(one: ComponentState, alive: Mapping[str, Process]) -> str:

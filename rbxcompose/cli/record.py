@@ -13,19 +13,19 @@ import re
 from datetime import datetime
 from pathlib import Path
 
-from rbxcompose.cli.common.bus_place import BusPlace, add_bus_options, find_place
-from rbxcompose.cli.common.guest import Guest
-from rbxcompose.cli.common.nouns import add_json_option, seconds
-from rbxcompose.cli.common.recording_bus import Tap
-from rbxcompose.cli.common.recordings import (
+from rbxcompose.cli.bus.entities import add_json_option, seconds
+from rbxcompose.cli.bus.guest import Guest
+from rbxcompose.cli.bus.place import BusPlace, add_bus_options, find_place
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.recordings.options import (
     add_selection_options,
     count_table,
     recover_in,
     selection_of,
     warn,
 )
-from rbxcompose.cli.common.robots import NotDoneError, find_robot
-from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.cli.recordings.tap import Tap
+from rbxcompose.cli.robots.lookup import NotDoneError, find_robot
 from rbxcompose.plain import plain
 from rbxcompose.recording.codes import LOST, UNWRITABLE
 from rbxcompose.recording.files import ENDING

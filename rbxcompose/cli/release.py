@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.common.asking import add_asking_options, pass_on
+from rbxcompose.cli.robots.commands import add_asking_options, pass_on
+from rbxcompose.runtime.requests import ReleaseRobot
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,4 +18,4 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Release the robot."""
-    return pass_on(arguments, {"verb": "release"})
+    return pass_on(arguments, ReleaseRobot())

@@ -17,22 +17,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rbxcompose.cli.common.answering import misused
-from rbxcompose.cli.common.bus_place import add_bus_options, find_place
-from rbxcompose.cli.common.guest import Guest
-from rbxcompose.cli.common.nouns import seconds
-from rbxcompose.cli.common.recording_bus import Player
-from rbxcompose.cli.common.recordings import (
+from rbxcompose.cli.bus.entities import seconds
+from rbxcompose.cli.bus.guest import Guest
+from rbxcompose.cli.bus.place import add_bus_options, find_place
+from rbxcompose.cli.output.console import misused, refuse, tell
+from rbxcompose.cli.project.robot_options import add_layer_options
+from rbxcompose.cli.recordings.options import (
     add_selection_options,
     count_table,
     recover_in,
     selection_of,
     warn,
 )
-from rbxcompose.cli.common.rerunning import run_again
-from rbxcompose.cli.common.robot_options import add_layer_options
-from rbxcompose.cli.common.robots import NotDoneError
-from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.cli.recordings.rerun import run_again
+from rbxcompose.cli.recordings.tap import Player
+from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.findings import MOST_NAMES, Finding
 from rbxcompose.plain import plain
 from rbxcompose.qos import Qos

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.common.telling import tell
+from rbxcompose.cli.output.console import tell
 from rbxcompose.schema.documents import MAKERS, as_text, installed_schema
 
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.common.guest import Guest
-from rbxcompose.cli.common.nouns import add_server_verbs, tell_list, visit
+from rbxcompose.cli.bus.entities import add_server_verbs, tell_list, visit
+from rbxcompose.cli.bus.guest import Guest
 
 _VERB = ("call", "send a request and print the response")
 
@@ -28,6 +28,6 @@ def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
 
 
 def _call(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.calling import call  # what messages need would slow down the list
+    from rbxcompose.cli.bus.service_call import call  # what messages need would slow down the list
 
     return call(guest, arguments)

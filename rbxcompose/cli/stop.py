@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.common.asking import add_asking_options, pass_on
+from rbxcompose.cli.robots.commands import add_asking_options, pass_on
+from rbxcompose.runtime.requests import StopRobot
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,4 +19,4 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Stop the robot."""
-    return pass_on(arguments, {"verb": "stop"})
+    return pass_on(arguments, StopRobot())

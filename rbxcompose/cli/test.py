@@ -14,8 +14,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from rbxcompose.cli.common.answering import misused
-from rbxcompose.cli.common.telling import FINDINGS, has_colour, tell, tell_report
+from rbxcompose.cli.output.console import FINDINGS, has_colour, misused, tell, tell_report
 from rbxcompose.findings import Report
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.trials.coverage import Coverage

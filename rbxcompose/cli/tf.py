@@ -11,11 +11,7 @@ from typing import Any
 
 from rbxcompose.body.transforms import TransformTree
 from rbxcompose.bus.graph import Name
-from rbxcompose.cli.common.bus_place import add_bus_options
-from rbxcompose.cli.common.guest import Guest, Heard
-from rbxcompose.cli.common.listening import Reader
-from rbxcompose.cli.common.messages import shown, to_json
-from rbxcompose.cli.common.nouns import (
+from rbxcompose.cli.bus.entities import (
     NO_NAME,
     NOBODY,
     add_count_options,
@@ -24,7 +20,11 @@ from rbxcompose.cli.common.nouns import (
     hertz,
     visit,
 )
-from rbxcompose.cli.common.telling import refuse, tell
+from rbxcompose.cli.bus.guest import Guest, Heard
+from rbxcompose.cli.bus.messages import shown, to_json
+from rbxcompose.cli.bus.place import add_bus_options
+from rbxcompose.cli.bus.topic_echo import Reader
+from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.geometry import Transform3, yaw_of
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.plain import plain

@@ -11,15 +11,15 @@ import os
 import shutil
 import sys
 
-from rbxcompose.cli.common.bus_place import place_of
-from rbxcompose.cli.common.guest import Guest
-from rbxcompose.cli.common.messages import to_json
-from rbxcompose.cli.common.nouns import add_json_option
-from rbxcompose.cli.common.picture import Picture, lines_of
-from rbxcompose.cli.common.robots import NOT_UP, NotDoneError, add_robot_option, find_robot
-from rbxcompose.cli.common.sampling import Sampler
-from rbxcompose.cli.common.telling import has_colour, refuse, tell
-from rbxcompose.cli.common.terminal import full_screen, raw, show
+from rbxcompose.cli.bus.entities import add_json_option
+from rbxcompose.cli.bus.guest import Guest
+from rbxcompose.cli.bus.messages import to_json
+from rbxcompose.cli.bus.place import place_of
+from rbxcompose.cli.output.console import has_colour, refuse, tell
+from rbxcompose.cli.output.terminal import full_screen, raw, show
+from rbxcompose.cli.robots.lookup import NOT_UP, NotDoneError, add_robot_option, find_robot
+from rbxcompose.cli.robots.picture import Picture, lines_of
+from rbxcompose.cli.robots.sampling import Sampler
 
 _PERIOD = 1.0  # [s] between two looks
 _MOST_READ = 1024  # bytes of keys at once

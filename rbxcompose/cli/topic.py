@@ -9,9 +9,7 @@ import argparse
 import json
 
 from rbxcompose.bus.graph import End
-from rbxcompose.cli.common.bus_place import add_bus_options
-from rbxcompose.cli.common.guest import Guest
-from rbxcompose.cli.common.nouns import (
+from rbxcompose.cli.bus.entities import (
     add_count_options,
     add_json_option,
     add_ls_options,
@@ -25,7 +23,9 @@ from rbxcompose.cli.common.nouns import (
     visit,
     wanted,
 )
-from rbxcompose.cli.common.telling import tell
+from rbxcompose.cli.bus.guest import Guest
+from rbxcompose.cli.bus.place import add_bus_options
+from rbxcompose.cli.output.console import tell
 
 _ENDS = ("publishers", "subscriptions")
 _WINDOW = 100  # messages
@@ -97,18 +97,18 @@ def _qos(end: End) -> str:
 
 
 def _echo(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.listening import echo
+    from rbxcompose.cli.bus.topic_echo import echo
 
     return echo(guest, arguments)
 
 
 def _hz(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.measuring import measure
+    from rbxcompose.cli.bus.topic_hz import measure
 
     return measure(guest, arguments)
 
 
 def _pub(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.common.publishing import publish
+    from rbxcompose.cli.bus.topic_pub import publish
 
     return publish(guest, arguments)

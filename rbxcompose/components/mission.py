@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Annotated, Any, TypeVar
 
@@ -12,11 +12,25 @@ from pydantic import InstanceOf, WithJsonSchema
 from rbxcompose.executive import broadcast
 from rbxcompose.executive.arrivals import Arrivals
 from rbxcompose.executive.missions import Missions
+from rbxcompose.executive.requests import (
+    CancelMission,
+    ListedMission,
+    ListMissions,
+    LogPart,
+    LookAtAll,
+    LookAtMission,
+    PauseMission,
+    PictureData,
+    ReadLog,
+    ResumeMission,
+    RunMission,
+    Seen,
+    ShowPicture,
+)
 from rbxcompose.executive.running import PATIENCE, Running
 from rbxcompose.executive.shell import ENDS, PUBLISHES, VALUE, port_name
 from rbxcompose.executive.topic_skills import Desks
 from rbxcompose.executive.wiring import EVENTS, ports_for
-from rbxcompose.executive.words import words_of
 from rbxcompose.executive.world import RobotWorld
 from rbxcompose.missions.events import MissionEnded, MissionEvent
 from rbxcompose.missions.logbook import INPUTS, Record
@@ -28,6 +42,7 @@ from rbxcompose.missions.using import Using
 from rbxcompose.missions.watching import POSE
 from rbxcompose.missions.world import World
 from rbxcompose.msgs.std_msgs import String
+from rbxcompose.robot_events import MissionOver, MissionWaits
 from rbxcompose.sdk import (
     Component,
     Config,
@@ -35,10 +50,12 @@ from rbxcompose.sdk import (
     Place,
     Port,
     Refused,
+    answers,
     component,
 )
 
 LOOK_AGAIN = 0.1  # [s] between two looks for a pose that has not come yet
+NO_INPUTS: Mapping[str, str] = {}
 
 
 T = TypeVar("T")
@@ -118,7 +135,7 @@ class Mission(Component[MissionConfig]):
         self.missions = Missions(self.config, self.world, self.story, self.publish)
         self.broadcast = broadcast.Broadcast(self.config.programs, self.context.window)
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
-        self.kept: dict[str, str] = {}  # what people said to begin missions that still run
+        self.kept: dict[str, RunMission] = {}  # by which people began missions that still run
         self.shown = ""  # the status that was told last
         self.planned: float | None = None  # the wake that was asked for last [s]
         self.misfits: set[str] = set()  # values whose messages have another shape
@@ -143,13 +160,13 @@ class Mission(Component[MissionConfig]):
         except Refused as refusal:  # it was begun by a person before
             self.warn(f"mission {name} does not start: {refusal}")
 
-    def begin(self, name: str, inputs: dict[str, str] | None = None, state: str = "") -> Running:
+    def begin(self, name: str, inputs: Mapping[str, str] = NO_INPUTS, state: str = "") -> Running:
         """Begin a mission; a robot that is stopped holds it until the resume.
 
         Raises:
             Refused: if it cannot run, with the reason.
         """
-        one = self.missions.run(name, inputs or {}, state)
+        one = self.missions.run(name, inputs, state)
         if missing := one.missing():
             self.info(f"mission {name} waits for {', '.join(missing)}")
         if self.context.is_stopped:
@@ -209,7 +226,7 @@ class Mission(Component[MissionConfig]):
         if one.loses_patience(self.now):
             text = f"waits for {missing}, of which nothing has come for {PATIENCE:g} s"
             self.warn(f"mission {one.name} {text}")
-            self.context.notify("mission_waits", mission=one.name, message=text)
+            self.context.notify(MissionWaits(one.name, text))
         return [self.now + LOOK_AGAIN if POSE in missing else one.patient_until or self.now]
 
     def plan(self, time: float) -> None:
@@ -238,14 +255,14 @@ class Mission(Component[MissionConfig]):
         self.show(Level.ERROR if end.result == "failure" else Level.OK, f"{name}: {end.result}")
         self.keep()
         if name == self.config.start:
-            self.context.notify("mission_ended", mission=name, outcome=end.result, message=end.words)
+            self.context.notify(MissionOver(name, end.result, end.words))
 
     def stop(self) -> None:
         """Pause all missions; what they were at is asked for again at the resume."""
         self.is_held = not self.missions.runs
         for one in self.missions:
             if not one.is_paused:
-                self.pause(one, "stopped")
+                self.hold_running(one, "stopped")
 
     def brake(self) -> None:
         """End all missions: the robot is going down, or another executive takes over."""
@@ -256,70 +273,35 @@ class Mission(Component[MissionConfig]):
 
     # What people want
 
-    def command(self, verb: str) -> str:
-        """Run, cancel, pause or resume a mission.
+    @answers(RunMission)
+    def run(self, request: RunMission) -> str:
+        """Begin a mission, and begin it again after a crash."""
+        self.begin(request.mission, request.inputs, request.start)
+        self.keep(request)
+        return f"mission {request.mission} begins"
 
-        Raises:
-            Refused: if it cannot be done, with the reason.
-        """
-        words = words_of(verb)
-        match words.verb:
-            case "run":
-                self.begin(words.mission, dict(words.inputs), words.start)
-                self.keep(words.mission, verb)
-                return f"mission {words.mission} begins"
-            case "cancel":
-                return self.cancel(self.missions.running(words.mission))
-            case "pause":
-                one = self.missions.running(words.mission, lambda one: not one.is_paused)
-                if one.is_paused:
-                    raise Refused(f"mission {one.name} is paused already")
-                return self.pause(one, "paused")
-            case "resume":
-                return self.resume(self.missions.running(words.mission, lambda one: one.is_paused, "paused"))
-        return super().command(verb)
-
-    def query(self, words: str) -> str:
-        """Answer in JSON what is asked about missions.
-
-        The questions are `ls`, `picture NAME`, `state NAME SINCE`, `whole NAME` (both of them) and `log NUMBER`.
-
-        Raises:
-            Refused: if there is no such mission, or the question is none.
-        """
-        match words.split():
-            case ["ls"]:
-                return json.dumps(self.missions.listed())
-            case ["picture", name]:
-                return json.dumps(self.missions.picture(name))
-            case ["state", name, since] if since.isdecimal():
-                return json.dumps(self.missions.seen(name, int(since)))
-            case [broadcast.WHOLE, name]:
-                return json.dumps({**self.missions.seen(name), "picture": self.missions.picture(name)})
-            case ["log", number] if number.isdecimal():
-                return json.dumps(self.missions.since(int(number)))
-        raise Refused(f"'{words}' is no question about missions")
-
-    def cancel(self, one: Running) -> str:
-        """End a mission for good and return what is told of it."""
+    @answers(CancelMission)
+    def cancel(self, request: CancelMission) -> str:
+        """End a mission for good."""
+        one = self.missions.running(request.mission)
         one.abort(self.now)
         if one.end is not None:
             self.finish(one.name, one.end)
         self.broadcast.tell(self.missions)
         return f"mission {one.name} cancelled"
 
-    def pause(self, one: Running, why: str) -> str:
-        """Hold a mission and return what is told of it."""
-        one.pause(self.now)
-        self.broadcast.tell(self.missions)
-        return self.tell(f"mission {one.name} {why}")
+    @answers(PauseMission)
+    def pause(self, request: PauseMission) -> str:
+        """Hold a mission."""
+        one = self.missions.running(request.mission, lambda one: not one.is_paused)
+        if one.is_paused:
+            raise Refused(f"mission {one.name} is paused already")
+        return self.hold_running(one, "paused")
 
-    def resume(self, one: Running) -> str:
-        """Go on with a mission and return what is told of it.
-
-        Raises:
-            Refused: if the robot is held by a stop, or the mission is not paused.
-        """
+    @answers(ResumeMission)
+    def resume(self, request: ResumeMission) -> str:
+        """Go on with a mission, unless the robot is held by a stop."""
+        one = self.missions.running(request.mission, lambda one: one.is_paused, "paused")
         if self.context.is_stopped:
             raise Refused("the robot is stopped: release it first")
         if not one.is_paused:
@@ -328,13 +310,44 @@ class Mission(Component[MissionConfig]):
         self.look_soon()
         return self.tell(f"mission {one.name} resumed")
 
-    def keep(self, name: str = "", line: str = "") -> None:
+    @answers(ListMissions)
+    def listed(self, request: ListMissions) -> tuple[ListedMission, ...]:
+        """Return all missions."""
+        return self.missions.listed()
+
+    @answers(ShowPicture)
+    def picture(self, request: ShowPicture) -> PictureData:
+        """Return the picture of a mission."""
+        return self.missions.picture(request.mission)
+
+    @answers(LookAtMission)
+    def look_at(self, request: LookAtMission) -> Seen:
+        """Return what is new of a mission."""
+        return self.missions.seen(request.mission, request.since)
+
+    @answers(LookAtAll)
+    def look_at_all(self, request: LookAtAll) -> Seen:
+        """Return how a mission stands, with its picture."""
+        return {**self.missions.seen(request.mission), "picture": self.missions.picture(request.mission)}
+
+    @answers(ReadLog)
+    def log_part(self, request: ReadLog) -> LogPart:
+        """Return records of the log."""
+        return self.missions.since(request.after)
+
+    def hold_running(self, one: Running, why: str) -> str:
+        """Hold a mission and return what is told of it."""
+        one.pause(self.now)
+        self.broadcast.tell(self.missions)
+        return self.tell(f"mission {one.name} {why}")
+
+    def keep(self, begun: RunMission | None = None) -> None:
         """Have the supervisor tell us again, after a crash, which missions people have begun that still run."""
-        kept = {**self.kept, **({name: line} if name else {})}
-        still = {one: words for one, words in kept.items() if one in self.missions.names}
+        kept = {**self.kept, **({begun.mission: begun} if begun else {})}
+        still = {name: one for name, one in kept.items() if name in self.missions.names}
         if still != self.kept:
             self.kept = still
-            self.context.notify("commands", instance=self.name, commands="\n".join(still.values()))
+            self.context.repeat(tuple(still.values()))
 
     # What is told
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rbxcompose.bus.graph import Graph
 from rbxcompose.model.robot import Robot
-from rbxcompose.runtime.folder import RobotFolder, State
+from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process
 
 
@@ -29,7 +29,7 @@ class Running:
     """
 
     folder: RobotFolder
-    state: State | None
+    state: RobotState | None
     problem: str = ""
     robot: Robot | None = None
     bus: Bus | None = None

@@ -9,22 +9,23 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from rbxcompose.executive.missions import Missions
+from rbxcompose.executive.requests import ListMissions, LookAtAll
 from rbxcompose.executive.running import Running
+from rbxcompose.requests import Query
 from rbxcompose.sdk.bound import Window
 
 PATH = "missions"
-WHOLE = "whole"  # the question about one mission
 _ALWAYS = frozenset({"mission", "version", "whole", "state"})  # what is in all news
 
-Open = Callable[[str, str], Window]  # takes a path and the question that is asked there
+Open = Callable[[str, Query[Any]], Window]  # takes a path and the question that is asked there
 
 
 class Broadcast:
     """A window for each mission of a robot."""
 
     def __init__(self, names: Iterable[str], open_window: Open) -> None:
-        self._list = open_window(PATH, "ls")
-        self._feeds = {name: Feed(open_window(f"{PATH}/{name}", f"{WHOLE} {name}")) for name in names}
+        self._list = open_window(PATH, ListMissions())
+        self._feeds = {name: Feed(open_window(f"{PATH}/{name}", LookAtAll(name))) for name in names}
 
     def tell(self, missions: Missions) -> None:
         """Tell what has changed to those who watch; nothing is put together for nobody."""

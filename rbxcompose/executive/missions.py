@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
 
 from rbxcompose.diagnostics.levels import Level
+from rbxcompose.executive.requests import ListedMission, LogPart, PictureData, Seen
 from rbxcompose.executive.running import MakeWorld, Running, claims_of
 from rbxcompose.executive.shell import Equipment
 from rbxcompose.expressions.values import Value
@@ -19,7 +19,7 @@ from rbxcompose.missions.picture import picture_of, picture_to_data
 from rbxcompose.missions.program import Program
 from rbxcompose.missions.statuses import IDLE, NAMES
 from rbxcompose.missions.world import Observer, Settings
-from rbxcompose.sdk.bound import Refused
+from rbxcompose.requests import Refused
 
 MOST_RECORDS = 20_000  # of the log that are kept
 
@@ -78,7 +78,7 @@ class Missions:
         )
         return self.runs[name]
 
-    def seen(self, name: str, since: int = 0) -> dict[str, Any]:
+    def seen(self, name: str, since: int = 0) -> Seen:
         """Return for a viewer what is new of a mission since a version of its own, 0 for the whole.
 
         Raises:
@@ -86,7 +86,7 @@ class Missions:
         """
         return self._begun(name).seen(since)
 
-    def picture(self, name: str) -> dict[str, Any]:
+    def picture(self, name: str) -> PictureData:
         """Return the picture of a mission, as data.
 
         Raises:
@@ -116,20 +116,19 @@ class Missions:
             raise Refused(f"no mission is {word}")
         raise Refused(f"several missions are {word}: {', '.join(one.name for one in found)}; name one")
 
-    def listed(self) -> list[dict[str, Any]]:
+    def listed(self) -> tuple[ListedMission, ...]:
         """Return all missions of the robot with how they stand."""
-        names, start = self._equipment.names, []
-        for name, program in self._equipment.programs.items():
-            one = self.runs.get(name)
-            claims = sorted(claims_of(link(program, names.missions), names.skills)) if name in names.missions else []
-            how = one.state if one else NAMES[IDLE]
-            start.append({"name": name, "about": program.about, "state": how, "claims": claims})
-        return start
+        return tuple(self._listed(name, program) for name, program in self._equipment.programs.items())
 
-    def since(self, number: int) -> dict[str, Any]:
+    def _listed(self, name: str, program: Program) -> ListedMission:
+        one, names = self.runs.get(name), self._equipment.names
+        claims = sorted(claims_of(link(program, names.missions), names.skills)) if name in names.missions else []
+        return ListedMission(name, program.about, one.state if one else NAMES[IDLE], tuple(claims))
+
+    def since(self, number: int) -> LogPart:
         """Return the records of the log that were written after so many."""
         first = self.written - len(self.records)
-        return {"next": self.written, "records": [one for at, one in enumerate(self.records, first) if at >= number]}
+        return LogPart(self.written, [one for at, one in enumerate(self.records, first) if at >= number])
 
     def _begun(self, name: str) -> Running:
         if name not in self.runs:

@@ -54,7 +54,7 @@ class Tape:
         message = event(info=info, response=held) if call.is_reply else event(info=info, request=held)
         self._say(f"{call.name}/{TOPIC}", message, node=call.node, sequence=call.sequence)
 
-    def order(self, verb: str, *words: str) -> None:
+    def order(self, verb: str, *words: object) -> None:
         """Record what the host was told to do."""
         self._say(ORDERS, String(data=json.dumps([verb, *words])))
 

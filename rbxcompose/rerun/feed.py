@@ -9,23 +9,25 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from rbxcompose.bus.attachment import Attachment
 from rbxcompose.bus.names import data_key
 from rbxcompose.bus.transport import Answer
 from rbxcompose.clock import NANOSECONDS
+from rbxcompose.diagnostics.levels import Level
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.events import TOPIC, event_of
 from rbxcompose.msgs.service_msgs import ServiceEventInfo
 from rbxcompose.msgs.std_msgs import Float64, String
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.tape import INSTANTS, ORDERS
+from rbxcompose.requests import Refused
 from rbxcompose.rerun.aliases import Aliases
 from rbxcompose.rerun.services import Known, Services
 from rbxcompose.rerun.stage import Fed, Stage
-from rbxcompose.runtime.host import Host
+from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.scheduler import Scheduler
-from rbxcompose.sdk.bound import Refused
 
 LAST = "\U0010ffff"  # an owner whose events come after those of all others
 
@@ -124,7 +126,7 @@ class Feed:
             sender = record.topic.node.encode()[:16].ljust(16, b"\0")
             self._stage.publish(self._key(record), payload, Attachment(self._count, record.publish_time, sender))
 
-    def _order(self, verb: str, *words: str) -> None:
+    def _order(self, verb: str, *words: Any) -> None:
         """Give the host an order again, as far as it is about this component."""
         match verb:
             case "shutdown":
@@ -139,12 +141,18 @@ class Feed:
             case "start" | "stop" | "release" | "brake":
                 getattr(self._host, verb)()
 
-    def _command(self, instance: str, verb: str) -> None:
-        if instance == self._name:
-            try:
-                self._host.command(instance, verb)
-            except Refused:
-                return  # as it was when it was recorded
+    def _command(self, instance: str, data: object) -> None:
+        if instance != self._name:
+            return
+        try:
+            request = self._host.request(instance, data)
+        except Refused as refusal:  # another version recorded it
+            self._host.log(instance, Level.ERROR, f"a recorded command cannot be given again: {refusal}")
+            return
+        try:
+            self._host.ask(instance, request)
+        except Refused:
+            return  # as it was when it was recorded
 
     def _called(self, service: Known, payload: bytes) -> None:
         """Let a request arrive at its server, or a reply at who has asked."""

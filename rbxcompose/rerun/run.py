@@ -16,7 +16,7 @@ from rbxcompose.rerun.comparison import Comparison, Difference
 from rbxcompose.rerun.feed import Feed
 from rbxcompose.rerun.services import Services
 from rbxcompose.rerun.stage import Stage, StageBus
-from rbxcompose.runtime.host import Host
+from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.ports import In, Looks
@@ -73,7 +73,7 @@ def rerun(
     stage = Stage(scheduler, services.is_served)
     tape = Tape(clock, lambda topic: None, sent)
     bus = StageBus(scheduler, clock, alone, only.name, stage, tape)
-    host = Host(alone, [only], scheduler, clock, bus, log, lambda event, data: None)
+    host = Host(alone, [only], scheduler, clock, bus, log, lambda notice: None)
     feed = Feed(iter(records), only.name, alone.bus.domain, stage, services, aliases, comparison.expect)
     host.configure()
     feed.begin(scheduler, host)

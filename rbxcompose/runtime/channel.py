@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
-import json
 import socket
 from dataclasses import dataclass, field
+from typing import Any, get_args
+
+from rbxcompose.robot_events import MissionOver
+from rbxcompose.typed_json import Family
 
 _CHUNK = 65536
 
@@ -55,21 +57,12 @@ class Lost:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
-    """A person's command to one component; `Answer` carries the same number."""
+class Ask:
+    """A request to one component, as data; `Answered` or `Refusal` carries the same number."""
 
     number: int
     instance: str
-    verb: str
-
-
-@dataclass(frozen=True, slots=True)
-class Query:
-    """A question to one component, which changes nothing; `Answer` carries the same number."""
-
-    number: int
-    instance: str
-    words: str
+    request: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,20 +129,40 @@ class AtRest:
 
 
 @dataclass(frozen=True, slots=True)
-class Notify:
-    """Something that concerns the whole robot, told by a component."""
+class Failed:
+    """A component, or with no name the process itself, has failed for good; the robot cannot go on as it is."""
 
-    event: str
-    data: dict[str, object]
+    instance: str
+    message: str
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
-    """What came of a `Command` or a `Query`."""
+class Repeated:
+    """These requests, as data, are to be told to a component again when its process has come back."""
+
+    instance: str
+    requests: list[dict[str, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class TimeIsUp:
+    """The time for which the robot was to run is over, on a stepped clock."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """What came of an `Ask`, as data."""
 
     number: int
-    text: str
-    is_refused: bool = False
+    answer: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why an `Ask` was refused."""
+
+    number: int
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,8 +202,7 @@ Order = (
     | Release
     | Brake
     | Lost
-    | Command
-    | Query
+    | Ask
     | Adopt
     | Retire
     | Prepare
@@ -198,28 +210,24 @@ Order = (
     | Blocked
     | Shutdown
 )
-Word = Configured | States | AtRest | Notify | Answer | Summary | Retired | Reconfigured | Alive
+Word = (
+    Configured
+    | States
+    | AtRest
+    | Failed
+    | MissionOver
+    | Repeated
+    | TimeIsUp
+    | Answered
+    | Refusal
+    | Summary
+    | Retired
+    | Reconfigured
+    | Alive
+)
 Message = Order | Word
 
-_TYPES: dict[str, type[Message]] = {
-    one.__name__.lower(): one
-    for one in (
-        Configure, Activate, Start, Stop, Release, Brake, Lost, Command, Query, Adopt, Retire, Prepare, Reconfigure,
-        Blocked, Shutdown, Configured, States, AtRest, Notify, Answer, Summary, Retired, Reconfigured, Alive,
-    )
-}  # fmt: skip
-
-
-def to_line(message: Message) -> bytes:
-    """Return a message as one line."""
-    fields = {one.name: getattr(message, one.name) for one in dataclasses.fields(message)}
-    return json.dumps({"type": type(message).__name__.lower(), **fields}).encode() + b"\n"
-
-
-def from_line(line: bytes) -> Message:
-    """Read what `to_line` wrote."""
-    fields = json.loads(line)
-    return _TYPES[fields.pop("type")](**fields)
+MESSAGES: Family[Message] = Family(get_args(Message))
 
 
 @dataclass
@@ -241,7 +249,7 @@ class Channel:
     def send(self, message: Message) -> None:
         """Send a message; to a closed channel nothing is sent."""
         if self.is_open:
-            self._unsent += to_line(message)
+            self._unsent += MESSAGES.to_line(message)
         self.flush()
 
     @property
@@ -268,7 +276,7 @@ class Channel:
                 self._received += chunk
         *lines, rest = bytes(self._received).split(b"\n")
         self._received[:] = rest
-        return [from_line(line) for line in lines]
+        return [MESSAGES.from_line(line) for line in lines]
 
     def close(self) -> None:
         """Close this end."""

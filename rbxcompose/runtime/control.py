@@ -1,6 +1,7 @@
 """The supervisor's door: a unix socket in the robot's folder that answers one request per connection.
 
-A request is a JSON object with `verb`; the answer is `{"answer": ...}` or `{"refused": "why"}`.
+A request is a line of JSON as `Family` of `typed_json` writes it; the answer is `{"answer": ...}`, with data of the
+request's answer type, or `{"refused": "why"}`.
 """
 
 from __future__ import annotations
@@ -13,8 +14,13 @@ import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
+from rbxcompose.requests import Refused, Request, requests
 from rbxcompose.runtime.folder import SOCKET, RobotFolder
+from rbxcompose.typed_json import UnreadableError, from_data
+
+A = TypeVar("A")
 
 _MOST = 64_000_000  # [B] of a request; the plan of a large robot is one
 _CHUNK = 262144  # [B] that are read at once
@@ -25,15 +31,11 @@ _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
 
 ANSWER = 2.0  # [s] in which a supervisor that is there answers
 
-Handle = Callable[[dict[str, object], int], None]  # request, number of the connection
+Handle = Callable[[object, int], None]  # request as data, number of the connection
 
 
 class NoAnswerError(OSError):
     """Raised when the supervisor does not answer."""
-
-
-class RefusedError(Exception):
-    """Raised with the reason when a request was refused."""
 
 
 @contextmanager
@@ -113,11 +115,9 @@ class ControlServer:
         try:
             request = json.loads(line)
         except (ValueError, RecursionError):  # no JSON, or nested without end
-            request = None
-        if isinstance(request, dict):
-            self.handle(request, number)
-        else:
             self.refuse(number, "this is not a request")
+        else:
+            self.handle(request, number)
 
     def _reply(self, number: int, reply: object) -> None:
         found = self._connections.get(number)
@@ -138,27 +138,36 @@ def _micros(seconds: float) -> int:
     return int(seconds % 1 * 1e6)
 
 
-def ask(folder: RobotFolder, request: dict[str, object], *, timeout: float = ANSWER) -> object:
+def ask(folder: RobotFolder, request: Request[A], *, timeout: float = ANSWER) -> A:
     """Send a request to a robot's supervisor and return the answer.
 
     Raises:
         NoAnswerError: if there is no supervisor, or it does not answer within `timeout` [s].
-        RefusedError: if it refuses.
+        Refused: if it refuses, or answers as another version of rbxcompose would.
     """
+    reply = json.loads(_exchange(folder, requests(type(request)).to_line(request), timeout))
+    if "refused" in reply:
+        raise Refused(reply["refused"])
+    try:
+        answer: A = from_data(request.answer_type(), reply["answer"])
+    except UnreadableError as error:
+        raise Refused(f"it answers as another version of rbxcompose: {error}") from error
+    return answer
+
+
+def _exchange(folder: RobotFolder, line: bytes, timeout: float) -> bytes:
+    """Return the line with which the supervisor answers one."""
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection, _short_address(folder.path) as address:
             # Blocking, but for so long: without blocking, a door with others waiting before it is an error at once.
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _TIMEVAL.pack(int(timeout), _micros(timeout)))
             connection.connect(address)
             connection.settimeout(timeout)
-            connection.sendall(json.dumps(request).encode() + b"\n")
+            connection.sendall(line)
             with connection.makefile("rb") as file:
-                line = file.readline()
+                reply = file.readline()
     except (OSError, TimeoutError) as error:
         raise NoAnswerError(str(error)) from error
-    if not line:
+    if not reply:
         raise NoAnswerError("the supervisor has closed the connection")
-    reply = json.loads(line)
-    if "refused" in reply:
-        raise RefusedError(reply["refused"])
-    return reply["answer"]
+    return reply

@@ -9,11 +9,12 @@ import os
 import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from rbxcompose.replacing import TEMPORARY, replace_file
 from rbxcompose.runtime.processes import Process, boot_id
+from rbxcompose.typed_json import UnreadableError, from_data, to_data
 
 STATE, LOCK, SOCKET = "state.json", "lock", "control.sock"
 _VERSION = 1
@@ -48,7 +49,7 @@ class ComponentState:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class RobotState:
     """What is known of a robot from outside, also when its supervisor is dead."""
 
     robot: str
@@ -62,11 +63,11 @@ class State:
 
     def to_text(self) -> str:
         """Return the text of the state file: a checksum, then JSON."""
-        body = json.dumps({"version": _VERSION, **asdict(self)})
+        body = json.dumps({"version": _VERSION, **to_data(self)})
         return f"{_checksum(body)}\n{body}"
 
     @classmethod
-    def from_text(cls, text: str) -> State:
+    def from_text(cls, text: str) -> RobotState:
         """Read what `to_text` wrote.
 
         Raises:
@@ -78,10 +79,11 @@ class State:
         fields = json.loads(body)
         if fields.pop("version") != _VERSION:
             raise BrokenStateError("another version of rbxcompose wrote it")
-        fields["supervisor"] = Process(**fields["supervisor"])
-        fields["processes"] = {name: Process(**one) for name, one in fields["processes"].items()}
-        fields["components"] = tuple(ComponentState(**one) for one in fields["components"])
-        return cls(**fields)
+        try:
+            state: RobotState = from_data(cls, fields)
+        except UnreadableError as error:
+            raise BrokenStateError(f"another version of rbxcompose wrote it: {error}") from error
+        return state
 
     def alive(self) -> dict[str, Process]:
         """Return those of its processes that still run, by name, without the supervisor."""
@@ -154,18 +156,18 @@ class RobotFolder:
         except FileNotFoundError:
             return False
 
-    def read_state(self) -> State | None:
+    def read_state(self) -> RobotState | None:
         """Return the state, or None if there is none.
 
         Raises:
             BrokenStateError: if the file is not what was written.
         """
         try:
-            return State.from_text((self.path / STATE).read_text(encoding="utf-8"))
+            return RobotState.from_text((self.path / STATE).read_text(encoding="utf-8"))
         except FileNotFoundError:
             return None
 
-    def write_state(self, state: State) -> None:
+    def write_state(self, state: RobotState) -> None:
         """Replace the state file: whole or not at all, whatever happens meanwhile."""
         replace_file(self.path / STATE, state.to_text().encode(), mode=0o600)
 

@@ -20,7 +20,9 @@ from rbxcompose.config import (
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.geometry import Pose2
 from rbxcompose.qos import Qos
-from rbxcompose.sdk.bound import Ended, Outcome, Refused, Reply, SentGoal, ServedGoal
+from rbxcompose.requests import Command, Query, Refused, answers
+from rbxcompose.robot_events import MissionOver, MissionWaits
+from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal, ServedGoal
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component
@@ -34,6 +36,7 @@ __all__ = [
     "AngularSpeed",
     "Calls",
     "CallsAction",
+    "Command",
     "Component",
     "Config",
     "Ended",
@@ -43,6 +46,8 @@ __all__ = [
     "Level",
     "Live",
     "Looks",
+    "MissionOver",
+    "MissionWaits",
     "Name",
     "Out",
     "Outcome",
@@ -51,6 +56,7 @@ __all__ = [
     "Port",
     "Pose2",
     "Qos",
+    "Query",
     "Ratio",
     "Refused",
     "Reply",
@@ -62,6 +68,7 @@ __all__ = [
     "ServesTopic",
     "Speed",
     "Time",
+    "answers",
     "component",
     "skill",
 ]

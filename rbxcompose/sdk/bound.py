@@ -21,10 +21,6 @@ F_co = TypeVar("F_co", covariant=True)
 F_contra = TypeVar("F_contra", contravariant=True)
 
 
-class Refused(Exception):  # noqa: N818 - it is an answer, not an error of ours
-    """Raised by a component to refuse a request or a command; its text is the reason."""
-
-
 class Sender(Protocol[M_contra]):
     """Publishes one message per call."""
 

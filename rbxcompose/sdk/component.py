@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, get_args
 
 from rbxcompose.clock import Clock
 from rbxcompose.config import Config
 from rbxcompose.diagnostics.levels import Level
-from rbxcompose.sdk.bound import Refused, Window
+from rbxcompose.requests import Command, Query, Refused, Request, Requests, answering, requests
+from rbxcompose.robot_events import RobotEvent
+from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.ports import Port
 
+A = TypeVar("A")
 C = TypeVar("C", bound=Config)
 
 
@@ -38,11 +41,15 @@ class Context(Protocol):
         """Call the component's `wake` at robot time `time` [s]; an earlier wish is kept as well."""
         ...
 
-    def notify(self, event: str, **data: object) -> None:
+    def notify(self, event: RobotEvent) -> None:
         """Tell the supervisor of something that concerns the whole robot."""
         ...
 
-    def window(self, path: str, question: str) -> Window:
+    def repeat(self, requests: Sequence[Command]) -> None:
+        """Have the component told these again, and none of before, after it was restarted."""
+        ...
+
+    def window(self, path: str, question: Query[Any]) -> Window:
         """Open a window for tools outside at `path`; who asks there gets the component's answer to `question`."""
         ...
 
@@ -174,21 +181,22 @@ class Component(Generic[C]):
     def lost(self, names: tuple[str, ...], cause: str) -> None:
         """Hear that these components have gone."""
 
-    def command(self, verb: str) -> str:
-        """Carry out a command of a person and return the answer.
+    @classmethod
+    def requests(cls) -> Requests:
+        """Return the requests that it takes: those of its methods that are marked with `answers`."""
+        return requests(*answering(cls))
+
+    def handle(self, request: Request[A]) -> A:
+        """Return the answer to a request of a person or a tool.
 
         Raises:
-            Refused: if it cannot be done, with the reason.
+            Refused: if it cannot be carried out, with the reason.
         """
-        raise Refused(f"'{self.name}' does not know the command '{verb}'")
-
-    def query(self, words: str) -> str:
-        """Answer a question of a person or a tool; it changes nothing and is asked as often as they like.
-
-        Raises:
-            Refused: if there is no answer, with the reason.
-        """
-        raise Refused(f"'{self.name}' has no answer to '{words}'")
+        method = answering(type(self)).get(type(request))
+        if method is None:
+            raise Refused(f"'{self.name}' does not take the request '{request.name()}'")
+        answer: A = getattr(self, method)(request)
+        return answer
 
     def summary(self) -> dict[str, str]:
         """Return facts for the summary at the end, by their label."""

@@ -13,7 +13,7 @@ from rbxcompose.model.wiring import ends_of
 from rbxcompose.msgs.types import Message
 from rbxcompose.plan.model import Instance, Plan, Wire
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.host import Host
+from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.component import Component
@@ -45,7 +45,7 @@ class Bench:
         self.clock = SteppedClock()
         self.scheduler = Scheduler()
         self.records: list[Record] = []
-        self.events: list[tuple[str, dict[str, object]]] = []
+        self.events: list[Notice] = []
         self.plan = plan.in_one_process() if plan else Plan("bench", "bench.yaml", tuple(instances))
         bus = self.plan.bus
         self.bus = Bus(
@@ -63,7 +63,7 @@ class Bench:
             self.clock,
             self.bus,
             self.records.append,
-            self._event,
+            self.events.append,
         )
         self.host.configure()
         self.host.activate([one.name for one in self.plan.instances])
@@ -117,6 +117,3 @@ class Bench:
 
     def _note(self, owner: str, text: str) -> None:
         self.records.append(Record(self.clock.now(), Level.WARN, owner, text))
-
-    def _event(self, event: str, data: dict[str, object]) -> None:
-        self.events.append((event, data))

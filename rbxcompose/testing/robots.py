@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rbxcompose.plan.model import Plan
+from rbxcompose.robot_events import MissionOver
 from rbxcompose.testing.bench import Bench
 
 LONGEST = 3600.0  # [s] of robot time
@@ -19,7 +20,7 @@ class Ran:
     @property
     def outcome(self) -> str:
         """Return how the mission ended: `success`, `failure`, or `running` if it has not."""
-        ends = [data["outcome"] for event, data in self.bench.events if event == "mission_ended"]
+        ends = [event.outcome for event in self.bench.events if isinstance(event, MissionOver)]
         return str(ends[0]) if ends else "running"
 
     @property
@@ -31,5 +32,5 @@ class Ran:
 def run_robot(plan: Plan, *, most: float = LONGEST) -> Ran:
     """Run a robot until its mission has ended, at most `most` [s] of robot time."""
     bench = Bench(plan=plan)
-    bench.run_until(lambda: any(event == "mission_ended" for event, _ in bench.events), most)
+    bench.run_until(lambda: any(isinstance(event, MissionOver) for event in bench.events), most)
     return Ran(bench)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from rbxcompose.components.mission import Mission, MissionConfig
+from rbxcompose.executive.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.executive.world import RobotWorld
 from rbxcompose.expressions.values import NotArrived, Value
 from rbxcompose.missions.events import MissionEvent
@@ -13,7 +14,7 @@ from rbxcompose.missions.results import Result
 from rbxcompose.missions.world import World
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.qos import Qos
-from rbxcompose.sdk.bound import Refused
+from rbxcompose.requests import Refused
 from rbxcompose.testing.bench import Bench
 from rbxcompose.trials.mocked import Mocked, SetValues
 from rbxcompose.trials.model import Deed, Event, Trial
@@ -25,6 +26,7 @@ OWNER = "test"
 Ended = Callable[[int, Result], None]
 BEGINS_WITHIN = 60.0  # [s] after the last event of the test, else something never comes
 EXECUTIVE = "mission"  # the type of the component that runs missions
+_COMMANDS = {"pause": PauseMission, "resume": ResumeMission, "cancel": CancelMission}
 
 
 class RobotRun:
@@ -110,7 +112,7 @@ class RobotRun:
                 self.bench.bus.publisher(OWNER, deed.topic, type(deed.message), Qos.COMMAND)(deed.message)
             case word:
                 self.record.note(f"the test {word}s the mission")
-                self.bench.host.command(self.name, f"{word} {self.trial.mission}")
+                self.bench.host.ask(self.name, _COMMANDS[word](self.trial.mission))
 
     def settle(self) -> None:
         """End the calls that are due."""

@@ -28,7 +28,7 @@ from rbxcompose.msgs.types import Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.host import Host
+from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.testing import Golden, instance
 
@@ -208,9 +208,7 @@ def test_an_action_from_its_client(wire: Wire, golden: Golden) -> None:
 def test_parameters_log_and_frames_of_a_robot(wire: Wire, golden: Golden) -> None:
     one = instance("battery", "battery_sim", {"runtime": "45 s"})
     plan = Plan("wire", "wire.yaml", (one, instance("transforms", "transforms")))
-    host = Host(
-        plan, plan.instances, wire.scheduler, wire.clock, wire.bus(), lambda record: None, lambda event, data: None
-    )
+    host = Host(plan, plan.instances, wire.scheduler, wire.clock, wire.bus(), lambda record: None, lambda notice: None)
     host.configure()
     host.activate(["battery", "transforms"])
     wire.settle()
@@ -229,9 +227,7 @@ def test_parameters_log_and_frames_of_a_robot(wire: Wire, golden: Golden) -> Non
 def test_the_description_of_a_body_is_latched(wire: Wire, golden: Golden) -> None:
     one = instance("robot_description", "robot_description", {"urdf": '<robot name="cart"/>'})
     plan = Plan("wire", "wire.yaml", (one,))
-    host = Host(
-        plan, plan.instances, wire.scheduler, wire.clock, wire.bus(), lambda record: None, lambda event, data: None
-    )
+    host = Host(plan, plan.instances, wire.scheduler, wire.clock, wire.bus(), lambda record: None, lambda notice: None)
     host.configure()
     host.activate(["robot_description"])
     wire.settle()

@@ -4,7 +4,8 @@ import math
 
 from rbxcompose.bus.services import LOST, Request, Server
 from rbxcompose.msgs.example_interfaces import AddTwoInts
-from rbxcompose.sdk.bound import Refused, Reply
+from rbxcompose.requests import Refused
+from rbxcompose.sdk.bound import Reply
 from tests.bus.conftest import Alone
 
 Replies = list[Reply[AddTwoInts.Response]]

@@ -11,7 +11,7 @@ from rbxcompose.bus.names import admin_key
 from rbxcompose.bus.transport import Answer
 from rbxcompose.bus.window import GRACE, Window
 from rbxcompose.qos import Qos
-from rbxcompose.sdk.bound import Refused
+from rbxcompose.requests import Refused
 from tests.bus.conftest import Alone, Connected, Network
 
 KEY = admin_key("bot", "missions/patrol")
@@ -45,7 +45,7 @@ def value_of(payload: bytes) -> tuple[int, Any]:
 
 def test_who_asks_gets_the_whole_and_who_listens_the_news(network: Network) -> None:
     one, other = network.process(), network.process()
-    window = one.bus.window("mission", KEY, lambda: '{"all": 1}')
+    window = one.bus.window("mission", KEY, lambda: {"all": 1})
     assert not is_watched(window)
     heard: list[bytes] = []
     listening = other.transport.subscribe(
@@ -89,7 +89,7 @@ class Asking:
 
 
 def test_who_asks_counts_as_listening_until_the_transport_knows(alone: Alone) -> None:
-    window = alone.bus.window("mission", KEY, lambda: "{}")
+    window = alone.bus.window("mission", KEY, lambda: {})
     assert not is_watched(window)
     window._asked(Asking())
     assert is_watched(window)

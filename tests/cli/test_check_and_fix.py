@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.cli import main as command
-from rbxcompose.cli.common import fixing
+from rbxcompose.cli.project import fixes
 from rbxcompose.edits import safe_fixes
 from rbxcompose.findings import Finding, Fix, Sources
 from rbxcompose.replacing import replace_file
@@ -233,7 +233,7 @@ def test_a_file_that_changed_meanwhile_is_left_as_it_is(
             file.write("# saved by an editor\n")
         return safe_fixes(found, sources)
 
-    monkeypatch.setattr(fixing, "safe_fixes", meanwhile)
+    monkeypatch.setattr(fixes, "safe_fixes", meanwhile)
     told = output(capsys, "--fix", str(ROBOT), code=1)
     assert f"left {ROBOT} as it is: it was changed since it was read" in told
     assert "type: chargr" in (project / ROBOT).read_text()

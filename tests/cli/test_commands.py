@@ -14,7 +14,7 @@ import pytest
 
 from rbxcompose.cli import main as command
 from rbxcompose.diagnostics.levels import Level
-from rbxcompose.runtime.folder import ComponentState, RobotFolder, State
+from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.log import start_new
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.runtime.records import Record
@@ -35,7 +35,9 @@ def written(name: str, supervisor: Process | None = None) -> RobotFolder:
     folder.make()
     component = ComponentState("base", "toy", "active", "robot", 77, 1)
     gone = supervisor or Process(os.getpid(), 1)
-    folder.write_state(State(name, f"/robots/{name}/robot.yaml", gone, {"robot": gone}, (component,), None, boot_id()))
+    folder.write_state(
+        RobotState(name, f"/robots/{name}/robot.yaml", gone, {"robot": gone}, (component,), None, boot_id())
+    )
     return folder
 
 

@@ -13,11 +13,11 @@ import pytest
 
 from rbxcompose.bus.graph import Graph, Name
 from rbxcompose.cli import main as command
-from rbxcompose.cli.common.bus_place import BusPlace
-from rbxcompose.cli.common.completing import candidates, for_shell
-from rbxcompose.cli.common.known_values import KnownValues, files
+from rbxcompose.cli.bus.place import BusPlace
 from rbxcompose.cli.completion import SCRIPTS
-from rbxcompose.runtime.folder import ComponentState, RobotFolder, State
+from rbxcompose.cli.completions.candidates import candidates, for_shell
+from rbxcompose.cli.completions.known_values import KnownValues, files
+from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
 
 ROOT = Path(__file__).parents[2]
@@ -85,7 +85,7 @@ def up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = RobotFolder.of("cart")
     folder.make()
     part, here = ComponentState("base", "toy", "active", "robot", 77, 0), Process.of(os.getpid())
-    folder.write_state(State("cart", "/a/robot.yaml", here, {}, (part,), "tcp/127.0.0.1:1", boot_id(), 7))
+    folder.write_state(RobotState("cart", "/a/robot.yaml", here, {}, (part,), "tcp/127.0.0.1:1", boot_id(), 7))
 
 
 @pytest.mark.usefixtures("up")

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.bus.graph import Kind
-from rbxcompose.cli.common.messages import message_from, message_type, shown, to_json, to_text, type_of
-from rbxcompose.cli.common.robots import NotDoneError
+from rbxcompose.cli.bus.messages import message_from, message_type, shown, to_json, to_text, type_of
+from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.plain import to_plain

@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from rbxcompose.cli import main as command
-from rbxcompose.cli.common.mission_watch import lines_of
-from rbxcompose.cli.common.robots import REFUSED, NotDoneError
+from rbxcompose.cli.missions.live_view import lines_of
+from rbxcompose.executive.requests import CancelMission, LookAtAll
 from rbxcompose.missions.picture import picture_from_data
+from rbxcompose.requests import Request, as_data
 from rbxcompose.runtime.folder import RobotFolder
-from rbxcompose.sdk.bound import Outcome, Refused
+from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing.golden import Golden
+from rbxcompose.typed_json import from_data, to_data
 from tests.executive.fake_robot import Robot
 
 ROUNDS = """
@@ -60,16 +63,12 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Robot:
     made.start()
     made.advance(3.0)
 
-    def request(folder: RobotFolder, fields: dict[str, object]) -> object:
-        do = {"query": made.mission.query, "command": made.mission.command}[str(fields["verb"])]
-        try:
-            return do(str(fields["word"]))
-        except Refused as refusal:
-            raise NotDoneError(REFUSED.at(None, f"'bot' refuses: {refusal}")) from refusal
+    def ask(folder: RobotFolder, request: Request[Any], *, timeout: float) -> Any:
+        there = made.mission.requests().from_data(json.loads(json.dumps(as_data(request))))
+        return from_data(request.answer_type(), json.loads(json.dumps(to_data(made.mission.handle(there)))))
 
-    for module in ("rbxcompose.cli.mission", "rbxcompose.cli.common.asking"):
-        monkeypatch.setattr(f"{module}.request", request)
-        monkeypatch.setattr(f"{module}.find_robot", lambda wanted: RobotFolder(tmp_path / "bot"))
+    monkeypatch.setattr("rbxcompose.cli.robots.lookup.ask", ask)
+    monkeypatch.setattr("rbxcompose.cli.robots.lookup.all_folders", lambda: [RobotFolder(tmp_path / "bot")])
     return made
 
 
@@ -120,7 +119,7 @@ def test_a_mission_that_runs_is_drawn_with_how_its_nodes_stand(
 
 
 def test_the_tree_of_watch_is_coloured_by_status(robot: Robot, golden: Golden) -> None:
-    whole = json.loads(robot.mission.query("whole test"))
+    whole = robot.mission.handle(LookAtAll("test"))
     lines = lines_of(picture_from_data(whole["picture"]), whole, 60, colour=True)
     golden.check("mission_colours.txt", "".join(f"{line}\n" for line in lines).replace("\x1b", "ESC"))
 
@@ -131,9 +130,9 @@ def test_watch_tells_programs_the_whole_and_then_what_changes(
     steps: list[Callable[[], object]] = [
         lambda: None,
         lambda: arrive(robot),
-        lambda: robot.mission.command("cancel"),
+        lambda: robot.mission.handle(CancelMission()),
     ]
-    monkeypatch.setattr("rbxcompose.cli.common.mission_watch.time.sleep", lambda seconds: steps.pop(0)())
+    monkeypatch.setattr("rbxcompose.cli.missions.live_view.time.sleep", lambda seconds: steps.pop(0)())
     lines = [json.loads(line) for line in told(capsys, "watch", "--json").splitlines()]
     assert [(one["whole"], one["state"]) for one in lines] == [(True, "running"), (False, "running"), (False, "halted")]
     assert len(lines[1]["statuses"]) < len(lines[0]["statuses"])

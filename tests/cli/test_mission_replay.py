@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.cli import main as command
+from rbxcompose.executive.requests import ReadLog
 from rbxcompose.testing import Bench, check_file
 
 HEAD = "rbx: 1\nkind: Mission\nname: work\n"
@@ -35,7 +36,7 @@ def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     robot = Bench(plan=plan)
     robot.advance(10.0)
     mission: Any = robot.component("mission")
-    records = json.loads(mission.query("log 0"))["records"]
+    records = mission.handle(ReadLog()).records
     Path("work.log").write_text("".join(f"{json.dumps(one)}\n" for one in records))
     return Path("work.log")
 

@@ -20,8 +20,8 @@ from typing import Any, Self
 import pytest
 
 from rbxcompose.bus.graph import find
-from rbxcompose.cli.common.bus_place import BusPlace, find_place
-from rbxcompose.cli.common.guest import Guest, Heard
+from rbxcompose.cli.bus.guest import Guest, Heard
+from rbxcompose.cli.bus.place import BusPlace, find_place
 from rbxcompose.msgs.cdr import decode
 from rbxcompose.msgs.geometry_msgs import Twist
 

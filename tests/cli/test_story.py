@@ -1,7 +1,6 @@
 from __future__ import annotations
 
-from rbxcompose.cli.common.story import Story
-from rbxcompose.cli.common.summary import summary
+from rbxcompose.cli.robots.story import Story, summary
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.runtime.records import Record
 

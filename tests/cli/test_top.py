@@ -22,7 +22,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.cli.common.picture import Load, Part, Picture, Tree, lines_of
+from rbxcompose.cli.robots.picture import Load, Part, Picture, Tree, lines_of
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plain import FORBIDDEN, columns
 from rbxcompose.runtime.records import Record

@@ -77,7 +77,7 @@ def test_they_are_listed_with_their_topic_arguments_and_an_example(
     folder: Path, capsys: pytest.CaptureFixture[str], golden: Golden, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert Gripper.type_name == "toy_gripper"
-    monkeypatch.setattr("rbxcompose.cli.common.mission_files.skill_names", lambda: ["say"])  # other tests have toys
+    monkeypatch.setattr("rbxcompose.cli.missions.files.skill_names", lambda: ["say"])  # other tests have toys
     golden.check("mission_skills.txt", told(capsys, "mission", "skills", str(folder)))
     listed = json.loads(told(capsys, "mission", "skills", str(folder), "--json"))
     assert {one["name"]: one["way"] for one in listed if one["topic"]} == {

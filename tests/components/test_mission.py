@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import pytest
 
 from rbxcompose.components.mission import Mission, MissionConfig
+from rbxcompose.executive.requests import PauseMission, ResumeMission
 from rbxcompose.expressions.values import NOT_ARRIVED
 from rbxcompose.geometry import Pose2
+from rbxcompose.requests import Command
+from rbxcompose.robot_events import MissionOver, MissionWaits
 from rbxcompose.sdk import Ended, Outcome, Refused
 from tests.executive.fake_robot import Robot
 
@@ -56,7 +61,7 @@ def test_a_mission_that_waits_for_a_value_says_so_again_each_minute() -> None:
     robot.advance(130.0)
     text = "waits for battery, of which nothing has come for 60 s"
     assert robot.lines == ["0 mission test waits for battery", f"60 mission test {text}", f"120 mission test {text}"]
-    assert robot.events == [{"event": "mission_waits", "mission": "test", "message": text}] * 2
+    assert robot.events == [MissionWaits("test", text)] * 2
     robot.level(100.0)
     robot.advance(0.0)
     assert robot.lines[-1] == "130 go_to corner"
@@ -94,14 +99,7 @@ def test_it_waits_for_every_value_that_is_read_then_tells_its_story() -> None:
         "10.5 go_to dock: failure (1 s): stuck",
         "10.5 mission test: failure: do.sequence.go_to.1: stuck",
     ]
-    assert robot.events == [
-        {
-            "event": "mission_ended",
-            "mission": "test",
-            "outcome": "failure",
-            "message": "do.sequence.go_to.1: stuck",
-        }
-    ]
+    assert robot.events == [MissionOver("test", "failure", "do.sequence.go_to.1: stuck")]
     assert robot.mission.summary() == {
         "mission": "test: failure",
         "skills": "go_to 3 (1 success, 1 halted, 1 failure), recharge 1 (1 success)",
@@ -115,7 +113,7 @@ def test_without_a_start_mission_it_does_nothing() -> None:
     robot.advance(5.0)
     assert (robot.go_to.goals, robot.lines, robot.mission.summary()) == ([], [], {})
     with pytest.raises(Refused, match="no mission is running"):
-        robot.mission.command("pause")
+        robot.mission.handle(PauseMission())
 
 
 def test_it_waits_for_a_pose_that_is_read() -> None:
@@ -125,7 +123,7 @@ def test_it_waits_for_a_pose_that_is_read() -> None:
     assert robot.events == []
     robot.look.pose = Pose2(0.5, 0.5)
     robot.advance(0.2)
-    assert robot.events[0]["outcome"] == "success"
+    assert robot.ends[0].outcome == "success"
 
 
 GO = "do:\n  go_to: dock"
@@ -142,7 +140,7 @@ def test_a_goal_whose_server_is_lost_is_sent_again_when_it_is_back_in_time() -> 
     assert len(robot.go_to.goals) == 2
     robot.go_to.end(Outcome.SUCCEEDED)
     robot.advance(0.0)
-    assert robot.events[0]["outcome"] == "success"
+    assert robot.ends[0].outcome == "success"
     assert robot.lines[1:3] == ["0 the server of go_to is gone; waiting for up to 5 s", "4 go_to: sent again"]
 
 
@@ -152,7 +150,7 @@ def test_it_fails_when_the_server_stays_away() -> None:
     robot.go_to.is_available = False
     robot.go_to.end(Outcome.LOST)
     robot.advance(5.2)
-    assert robot.events[0]["message"] == "do.go_to: its server is gone"
+    assert robot.ends[0].message == "do.go_to: its server is gone"
     assert 5.0 <= robot.clock.now() < 5.3
 
 
@@ -161,7 +159,7 @@ def test_a_skill_that_cannot_be_restarted_fails_at_once_when_its_server_is_lost(
     robot.start()
     robot.recharge.end(Outcome.LOST)
     robot.advance(0.0)
-    assert robot.events[0]["outcome"] == "failure"
+    assert robot.ends[0].outcome == "failure"
 
 
 def test_a_goal_waits_for_a_server_that_is_not_there_yet() -> None:
@@ -188,17 +186,17 @@ def test_a_goal_that_a_stop_cancelled_is_no_failure_and_is_sent_again_at_the_res
         robot.go_to.end(Outcome.CANCELED)
     robot.advance(3.0)
     with pytest.raises(Refused, match="release it first"):
-        robot.mission.command("resume")
+        robot.mission.handle(ResumeMission())
     robot.is_stopped = False
     robot.mission.release()
     robot.advance(3.0)
     assert len(robot.go_to.goals) == 1
-    assert robot.mission.command("resume") == "mission test resumed"
+    assert robot.mission.handle(ResumeMission()) == "mission test resumed"
     robot.advance(1.0)
     assert len(robot.go_to.goals) == 2
     robot.go_to.end(Outcome.SUCCEEDED)
     robot.advance(0.0)
-    assert robot.events[0]["outcome"] == "success"
+    assert robot.ends[0].outcome == "success"
 
 
 def test_a_goal_that_someone_else_cancelled_is_a_failure() -> None:
@@ -206,24 +204,24 @@ def test_a_goal_that_someone_else_cancelled_is_a_failure() -> None:
     robot.start()
     robot.go_to.end(Outcome.CANCELED)
     robot.advance(1.0)
-    assert robot.events[0]["message"] == "do.go_to: cancelled by someone else"
+    assert robot.ends[0].message == "do.go_to: cancelled by someone else"
 
 
 def test_a_pause_cancels_the_goal_and_a_resume_sends_it_again() -> None:
     robot = Robot(GO)
     robot.start()
-    assert robot.mission.command("pause") == "mission test paused"
+    assert robot.mission.handle(PauseMission()) == "mission test paused"
     assert robot.go_to.goals[0].is_cancelled
     robot.go_to.end(Outcome.CANCELED)
     robot.advance(9.0)
     assert len(robot.go_to.goals) == 1
     with pytest.raises(Refused, match="paused already"):
-        robot.mission.command("pause")
-    robot.mission.command("resume")
+        robot.mission.handle(PauseMission())
+    robot.mission.handle(ResumeMission())
     robot.advance(0.0)
     assert len(robot.go_to.goals) == 2
     with pytest.raises(Refused, match="is not paused"):
-        robot.mission.command("resume")
+        robot.mission.handle(ResumeMission())
 
 
 def test_a_robot_that_is_stopped_before_the_mission_begins_begins_it_at_the_resume() -> None:
@@ -233,7 +231,7 @@ def test_a_robot_that_is_stopped_before_the_mission_begins_begins_it_at_the_resu
     robot.advance(2.0)
     assert robot.go_to.goals == []
     assert robot.lines == ["0 mission test is held until it is resumed"]
-    robot.mission.command("resume")
+    robot.mission.handle(ResumeMission())
     robot.advance(0.0)
     assert len(robot.go_to.goals) == 1
 
@@ -259,9 +257,14 @@ def test_going_down_halts_the_mission_for_good() -> None:
     assert robot.events == []
 
 
-def test_an_unknown_command_is_refused() -> None:
-    with pytest.raises(Refused, match="does not know"):
-        Robot(GO).mission.command("dance")
+@dataclass(frozen=True, slots=True)
+class Dance(Command):
+    about = "toys"
+
+
+def test_an_unknown_request_is_refused() -> None:
+    with pytest.raises(Refused, match=r"does not take the request 'toys\.Dance'"):
+        Robot(GO).mission.handle(Dance())
 
 
 def test_the_summary_of_a_mission_that_calls_no_skill_has_no_skills() -> None:

@@ -57,7 +57,7 @@ def test_up_compiles_and_then_runs_the_plan() -> None:
         "compile_robot",
         "run_plan",
     ]
-    assert "start_supervisor" in calls_of("cli/common/watch.py", "run_plan")
+    assert "start_supervisor" in calls_of("cli/robots/run_view.py", "run_plan")
 
 
 def test_every_family_of_codes_is_told_and_every_one_that_is_told_exists() -> None:
@@ -67,5 +67,5 @@ def test_every_family_of_codes_is_told_and_every_one_that_is_told_exists() -> No
 
 def test_every_file_that_is_named_exists() -> None:
     files = set(re.findall(r"`([\w/]+\.py)`", PAGE))
-    homes = (PACKAGE, PACKAGE / "runtime", ROOT)
+    homes = (PACKAGE, *(PACKAGE / room for room in ("runtime", "runtime/supervision", "runtime/process_group")), ROOT)
     assert [file for file in files if not any((home / file).exists() for home in homes)] == []

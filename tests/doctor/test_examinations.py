@@ -18,7 +18,7 @@ from rbxcompose.doctor.examining import EXAMINATIONS, PLUGINS, Answer, examinati
 from rbxcompose.doctor.facts import Bus, Clocks, Facts, Limits, Listener, Running, Version
 from rbxcompose.findings import Finding
 from rbxcompose.model.robot import Robot
-from rbxcompose.runtime.folder import RobotFolder, State
+from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
 
 HERE = Process.of(os.getpid())
@@ -50,12 +50,12 @@ def robot_of(folder: Path, text: str) -> Robot:
     return robot
 
 
-def running(state: State | None = None, **fields: object) -> Running:
+def running(state: RobotState | None = None, **fields: object) -> Running:
     return replace(Running(RobotFolder(Path("/nowhere/cart")), state), **fields)  # type: ignore[arg-type]
 
 
-def state(supervisor: Process = HERE, processes: Mapping[str, Process] | None = None) -> State:
-    return State("cart", "robot.yaml", supervisor, processes or {}, (), "tcp/127.0.0.1:7447", boot_id())
+def state(supervisor: Process = HERE, processes: Mapping[str, Process] | None = None) -> RobotState:
+    return RobotState("cart", "robot.yaml", supervisor, processes or {}, (), "tcp/127.0.0.1:7447", boot_id())
 
 
 def name_of(topic: str, giver: str = "", taker: str = "", types: tuple[str, str] = ("a/msg/A", "a/msg/A")) -> Name:

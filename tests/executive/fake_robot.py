@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 from rbxcompose.clock import Clock, SteppedClock
@@ -25,6 +25,8 @@ from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Float32
+from rbxcompose.requests import Command, Query
+from rbxcompose.robot_events import MissionOver, RobotEvent
 from rbxcompose.sdk import Activity, Ended, Outcome, Place, skill
 from rbxcompose.sdk.bound import Reply
 
@@ -136,7 +138,7 @@ class Look:
 class FakeWindow:
     """A window whose viewer is the test."""
 
-    def __init__(self, question: str) -> None:
+    def __init__(self, question: Query[Any]) -> None:
         self.question = question
         self.is_watched = False
         self.news: list[Any] = []
@@ -154,7 +156,8 @@ class Robot:
         self.is_stopped = False
         self.lines: list[str] = []
         self.levels: list[Level] = []
-        self.events: list[dict[str, object]] = []
+        self.events: list[RobotEvent] = []
+        self.repeated: Sequence[Command] = ()
         self.statuses: list[str] = []
         self.wakes: list[float] = []
         self.windows: dict[str, FakeWindow] = {}
@@ -217,10 +220,18 @@ class Robot:
     def wake_at(self, time: float) -> None:
         self.wakes.append(time)
 
-    def notify(self, event: str, **data: object) -> None:
-        self.events.append({"event": event, **data})
+    def notify(self, event: RobotEvent) -> None:
+        self.events.append(event)
 
-    def window(self, path: str, question: str) -> FakeWindow:
+    @property
+    def ends(self) -> list[MissionOver]:
+        """Return how the start mission ended, each time."""
+        return [event for event in self.events if isinstance(event, MissionOver)]
+
+    def repeat(self, requests: Sequence[Command]) -> None:
+        self.repeated = tuple(requests)
+
+    def window(self, path: str, question: Query[Any]) -> FakeWindow:
         return self.windows.setdefault(path, FakeWindow(question))
 
     def level(self, percent: float) -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
+from rbxcompose.executive.requests import CancelMission, ListMissions, LookAtAll, PauseMission, RunMission
 from rbxcompose.missions.mirror import joined
 from rbxcompose.missions.replica import Replica
-from rbxcompose.sdk.bound import Refused
+from rbxcompose.requests import Command, Refused
 from tests.executive.fake_robot import FakeWindow, Robot
 
 COUNT = """
@@ -46,12 +45,11 @@ def test_news_are_what_changed_and_add_up_to_what_is_there() -> None:
     for one in window.news[1:]:
         assert not one["whole"]
         known = joined(known, one)
-    there = json.loads(robot.mission.query("whole test"))
+    whole = robot.mission.handle(LookAtAll("test"))
     assert known["state"] == "success"
-    for own in ("picture", "whole", "version"):
-        known.pop(own, None)
-        del there[own]
-    assert known == {**there, "statuses": {int(number): one for number, one in there["statuses"].items()}}
+    own = ("picture", "whole", "version")
+    seen, there = ({key: one for key, one in each.items() if key not in own} for each in (known, whole))
+    assert seen == there
     assert [one["data"] for one in window.news[1:4]] == [{"round": 2}, {"round": 3}, {}]
     assert "transitions" not in window.news[1]
 
@@ -65,12 +63,12 @@ def test_who_comes_in_the_middle_hears_what_was_not_told_before() -> None:
     assert [one["data"] for one in window.news] == [{"round": 3}]
 
 
-@pytest.mark.parametrize(("words", "state"), [("pause", "paused"), ("cancel", "halted")])
-def test_what_people_do_is_told_at_once(words: str, state: str) -> None:
+@pytest.mark.parametrize(("command", "state"), [(PauseMission(), "paused"), (CancelMission(), "halted")])
+def test_what_people_do_is_told_at_once(command: Command, state: str) -> None:
     robot = Robot(COUNT)
     window = watched(robot)
     robot.start()
-    robot.mission.command(words)
+    robot.mission.handle(command)
     assert window.news[-1]["state"] == state
 
 
@@ -80,7 +78,7 @@ def test_another_run_begins_with_a_whole() -> None:
     robot.start()
     robot.advance(10.0)
     told = len(window.news)
-    robot.mission.command("run test")
+    robot.mission.handle(RunMission("test"))
     robot.advance(0.0)
     assert window.news[told]["whole"]
     assert window.news[told]["data"] == {"round": 1}
@@ -90,10 +88,10 @@ def test_the_whole_has_all_that_a_viewer_needs() -> None:
     robot = Robot(COUNT)
     question = robot.windows["missions/test"].question
     with pytest.raises(Refused, match="has not been running"):
-        robot.mission.query(question)
+        robot.mission.handle(question)
     robot.start()
     replica = Replica()
-    replica.answered({"source": "s", "sequence": 0, "value": json.loads(robot.mission.query(question))})
+    replica.answered({"source": "s", "sequence": 0, "value": robot.mission.handle(question)})
     assert (replica.seen["mission"], replica.seen["state"], replica.seen["data"]) == ("test", "running", {"round": 1})
     assert replica.seen["picture"]["count"] == len(replica.seen["statuses"])
-    assert robot.windows["missions"].question == "ls"
+    assert robot.windows["missions"].question == ListMissions()

@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 
 from rbxcompose.components.mission import Mission
+from rbxcompose.executive.requests import PauseMission, ResumeMission, RunMission
 from rbxcompose.model.wiring import ends_of
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.plan.model import Instance, Wire
+from rbxcompose.robot_events import MissionOver
 from rbxcompose.sdk import Component, Config, ServesAction, component
 from rbxcompose.testing import Bench
 from tests.executive.fake_robot import Robot
@@ -66,9 +68,9 @@ def lines(robot: Bench) -> list[str]:
 def test_a_goal_that_can_be_held_is_held_and_goes_on_where_it_was() -> None:
     robot = bench()
     robot.advance(1.0)
-    robot.host.command("mission", "pause")
+    robot.host.ask("mission", PauseMission())
     robot.advance(7.0)
-    robot.host.command("mission", "resume")
+    robot.host.ask("mission", ResumeMission())
     robot.advance(2.0)
     assert goals(robot) == 1
     assert lines(robot)[-1].endswith("mission test: success")
@@ -80,9 +82,9 @@ def test_a_stop_ends_the_held_goal_and_the_resume_sends_it_again() -> None:
     robot.advance(1.0)
     robot.host.stop()
     robot.advance(5.0)
-    assert not [one for one in robot.events if one[0] == "mission_ended"]
+    assert not [one for one in robot.events if isinstance(one, MissionOver)]
     robot.host.release()
-    robot.host.command("mission", "resume")
+    robot.host.ask("mission", ResumeMission())
     robot.advance(2.5)
     assert goals(robot) == 2
     assert lines(robot)[-1].endswith("mission test: success")
@@ -93,7 +95,7 @@ def test_an_executive_that_crashed_runs_again_what_people_had_begun() -> None:
         instance("scanner", Scanner, Config()),
         instance("mission", Mission, Robot("do: scan", start=None).mission.config),  # type: ignore[arg-type]
     )
-    robot.host.command("mission", "run test")
+    robot.host.ask("mission", RunMission("test"))
     robot.advance(0.5)
     robot.host.failed("mission", RuntimeError("broken"))
     robot.advance(4.0)

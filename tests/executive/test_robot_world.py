@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rbxcompose.diagnostics.levels import Level
+from rbxcompose.executive.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Float32, String
@@ -19,8 +20,9 @@ def started(text: str) -> Robot:
     return robot
 
 
-def end_of(robot: Robot) -> object:
-    return robot.events[-1]["message"] if robot.events[-1]["outcome"] == "failure" else robot.events[-1]["outcome"]
+def end_of(robot: Robot) -> str:
+    end = robot.ends[-1]
+    return end.message if end.outcome == "failure" else end.outcome
 
 
 def test_a_message_is_published_with_its_fields() -> None:
@@ -89,11 +91,11 @@ def test_a_message_of_another_shape_is_told_once_and_gives_no_value() -> None:
 
 def test_a_skill_that_can_pause_is_held_and_goes_on() -> None:
     robot = started("do: scan")
-    robot.mission.command("pause")
+    robot.mission.handle(PauseMission())
     assert robot.pauses.asked[-1][0] == SetBool.Request(data=True)
     robot.pauses.answer(SetBool.Response(success=True))
     assert not robot.scan.goals[0].is_cancelled
-    robot.mission.command("resume")
+    robot.mission.handle(ResumeMission())
     robot.advance(0.0)
     assert robot.pauses.asked[-1][0] == SetBool.Request(data=False)
     robot.pauses.answer(SetBool.Response(success=True))
@@ -104,10 +106,10 @@ def test_a_skill_that_can_pause_is_held_and_goes_on() -> None:
 
 def test_one_that_cannot_be_held_after_all_is_cancelled_and_sent_again() -> None:
     robot = started("do: scan")
-    robot.mission.command("pause")
+    robot.mission.handle(PauseMission())
     robot.pauses.answer(None, "gone")
     assert robot.scan.goals[0].is_cancelled
-    robot.mission.command("resume")
+    robot.mission.handle(ResumeMission())
     robot.advance(0.0)
     assert len(robot.scan.goals) == 2
 
@@ -118,7 +120,7 @@ def test_a_held_goal_that_a_stop_ends_is_sent_again() -> None:
     robot.scan.end(Outcome.CANCELED)
     robot.advance(3.0)
     assert not robot.events
-    robot.mission.command("resume")
+    robot.mission.handle(ResumeMission())
     robot.advance(0.0)
     assert len(robot.scan.goals) == 2
 
@@ -163,12 +165,12 @@ def test_an_activity_is_held_and_halted() -> None:
     ToySlow.heard.clear()
     robot = started("do:\n  toy_slow\n")
     robot.advance(0.45)
-    robot.mission.command("pause")
+    robot.mission.handle(PauseMission())
     robot.advance(5.0)
-    robot.mission.command("resume")
+    robot.mission.handle(ResumeMission())
     robot.advance(0.3)
     assert not robot.events
-    robot.mission.command("cancel")
+    robot.mission.handle(CancelMission())
     assert ToySlow.heard == ["pause", "resume", "halt"]
 
 

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
-from rbxcompose.executive.words import Words, words_of
+from rbxcompose.executive.requests import (
+    CancelMission,
+    ListMissions,
+    LookAtAll,
+    LookAtMission,
+    PauseMission,
+    ResumeMission,
+    RunMission,
+    ShowPicture,
+)
+from rbxcompose.requests import Command, Query
+from rbxcompose.robot_events import MissionOver
 from rbxcompose.sdk import Outcome, Refused
 from tests.executive.fake_robot import Robot
 
@@ -64,8 +73,8 @@ def robot_with(**missions: str) -> Robot:
 
 def test_two_missions_that_claim_different_parts_run_beside_each_other() -> None:
     robot = robot_with(look=LOOK)
-    assert robot.mission.command("run test") == "mission test begins"
-    assert robot.mission.command("run look") == "mission look begins"
+    assert robot.mission.handle(RunMission("test")) == "mission test begins"
+    assert robot.mission.handle(RunMission("look")) == "mission look begins"
     robot.advance(0.0)
     assert (len(robot.go_to.goals), len(robot.scan.goals)) == (1, 1)
     robot.scan.end(Outcome.SUCCEEDED)
@@ -76,41 +85,38 @@ def test_two_missions_that_claim_different_parts_run_beside_each_other() -> None
 
 def test_one_that_needs_what_another_uses_is_refused_with_its_name() -> None:
     robot = robot_with(drive=DRIVE)
-    robot.mission.command("run test")
+    robot.mission.handle(RunMission("test"))
     with pytest.raises(Refused, match="base is in use by test"):
-        robot.mission.command("run drive")
-    robot.mission.command("cancel test")
-    robot.mission.command("run drive")
+        robot.mission.handle(RunMission("drive"))
+    robot.mission.handle(CancelMission("test"))
+    robot.mission.handle(RunMission("drive"))
     assert robot.mission.missions.names == ["drive"]
 
 
 @pytest.mark.parametrize(
-    ("words", "reason"),
+    ("command", "reason"),
     [
-        ("run tset", "the robot has no mission 'tset'"),
-        ("run test", "mission test runs already"),
-        ("run greet --set times=many", "the input 'times' must be a whole number"),
-        ("run greet --set tmes=1", "has no input 'tmes'"),
-        ("run greet --from somewhere", "there is no machine"),
-        ("run machine --from third", "base is in use|there is no state"),
-        ("pause greet", "mission greet is not running"),
-        ("cancel nobody", "the robot has no mission 'nobody'"),
-        ("run test greet", "one mission at a time"),
-        ("run greet --set", "'--set' needs a value"),
-        ("run greet --set times", "is no NAME=VALUE"),
-        ("resume", "mission test is not paused"),
+        (RunMission("tset"), "the robot has no mission 'tset'"),
+        (RunMission("test"), "mission test runs already"),
+        (RunMission("greet", {"times": "many"}), "the input 'times' must be a whole number"),
+        (RunMission("greet", {"tmes": "1"}), "has no input 'tmes'"),
+        (RunMission("greet", start="somewhere"), "there is no machine"),
+        (RunMission("machine", start="third"), "base is in use|there is no state"),
+        (PauseMission("greet"), "mission greet is not running"),
+        (CancelMission("nobody"), "the robot has no mission 'nobody'"),
+        (ResumeMission(), "mission test is not paused"),
     ],
 )
-def test_what_cannot_be_done_is_refused_with_the_reason(words: str, reason: str) -> None:
+def test_what_cannot_be_done_is_refused_with_the_reason(command: Command, reason: str) -> None:
     robot = robot_with(greet=GREET, machine=MACHINE)
-    robot.mission.command("run test")
+    robot.mission.handle(RunMission("test"))
     with pytest.raises(Refused, match=reason):
-        robot.mission.command(words)
+        robot.mission.handle(command)
 
 
 def test_inputs_can_be_given_as_text() -> None:
     robot = robot_with(greet=GREET)
-    robot.mission.command("run greet --set times=1")
+    robot.mission.handle(RunMission("greet", {"times": "1"}))
     robot.advance(1.5)
     assert robot.lines[-1] == "1.4 mission greet: success"
 
@@ -118,8 +124,8 @@ def test_inputs_can_be_given_as_text() -> None:
 def test_it_may_begin_in_another_state() -> None:
     robot = robot_with(machine=MACHINE)
     with pytest.raises(Refused, match="there is no state 'lst'; states are inner, last"):
-        robot.mission.command("run machine --from second.lst")
-    robot.mission.command("run machine --from second.last")
+        robot.mission.handle(RunMission("machine", start="second.lst"))
+    robot.mission.handle(RunMission("machine", start="second.last"))
     robot.advance(0.0)
     assert robot.go_to.goals[0].request.pose.pose.position.x == 0.5
     robot.go_to.end(Outcome.SUCCEEDED)
@@ -129,20 +135,20 @@ def test_it_may_begin_in_another_state() -> None:
 
 def test_each_can_be_paused_by_its_name_and_a_stop_pauses_all() -> None:
     robot = robot_with(look=LOOK)
-    robot.mission.command("run test")
-    robot.mission.command("run look")
+    robot.mission.handle(RunMission("test"))
+    robot.mission.handle(RunMission("look"))
     robot.advance(0.0)
     with pytest.raises(Refused, match="several missions are running: test, look; name one"):
-        robot.mission.command("pause")
-    assert robot.mission.command("pause look") == "mission look paused"
+        robot.mission.handle(PauseMission())
+    assert robot.mission.handle(PauseMission("look")) == "mission look paused"
     assert not robot.go_to.goals[0].is_cancelled
     robot.is_stopped = True
     robot.mission.stop()
     assert [one.is_paused for one in robot.mission.missions] == [True, True]
     with pytest.raises(Refused, match="release it first"):
-        robot.mission.command("resume look")
+        robot.mission.handle(ResumeMission("look"))
     robot.is_stopped = False
-    robot.mission.command("resume test")
+    robot.mission.handle(ResumeMission("test"))
     robot.advance(0.0)
     assert len(robot.go_to.goals) == 2
     assert [one.is_paused for one in robot.mission.missions] == [False, True]
@@ -151,43 +157,44 @@ def test_each_can_be_paused_by_its_name_and_a_stop_pauses_all() -> None:
 def test_only_the_end_of_the_start_mission_is_told_to_the_supervisor() -> None:
     robot = Robot(GO, look=LOOK)
     robot.start()
-    robot.mission.command("run look")
+    robot.mission.handle(RunMission("look"))
     robot.advance(0.0)
     robot.scan.end(Outcome.SUCCEEDED)
     robot.advance(0.0)
-    assert [one for one in robot.events if one["event"] == "mission_ended"] == []
+    assert robot.events == []
     robot.go_to.end(Outcome.SUCCEEDED)
     robot.advance(0.0)
-    assert robot.events[-1]["mission"] == "test"
+    assert robot.events == [MissionOver("test", "success")]
 
 
 def test_what_people_began_is_kept_for_a_restart_as_long_as_it_runs() -> None:
     robot = robot_with(look=LOOK)
-    robot.mission.command("run look")
-    assert robot.events[-1] == {"event": "commands", "instance": "mission", "commands": "run look"}
-    robot.mission.command("cancel")
-    assert robot.events[-1]["commands"] == ""
+    robot.mission.handle(RunMission("look"))
+    assert list(robot.repeated) == [RunMission("look")]
+    robot.mission.handle(CancelMission())
+    assert list(robot.repeated) == []
 
 
 def test_ls_tells_how_each_stands_and_what_it_claims() -> None:
     robot = robot_with(look=LOOK, greet=GREET)
-    robot.mission.command("run look")
+    robot.mission.handle(RunMission("look"))
     robot.advance(0.0)
-    listed = {one["name"]: one for one in json.loads(robot.mission.query("ls"))}
-    assert {name: one["state"] for name, one in listed.items()} == {"test": "idle", "look": "running", "greet": "idle"}
-    assert {name: one["claims"] for name, one in listed.items()} == {
+    listed = {one.name: one for one in robot.mission.handle(ListMissions())}
+    assert {name: one.state for name, one in listed.items()} == {"test": "idle", "look": "running", "greet": "idle"}
+    assert {name: list(one.claims) for name, one in listed.items()} == {
         "test": ["base"],
         "look": ["head"],
         "greet": ["voice"],
     }
 
 
-@pytest.mark.parametrize("question", ["", "ls all", "state nobody 0", "state test x", "picture nobody", "log many"])
-def test_a_question_that_has_no_answer_is_refused(question: str) -> None:
+@pytest.mark.parametrize("question", [LookAtMission("nobody"), ShowPicture("nobody"), LookAtAll("test")])
+def test_a_question_that_has_no_answer_is_refused(question: Query[object]) -> None:
     with pytest.raises(Refused):
-        robot_with().mission.query(question)
+        robot_with().mission.handle(question)
 
 
-def test_words_are_read_as_they_are_written() -> None:
-    words = Words("run", "patrol", {"low": "40 %", "rounds": "1"}, "outer.inner")
-    assert words_of(words.text) == words
+def test_the_log_tells_a_command_as_it_is_typed() -> None:
+    request = RunMission("patrol", {"low": "40 %", "rounds": "1"}, "outer.inner")
+    assert request.words == "run patrol --set 'low=40 %' --set rounds=1 --from outer.inner"
+    assert [PauseMission().words, CancelMission("a b").words] == ["pause", "cancel 'a b'"]

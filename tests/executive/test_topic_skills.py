@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.executive.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.msgs.std_msgs import Float64
+from rbxcompose.robot_events import MissionOver
 from rbxcompose.testing import Bench, check_text
 from tests.executive.toy_gripper import GripEnd, Gripper
 
@@ -48,8 +50,8 @@ class Hand:
     @property
     def end(self) -> str:
         """Return how the last mission ended, with the reason; empty while it runs."""
-        ends = [data for event, data in self.bench.events if event == "mission_ended"]
-        return f"{ends[-1]['outcome']} {ends[-1]['message']}".strip() if ends else ""
+        ends = [event for event in self.bench.events if isinstance(event, MissionOver)]
+        return f"{ends[-1].outcome} {ends[-1].message}".strip() if ends else ""
 
     def lose_gripper(self) -> None:
         """Have the gripper's process die."""
@@ -131,10 +133,10 @@ def test_a_deadline_gives_the_order_up(make: Make) -> None:
 def test_a_pause_gives_it_up_and_the_resume_sends_it_again(make: Make) -> None:
     hand = make("do:\n  grip: 0.02")
     hand.bench.advance(0.5)
-    hand.bench.host.command("mission", "pause")
+    hand.bench.host.ask("mission", PauseMission())
     hand.bench.advance(4.5)
     assert hand.end == ""
-    hand.bench.host.command("mission", "resume")
+    hand.bench.host.ask("mission", ResumeMission())
     hand.bench.advance(1.1)
     assert hand.gripper.heard == ["0.0 grip 0.02", "0.5 halt", "5.0 grip 0.02"]
     assert hand.end == "success"
@@ -147,7 +149,7 @@ def test_a_stop_of_the_robot_is_a_pause(make: Make) -> None:
     hand.bench.advance(2.5)
     assert hand.gripper.heard == ["0.0 grip 0.02", "0.5 halt"]
     hand.bench.host.release()
-    hand.bench.host.command("mission", "resume")
+    hand.bench.host.ask("mission", ResumeMission())
     hand.bench.advance(1.1)
     assert hand.gripper.heard[2:] == ["3.0 grip 0.02"]
     assert hand.end == "success"
@@ -165,7 +167,7 @@ def test_a_robot_that_is_stopped_takes_no_order_that_claims_a_part_of_it(make: M
 def test_a_mission_that_is_cancelled_gives_its_order_up(make: Make) -> None:
     hand = make("do:\n  grip: 0.02")
     hand.bench.advance(0.5)
-    hand.bench.host.command("mission", "cancel")
+    hand.bench.host.ask("mission", CancelMission())
     hand.bench.advance(0.0)
     assert hand.gripper.heard == ["0.0 grip 0.02", "0.5 halt"]
 

@@ -16,9 +16,9 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.cli.common.bus_place import BusPlace
-from rbxcompose.cli.common.guest import Guest
-from rbxcompose.cli.common.missions_seen import MissionsSeen
+from rbxcompose.cli.bus.guest import Guest
+from rbxcompose.cli.bus.place import BusPlace
+from rbxcompose.cli.missions.replicas import MissionsSeen
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 20.0  # [s]

@@ -68,20 +68,24 @@ REQUESTS = {
     "no text": bytes(range(256)) + b"\n",
     "nested without end": b"[" * 200_000 + b"\n",
     "nested objects without end": b'{"a":' * 200_000 + b"\n",
-    "a number without end": b'{"verb": ' + b"9" * 100_000 + b"}\n",
+    "a number without end": b'{"type": ' + b"9" * 100_000 + b"}\n",
     "a list": _line(["stop"]),
-    "a verb that is none": _line({"verb": {"stop": []}}),
-    "a verb of Python": _line({"verb": "__class__"}),
-    "a command of wrong types": _line({"verb": "command", "to": [1], "word": {}}),
-    "a plan that is none": _line({"verb": "apply", "plan": {"robot": 5}, "generation": "x"}),
-    "a plan nested without end": _line({"verb": "changes", "plan": "[" * 100_000}),
-    "terminal codes": _line({"verb": "\x1b[2Jstop\r\n"}),
+    "a name that is none": _line({"type": {"stop": []}}),
+    "a name of Python": _line({"type": "__class__"}),
+    "a request of another version": _line({"verb": "stop"}),
+    "a command of wrong types": _line({"type": "mission.PauseMission", "mission": [1]}),
+    "a command nested almost without end": b'{"type": "mission.RunMission", "mission": %s}\n'
+    % (b"[" * 900 + b"]" * 900),
+    "a command with more than it has": _line({"type": "robot.StopRobot", "force": True}),
+    "a plan that is none": _line({"type": "robot.ApplyPlan", "plan": {"robot": 5}, "generation": "x"}),
+    "a plan nested without end": _line({"type": "robot.ComparePlan", "plan": "[" * 100_000}),
+    "terminal codes": _line({"type": "\x1b[2Jstop\r\n"}),
 }
 ON_CONTROL: dict[str, Attack] = {
     "more than it may be": partial(sending, b"x" * MUCH),
-    "half a request, 200 times": partial(crowding, b'{"verb": "do'),
+    "half a request, 200 times": partial(crowding, b'{"type": "do'),
     "nothing, 200 times": partial(crowding, b""),
-    "answers that nobody reads": partial(flooding, _line({"verb": "ps"}) * 50, 50),
+    "answers that nobody reads": partial(flooding, _line({"type": "robot.RobotStatus"}) * 50, 50),
     "resets": resetting,
 }
 ON_ROUTER: dict[str, Attack] = {

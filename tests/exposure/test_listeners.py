@@ -12,7 +12,6 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -23,6 +22,7 @@ from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.runtime import control
 from rbxcompose.runtime.control import ControlServer, ask
 from rbxcompose.runtime.folder import SOCKET, RobotFolder
+from rbxcompose.runtime.requests import RobotStatus
 from tests.exposure.attacks import ON_CONTROL, ON_ROUTER, REQUESTS, sending
 from tests.exposure.sockets import Listener, listeners
 from tests.runtime.test_real_processes import Robot, eventually
@@ -112,7 +112,7 @@ def test_a_request_that_makes_no_sense_is_refused(robot: Robot, refused: list[st
     before = alive(robot)
     for name, data in REQUESTS.items():
         with sending(data, lambda: knock(robot)):
-            assert ask(robot.folder, {"verb": "ps"}, timeout=QUICK_ANSWER), name
+            assert ask(robot.folder, RobotStatus(), timeout=QUICK_ANSWER), name
         refused.append(name)
     assert_goes_on(robot, before)
 
@@ -122,7 +122,7 @@ def test_an_attack_on_the_control_socket_is_refused(robot: Robot, refused: list[
     before = alive(robot)
     with ON_CONTROL[name](lambda: knock(robot)):
         assert_goes_on(robot, before)
-    assert ask(robot.folder, {"verb": "ps"}, timeout=QUICK_ANSWER)
+    assert ask(robot.folder, RobotStatus(), timeout=QUICK_ANSWER)
     refused.append(name)
 
 
@@ -139,8 +139,8 @@ def test_an_attack_on_the_router_is_refused(robot: Robot, refused: list[str], na
 
 def assert_goes_on(robot: Robot, before: list[int]) -> None:
     """Require that the supervisor answers, the components make their steps, and no process was replaced."""
-    answer: Any = ask(robot.folder, {"verb": "ps"}, timeout=QUICK_ANSWER)
-    assert {one["state"] for one in answer["components"]} == {"active"}
+    status = ask(robot.folder, RobotStatus(), timeout=QUICK_ANSWER)
+    assert {one.state for one in status.components} == {"active"}
     count = steps(robot)
     eventually(lambda: steps(robot) > count)
     assert alive(robot) == before
@@ -196,7 +196,7 @@ def _is_refused(connection: socket.socket, path: Path, writing: int) -> bool:
     connection.connect(str(path))
     os.write(writing, b"x")
     try:
-        connection.sendall(b'{"verb": "ps"}\n')
+        connection.sendall(b'{"type": "robot.RobotStatus"}\n')
         return connection.recv(100) == b""
     except (BrokenPipeError, ConnectionResetError):
         return True

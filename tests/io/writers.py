@@ -14,7 +14,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from rbxcompose.cli import main as command
-from rbxcompose.cli.common.fixing import fix
+from rbxcompose.cli.project.fixes import fix
 from rbxcompose.clock import SteppedClock
 from rbxcompose.compiler import compile_robot
 from rbxcompose.diagnostics.levels import Level
@@ -25,13 +25,13 @@ from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import RecordingReader
 from rbxcompose.recording.topics import Topic
 from rbxcompose.replacing import replace_file
-from rbxcompose.runtime.folder import ComponentState, RobotFolder, State
+from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.follow import read_log
 from rbxcompose.runtime.log import NAME, PREVIOUS, LogFile, start_new
+from rbxcompose.runtime.process_group.taping import Taping
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.runtime.records import Record
-from rbxcompose.runtime.supervisor import Supervisor
-from rbxcompose.runtime.taping import Taping
+from rbxcompose.runtime.supervision.supervisor import Supervisor
 from rbxcompose.scaffold.writing import write_new
 
 OLD, NEW = b"old: 1\n" * 3000, b"new: 2\n" * 4000
@@ -117,10 +117,10 @@ def _prepare_graph(run: Run) -> None:
 # State
 
 
-def _state(robot: str) -> State:
+def _state(robot: str) -> RobotState:
     process = Process.of(os.getpid())
     one = ComponentState("base", "toy", "active", "robot", process.pid, 0)
-    return State(robot, "/robot.yaml", process, {"robot": process}, (one,), "tcp/x", boot_id())
+    return RobotState(robot, "/robot.yaml", process, {"robot": process}, (one,), "tcp/x", boot_id())
 
 
 def _prepare_state(run: Run) -> None:

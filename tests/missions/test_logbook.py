@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from rbxcompose.executive.requests import PauseMission, ResumeMission
 from rbxcompose.missions.logbook import INPUTS, ReplayError, replay
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.sdk import Outcome
@@ -59,9 +60,9 @@ def recorded() -> tuple[Robot, list[dict[str, Any]]]:
     robot.level(90.0)
     robot.recharge.end(Outcome.SUCCEEDED, result=Recharge.Result(level=90.0))
     robot.advance(3.0)
-    robot.mission.command("pause")
+    robot.mission.handle(PauseMission())
     robot.advance(5.0)
-    robot.mission.command("resume")
+    robot.mission.handle(ResumeMission())
     robot.advance(11.0)
     robot.go_to.end(Outcome.ABORTED, "stuck")
     robot.advance(20.0)

@@ -16,7 +16,7 @@ from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.lifeline import answer
+from rbxcompose.runtime.process_group.lifeline import answer
 from tests.net.proxy import Proxy
 from tests.runtime.test_lifeline import ROBOT, Probed, Visitor, until
 from tests.soak import Soak

@@ -25,9 +25,12 @@ GROUND = {
     "plugins": "findings plain",
     "qos": "",
     "replacing": "",
+    "requests": "typed_json",
     "restarts": "config",
+    "robot_events": "",
     "rules": "findings",
     "scheduler": "",
+    "typed_json": "",
     "units": "findings",
 }
 # What the others import beside the ground and themselves. A row may be that of a package, a module or what lies deeper.
@@ -37,10 +40,8 @@ ABOVE = {
     "bus": "sdk.bound",
     "checking": "missions.checking model.robot",
     "checks": "checking diagnostics.core manifest missions model sdk",
-    "cli": "body.transforms bus compiler diagnostics.levels doctor lsp.server manifest missions model.robot pages "
-    "params plan recording rendering runtime scaffold schema.documents sdk seeing trials",
-    "cli.common": "bus cli.main compiler diagnostics.levels executive.words manifest missions model plan recording "
-    "rendering rerun runtime scaffold sdk seeing trials.exploring",
+    "cli": "body.transforms bus compiler diagnostics.levels doctor executive.requests lsp.server manifest missions model "
+    "pages params plan recording rendering rerun runtime scaffold schema.documents sdk seeing trials",
     "compiler": "checking manifest model plan",
     "components": "diagnostics executive missions mux.core navigation.go_to sdk sim",
     "diagnostics": "",
@@ -57,7 +58,7 @@ ABOVE = {
     "plan": "diagnostics.levels manifest.shapes manifest.tree manifest.validate missions model sdk",
     "recording": "bus.attachment bus.classes bus.names bus.tokens bus.transport bus.witness",
     "rendering": "",
-    "rerun": "bus diagnostics.levels plan.model recording runtime.host runtime.records sdk",
+    "rerun": "bus diagnostics.levels plan.model recording runtime.process_group runtime.records sdk",
     "runtime": "body.transforms bus diagnostics.levels missions.sources params plan recording sdk",
     "scaffold": "manifest.files missions sdk",
     "schema": "manifest missions sdk",
@@ -66,8 +67,8 @@ ABOVE = {
     "sim": "diagnostics.levels",
     "skills": "sdk",
     "testing": "bus compiler components diagnostics.levels model.wiring plan.model recording.message rendering.text "
-    "runtime.host runtime.records sdk",
-    "trials": "compiler components.mission diagnostics.levels executive.world manifest missions model plan.model sdk "
+    "runtime.process_group runtime.records sdk",
+    "trials": "compiler components.mission diagnostics.levels executive.requests executive.world manifest missions model plan.model sdk "
     "testing.bench",
 }
 CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}  # pure: no bus, thread or clock

@@ -15,14 +15,18 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from rbxcompose.cli import main as command
+from rbxcompose.executive.requests import CancelMission
+from rbxcompose.msgs.cdr import encode
+from rbxcompose.msgs.std_msgs import String
 from rbxcompose.plan.dump import load
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import RecordingReader
 from rbxcompose.recording.recovery import recover
-from rbxcompose.recording.tape import PLAN
+from rbxcompose.recording.tape import ORDERS, PLAN
 from rbxcompose.recording.topics import Topic
 from rbxcompose.recording.writer import RecordingWriter
+from rbxcompose.requests import as_data
 from rbxcompose.rerun.run import Rerun, missing_topics, rerun
 
 ROOT = Path(__file__).parents[2]
@@ -124,6 +128,28 @@ def test_an_output_that_is_too_few_or_too_many_is_told(recording: Recording) -> 
     again = recording.again("cmd_vel", twice).difference
     assert again
     assert again.now == "nothing"
+
+
+def commanded(recording: Recording, data: object) -> Rerun:
+    """Run the missions again as if a command had come right after the start."""
+    orders = [number for number, one in enumerate(recording.records) if one.topic.name == ORDERS]
+    start = next(number for number in orders if b'"start"' in recording.records[number].payload)
+    payload = encode(String(data=json.dumps(["command", "mission", data])))
+    records = list(recording.records)
+    records.insert(start + 1, replace(records[start], payload=payload))
+    return recording.again("mission", records)
+
+
+def test_a_recorded_command_is_given_again(recording: Recording) -> None:
+    found = commanded(recording, as_data(CancelMission()))
+    assert found.errors == ()
+    assert found.difference  # it was not given then
+
+
+def test_a_command_that_another_version_recorded_is_told(recording: Recording) -> None:
+    found = commanded(recording, "cancel")
+    told = "a recorded command cannot be given again: the request cannot be read: '' is not known here"
+    assert (found.difference, found.errors) == (None, (f"mission: {told}",))
 
 
 def test_without_an_input_the_first_output_that_needs_it_differs(recording: Recording) -> None:

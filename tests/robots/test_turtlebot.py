@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.executive.requests import ResumeMission
 from rbxcompose.geometry import Pose2
 from rbxcompose.rendering.text import render_text
+from rbxcompose.robot_events import MissionOver
 from rbxcompose.testing.bench import Bench
 from rbxcompose.testing.robots import Ran, run_robot
 
@@ -129,8 +131,8 @@ def test_a_stop_brakes_at_once_and_only_a_resume_goes_on() -> None:
     bench.host.release()
     bench.advance(20.0)
     assert pose(bench) == stopped_at
-    bench.host.command("mission", "resume")
-    bench.run_until(lambda: any(event == "mission_ended" for event, _ in bench.events))
+    bench.host.ask("mission", ResumeMission())
+    bench.run_until(lambda: any(isinstance(event, MissionOver) for event in bench.events))
     assert Ran(bench).outcome == "success"
 
 
@@ -150,7 +152,7 @@ def test_it_never_exceeds_its_speed_limits() -> None:
     def ended() -> bool:
         velocity = bench.component("base").core.velocity  # type: ignore[attr-defined]
         speeds.append((abs(velocity.linear), abs(velocity.angular)))
-        return any(event == "mission_ended" for event, _ in bench.events)
+        return any(isinstance(event, MissionOver) for event in bench.events)
 
     bench.run_until(ended)
     assert max(linear for linear, _ in speeds) <= 0.5 + 1e-9

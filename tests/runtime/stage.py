@@ -7,8 +7,8 @@ from dataclasses import replace
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.conductor import Conductor
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.testing.bench import instance
 
@@ -49,7 +49,7 @@ class Stage:
         self.suspended: set[str] = set()
         self.ended: list[str] = []
         self.records: list[tuple[Level, str]] = []
-        self.answers: list[tuple[int, str, bool]] = []
+        self.answers: list[tuple[int, object, bool]] = []
         self.ups = 0
         self.writes = 0
         self.beats: set[str] = set()
@@ -84,8 +84,11 @@ class Stage:
     def states_changed(self) -> None:
         self.writes += 1
 
-    def answer(self, number: int, text: str, *, is_refused: bool) -> None:
-        self.answers.append((number, text, is_refused))
+    def answer(self, number: int, answer: object) -> None:
+        self.answers.append((number, answer, False))
+
+    def refuse(self, number: int, reason: str) -> None:
+        self.answers.append((number, reason, True))
 
     # Processes
 

@@ -9,7 +9,7 @@ import pytest
 from rbxcompose.plan.dump import dump, load
 from rbxcompose.plan.model import BusPlan, Plan
 from rbxcompose.restarts import Restart
-from rbxcompose.runtime.changes import Changes, Fate, changes
+from rbxcompose.runtime.supervision.changes import Changes, Fate, changes
 from rbxcompose.testing.bench import instance
 from tests.conftest import ROOT
 from tests.manifests import turtlebot

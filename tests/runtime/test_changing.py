@@ -10,8 +10,8 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.dump import load
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.changes import changes
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.supervision.changes import changes
 from tests.runtime.stage import Stage, placed, robot
 from tests.runtime.test_giving_up import with_never
 
@@ -152,7 +152,7 @@ def test_a_new_component_that_fails_is_told_and_the_robot_goes_on_without() -> N
     stage = Changed(replace(robot(), instances=robot().instances))
     stage.apply(replace(robot(), instances=(*robot().instances, lamp())))
     stage.configure("robot")
-    stage.speak("robot", say.Notify("failed", {"instance": "lamp", "message": "'lamp' failed too often: no"}))
+    stage.speak("robot", say.Failed("lamp", "'lamp' failed too often: no"))
     assert stage.done == [("only in part: 'lamp' failed too often: no; 'rbxcompose ps' shows what runs", True)]
     assert not stage.conductor.is_going_down
     assert stage.conductor.states["lamp"][0] == "failed"
@@ -160,7 +160,7 @@ def test_a_new_component_that_fails_is_told_and_the_robot_goes_on_without() -> N
 
 def test_a_failure_of_what_was_there_before_ends_the_robot_also_during_a_change() -> None:
     stage = Changed().apply(replace(robot(), instances=(*robot().instances, lamp())))
-    stage.speak("robot", say.Notify("failed", {"instance": "go_to", "message": "no"}))
+    stage.speak("robot", say.Failed("go_to", "no"))
     assert stage.conductor.is_going_down
     assert stage.done == [("only in part: the robot goes down: no; 'rbxcompose ps' shows what runs", True)]
 

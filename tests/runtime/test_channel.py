@@ -5,17 +5,19 @@ import socket
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rbxcompose.robot_events import MissionOver
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.channel import Channel, from_line, to_line
+from rbxcompose.runtime.channel import MESSAGES, Channel
 
 NAMES = st.lists(st.text(), max_size=4)
-MESSAGES: st.SearchStrategy[say.Message] = st.one_of(
+SOME: st.SearchStrategy[say.Message] = st.one_of(
     st.builds(say.Configure, st.none() | st.text()),
     st.builds(say.Activate, NAMES),
     st.just(say.Start()),
     st.builds(say.Lost, NAMES, st.text()),
-    st.builds(say.Command, st.integers(), st.text(), st.text()),
-    st.builds(say.Notify, st.text(), st.dictionaries(st.text(), st.text() | st.integers())),
+    st.builds(say.Ask, st.integers(), st.text(), st.dictionaries(st.text(), st.text() | st.integers())),
+    st.builds(say.States, st.dictionaries(st.text(), st.tuples(st.text(), st.integers()))),
+    st.builds(MissionOver, st.text(), st.text(), st.text()),
     st.builds(say.Summary, st.floats(0, 1e9), st.dictionaries(st.text(), st.dictionaries(st.text(), st.text()))),
     st.builds(say.Alive, st.floats(0, 1e9)),
 )
@@ -26,11 +28,11 @@ def pair() -> tuple[Channel, Channel]:
     return Channel(ours), Channel(theirs)
 
 
-@given(MESSAGES)
+@given(SOME)
 def test_a_message_is_one_line_and_comes_back_as_it_was(message: say.Message) -> None:
-    line = to_line(message)
+    line = MESSAGES.to_line(message)
     assert line.count(b"\n") == 1
-    assert from_line(line) == message
+    assert MESSAGES.from_line(line) == message
 
 
 def test_messages_come_in_order_however_they_are_bundled() -> None:

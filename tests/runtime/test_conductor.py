@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.diagnostics.levels import Level
+from rbxcompose.executive.requests import RunMission
 from rbxcompose.plan.model import BusPlan, Plan
+from rbxcompose.requests import as_data
+from rbxcompose.robot_events import MissionOver
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.members import Phase
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.supervision.members import Phase
 from tests.runtime.stage import ENDPOINT, Stage, robot
 
 # The beginning
@@ -68,7 +70,7 @@ def test_a_component_that_is_restarted_in_place_delays_the_start() -> None:
     stage.configure("router", "world", "robot", "mission")
     stage.speak("world", say.States({"base": ("unconfigured", 1)}))
     assert stage.told(say.Activate) == ["world"]
-    stage.speak("world", say.Notify("state", {"instance": "base", "state": "active", "restarts": 1}))
+    stage.speak("world", say.States({"base": ("active", 1)}))
     assert stage.told(say.Activate) == ["world", "robot"]
     assert stage.conductor.states["base"] == ("active", 1)
 
@@ -76,7 +78,7 @@ def test_a_component_that_is_restarted_in_place_delays_the_start() -> None:
 def test_a_component_that_fails_ends_the_start_with_its_reason() -> None:
     stage = Stage()
     stage.configure("router", "world", "robot", "mission")
-    stage.speak("robot", say.Notify("failed", {"instance": "mux", "message": "'mux' failed too often: no"}))
+    stage.speak("robot", say.Failed("mux", "'mux' failed too often: no"))
     assert (stage.conductor.exit_code, stage.conductor.reason) == (4, "'mux' failed too often: no")
     assert stage.conductor.is_going_down
 
@@ -87,15 +89,13 @@ def test_a_component_that_fails_ends_the_start_with_its_reason() -> None:
 def test_the_end_of_the_mission_ends_the_robot_in_the_foreground() -> None:
     for outcome, code in (("success", 0), ("failure", 3)):
         stage = Stage().start()
-        ended: dict[str, object] = {"mission": "patrol", "outcome": outcome, "message": ""}
-        stage.speak("mission", say.Notify("mission_ended", ended))
+        stage.speak("mission", MissionOver("patrol", outcome))
         assert (stage.conductor.is_going_down, stage.conductor.exit_code) == (True, code)
 
 
 def test_a_detached_robot_stays_up_when_its_mission_has_ended() -> None:
     stage = Stage(options=RunOptions(is_detached=True)).start()
-    ended: dict[str, object] = {"mission": "patrol", "outcome": "failure", "message": ""}
-    stage.speak("mission", say.Notify("mission_ended", ended))
+    stage.speak("mission", MissionOver("patrol", "failure"))
     assert not stage.conductor.is_going_down
 
 
@@ -212,7 +212,7 @@ def test_a_release_reaches_a_process_that_was_being_started_during_a_stop() -> N
 
 def test_one_restart_does_not_wait_for_the_trouble_of_another() -> None:
     stage = Stage().start()
-    stage.speak("world", say.Notify("state", {"instance": "base", "state": "unconfigured", "restarts": 1}))
+    stage.speak("world", say.States({"base": ("unconfigured", 1)}))
     stage.exit("mission")
     stage.scheduler.advance(stage.scheduler.now + 0.1)
     stage.configure("mission")
@@ -332,8 +332,25 @@ def test_facts_and_time_come_from_the_processes() -> None:
     assert (stage.conductor.time, stage.conductor.facts) == (12.5, {"base": {"distance": "8.0 m"}})
 
 
-@pytest.mark.parametrize("is_refused", [True, False])
-def test_answers_reach_who_asked(is_refused: bool) -> None:
+def test_answers_reach_who_asked() -> None:
     stage = Stage().start()
-    stage.speak("mission", say.Answer(7, "paused", is_refused))
-    assert stage.answers == [(7, "paused", is_refused)]
+    stage.speak("mission", say.Answered(7, {"next": 3}))
+    stage.speak("mission", say.Refusal(8, "not now"))
+    assert stage.answers == [(7, {"next": 3}, False), (8, "not now", True)]
+
+
+def test_a_process_that_was_killed_is_told_again_what_people_had_begun() -> None:
+    stage = Stage().start()
+    begun = as_data(RunMission("patrol"))
+    stage.speak("mission", say.Repeated("mission", [begun]))
+    stage.exit("mission")
+    stage.scheduler.advance(stage.scheduler.now + 0.1)
+    stage.configure("mission")
+    stage.speak("mission", say.States({"mission": ("active", 1)}))
+    assert stage.orders(say.Ask) == [("mission", say.Ask(0, "mission", begun))]
+
+
+def test_a_router_that_finds_no_port_ends_the_robot_with_its_reason() -> None:
+    stage = Stage()
+    stage.speak("router", say.Failed("", "no port is free"))
+    assert (stage.conductor.exit_code, stage.conductor.reason) == (4, "no port is free")

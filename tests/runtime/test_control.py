@@ -4,12 +4,29 @@ import selectors
 import socket
 import threading
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from rbxcompose.runtime.control import ControlServer, NoAnswerError, RefusedError, ask
+from rbxcompose.requests import Query, Refused, requests
+from rbxcompose.runtime.control import ControlServer, NoAnswerError, ask
 from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.typed_json import name_in, to_data
+
+
+@dataclass(frozen=True, slots=True)
+class Echoed:
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Echo(Query[Echoed]):
+    about = "robot"
+    text: str
+
+
+TAKEN = requests(Echo)
 
 
 class Served:
@@ -24,11 +41,17 @@ class Served:
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
 
-    def _handle(self, request: dict[str, object], number: int) -> None:
-        if request.get("verb") == "no":
-            self.server.refuse(number, "since I say so")
-        elif request.get("verb") != "silence":
-            self.server.answer(number, request)
+    def _handle(self, data: object, number: int) -> None:
+        if name_in(data) != "robot.Echo":
+            self.server.refuse(number, "this is no request")
+            return
+        match TAKEN.from_data(data):
+            case Echo(text="no"):
+                self.server.refuse(number, "since I say so")
+            case Echo(text="old"):
+                self.server.answer(number, {"words": []})
+            case Echo(text=text) if text != "silence":
+                self.server.answer(number, to_data(Echoed(text)))
 
     def _run(self) -> None:
         while not self._is_over:
@@ -53,17 +76,22 @@ def served(tmp_path: Path) -> Iterator[Served]:
 
 
 def test_a_request_is_answered(served: Served) -> None:
-    assert ask(served.folder, {"verb": "ps", "text": "ä\n"}) == {"verb": "ps", "text": "ä\n"}
+    assert ask(served.folder, Echo("ä\n")) == Echoed("ä\n")
 
 
 def test_a_refusal_comes_with_its_reason(served: Served) -> None:
-    with pytest.raises(RefusedError, match="since I say so"):
-        ask(served.folder, {"verb": "no"})
+    with pytest.raises(Refused, match="since I say so"):
+        ask(served.folder, Echo("no"))
+
+
+def test_the_answer_of_another_version_is_a_refusal(served: Served) -> None:
+    with pytest.raises(Refused, match="another version of rbxcompose: 'words' is not known here"):
+        ask(served.folder, Echo("old"))
 
 
 def test_silence_is_noticed(served: Served) -> None:
     with pytest.raises(NoAnswerError):
-        ask(served.folder, {"verb": "silence"}, timeout=0.05)
+        ask(served.folder, Echo("silence"), timeout=0.05)
 
 
 def test_nonsense_is_refused_and_hurts_nobody(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -74,9 +102,9 @@ def test_nonsense_is_refused_and_hurts_nobody(served: Served, monkeypatch: pytes
             connection.connect("control.sock")
             connection.sendall(nonsense)
             assert b"refused" in connection.recv(1000)
-    assert ask(served.folder, {"verb": "ps"}) == {"verb": "ps"}
+    assert ask(served.folder, Echo("still")) == Echoed("still")
 
 
 def test_where_nobody_listens_there_is_no_answer(tmp_path: Path) -> None:
     with pytest.raises(NoAnswerError):
-        ask(RobotFolder(tmp_path), {"verb": "ps"})
+        ask(RobotFolder(tmp_path), Echo("hello"))

@@ -18,8 +18,8 @@ from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.deliveries import PERIOD, Deliveries
-from rbxcompose.runtime.statuses import Statuses
+from rbxcompose.runtime.process_group.deliveries import PERIOD, Deliveries
+from rbxcompose.runtime.process_group.statuses import Statuses
 from rbxcompose.scheduler import Scheduler
 
 GOOD = encode(Float32(data=0.5))

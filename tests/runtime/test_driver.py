@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from rbxcompose.clock import MonotonicClock, SteppedClock
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import Channel
-from rbxcompose.runtime.driver import RealTimeDriver, SteppedDriver
-from rbxcompose.runtime.inbox import Inbox
+from rbxcompose.runtime.process_group.driver import RealTimeDriver, SteppedDriver
+from rbxcompose.runtime.process_group.inbox import Inbox
 from rbxcompose.scheduler import Scheduler
 
 

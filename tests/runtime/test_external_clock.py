@@ -26,9 +26,9 @@ from rbxcompose.msgs.std_msgs import Empty
 from rbxcompose.qos import Qos
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import Channel
-from rbxcompose.runtime.driver import ExternalDriver
-from rbxcompose.runtime.inbox import Inbox
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.process_group.driver import ExternalDriver
+from rbxcompose.runtime.process_group.inbox import Inbox
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.testing import Bench, instance
 from tests.bus.conftest import Network, network

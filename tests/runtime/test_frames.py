@@ -16,7 +16,7 @@ from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStampe
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.frames import Frames, Lookup
+from rbxcompose.runtime.process_group.frames import Frames, Lookup
 from rbxcompose.scheduler import Scheduler
 
 

@@ -8,7 +8,7 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.restarts import Restart
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.members import Phase
+from rbxcompose.runtime.supervision.members import Phase
 from tests.runtime.stage import Stage, robot
 
 NEVER = Restart(when="never")

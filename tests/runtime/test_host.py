@@ -7,9 +7,12 @@ from dataclasses import replace
 import pytest
 
 from rbxcompose.diagnostics.levels import Level
+from rbxcompose.executive.requests import PauseMission
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
+from rbxcompose.requests import as_data
 from rbxcompose.restarts import Restart
+from rbxcompose.runtime.channel import Failed
 from rbxcompose.sdk import Component, Config, In, Out, Refused, component
 from rbxcompose.testing import Bench, instance
 
@@ -104,7 +107,7 @@ def test_a_component_that_keeps_failing_has_failed_and_the_supervisor_is_told() 
     robot = bench("step", times=100)
     robot.advance(10.0)
     assert robot.host.states()["broken"] == ("failed", 4)
-    assert [data["instance"] for event, data in robot.events if event == "failed"] == ["broken"]
+    assert [one.instance for one in robot.events if isinstance(one, Failed)] == ["broken"]
     assert robot.host.states()["healthy"] == ("active", 0)
 
 
@@ -118,7 +121,7 @@ def test_a_component_that_is_never_restarted_stays_failed_and_the_robot_goes_on(
     robot.advance(10.0)
     assert robot.host.states() == {"broken": ("failed", 0), "healthy": ("active", 0)}
     assert "broken: stays failed: it is never restarted" in robot.texts()
-    assert [event for event, _ in robot.events if event == "failed"] == []
+    assert [one for one in robot.events if isinstance(one, Failed)] == []
 
 
 def test_a_component_that_is_always_restarted_outlives_any_number_of_failures() -> None:
@@ -131,7 +134,7 @@ def test_the_bound_of_failures_is_that_of_the_component() -> None:
     robot = with_restart(Restart(max=2), times=30)
     robot.advance(10.0)
     assert robot.host.states()["broken"] == ("failed", 1)
-    assert [data["instance"] for event, data in robot.events if event == "failed"] == ["broken"]
+    assert [one.instance for one in robot.events if isinstance(one, Failed)] == ["broken"]
 
 
 def test_a_message_that_breaks_its_handler_restarts_only_that_component() -> None:
@@ -159,12 +162,15 @@ def test_a_component_that_raises_on_the_way_down_does_not_keep_the_others() -> N
     assert {state for state, _ in robot.host.states().values()} == {"unconfigured"}
 
 
-def test_a_command_that_a_component_does_not_know_is_refused() -> None:
+def test_a_request_that_a_component_does_not_take_is_refused() -> None:
     robot = bench("")
-    with pytest.raises(Refused, match="does not know"):
-        robot.host.command("healthy", "dance")
+    pause = PauseMission()
+    with pytest.raises(Refused, match="does not take the request"):
+        robot.host.ask("healthy", pause)
     with pytest.raises(Refused, match="not active"):
-        robot.host.command("nobody", "pause")
+        robot.host.ask("nobody", pause)
+    with pytest.raises(Refused, match=r"'mission\.PauseMission' is not known here"):
+        robot.host.request("healthy", as_data(pause))
 
 
 def test_nothing_of_a_component_is_left_on_the_bus_after_shutdown() -> None:

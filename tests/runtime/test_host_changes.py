@@ -7,10 +7,11 @@ from typing import Annotated
 
 from rbxcompose.config import Live
 from rbxcompose.diagnostics.levels import Level
+from rbxcompose.executive.requests import PauseMission, ResumeMission
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.restarts import Restart
-from rbxcompose.runtime.hosted import State
+from rbxcompose.runtime.process_group.hosted import Lifecycle
 from rbxcompose.sdk import Component, Config, Out, Refused, component
 from rbxcompose.testing import Bench, instance
 from tests.manifests import turtlebot
@@ -136,7 +137,7 @@ def test_who_is_blocked_is_not_well_whatever_it_says() -> None:
     one.host.statuses.block({})
     one.advance(0.0)
     assert {status.level for status in heard[-1].status} == {Level.OK}
-    assert one.host.hosted["counter"].state is State.ACTIVE
+    assert one.host.hosted["counter"].state is Lifecycle.ACTIVE
 
 
 def test_a_mux_that_was_exchanged_during_a_stop_lets_through_what_comes_after_the_release() -> None:
@@ -152,7 +153,7 @@ def test_a_mux_that_was_exchanged_during_a_stop_lets_through_what_comes_after_th
     one.advance(1.0)
     assert one.component("base").is_at_rest
     one.host.release()
-    one.host.command("mission", "resume")
+    one.host.ask("mission", ResumeMission())
     one.advance(0.5)
     assert not one.component("base").is_at_rest
 
@@ -161,7 +162,7 @@ def test_a_mission_that_was_paused_is_still_held_when_it_was_exchanged() -> None
     one = Bench(plan=turtlebot())
     one.advance(3.0)
     assert one.host.work()[1] == {"mission": "mission patrol runs"}
-    one.host.command("mission", "pause")
+    one.host.ask("mission", PauseMission())
     mission = next(each for each in one.plan.instances if each.name == "mission")
     one.host.retire(["mission"])
     one.host.prepare([mission])
@@ -169,6 +170,6 @@ def test_a_mission_that_was_paused_is_still_held_when_it_was_exchanged() -> None
     one.advance(3.0)
     assert one.component("base").is_at_rest
     assert one.host.work() == ([], {})
-    one.host.command("mission", "resume")
+    one.host.ask("mission", ResumeMission())
     one.advance(2.0)
     assert not one.component("base").is_at_rest

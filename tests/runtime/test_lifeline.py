@@ -22,7 +22,7 @@ from rbxcompose.clock import MonotonicClock
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.lifeline import BEATS, Lifeline, answer
+from rbxcompose.runtime.process_group.lifeline import BEATS, Lifeline, answer
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.bound import Reply
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from rbxcompose.bus.probe import MISSES
 from rbxcompose.bus.renewal import RenewableTransport
 from rbxcompose.bus.transport import Answer, Nowhere, Transport
-from rbxcompose.runtime.driver import BEAT
-from rbxcompose.runtime.lifeline import BEATS, FIRST_PAUSE, LONGEST_PAUSE, Lifeline
+from rbxcompose.runtime.process_group.driver import BEAT
+from rbxcompose.runtime.process_group.lifeline import BEATS, FIRST_PAUSE, LONGEST_PAUSE, Lifeline
 
 OPENED_ANEW = "the session on the bus carries nothing any more; it is opened anew"
 

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from rbxcompose.runtime.folder import RobotFolder, State
-from rbxcompose.runtime.leftovers import end_leftovers
+from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id, describe_exit, titled, wait_until_ended
+from rbxcompose.runtime.supervision.leftovers import end_leftovers
 
 
 @pytest.fixture
@@ -76,7 +76,7 @@ def test_a_stopped_process_that_was_left_behind_is_killed(
     folder = RobotFolder.of("toys")
     folder.make()
     process = Process.of(child.pid)
-    folder.write_state(State("toys", "", process, {"robot": process}, (), None, boot_id()))
+    folder.write_state(RobotState("toys", "", process, {"robot": process}, (), None, boot_id()))
     child.send_signal(signal.SIGSTOP)
     wait_until_stopped(process)
     assert end_leftovers(folder) == ["processes left behind were killed: robot"]

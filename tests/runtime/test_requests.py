@@ -2,39 +2,66 @@
 
 from __future__ import annotations
 
+import json
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
 
 from rbxcompose.components.mission import MissionConfig
 from rbxcompose.diagnostics.levels import Level
+from rbxcompose.executive.requests import ListMissions, PauseMission
 from rbxcompose.plan.dump import dump
 from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.requests import Command, Request, answers, as_data
 from rbxcompose.restarts import Restart
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.conductor import Conductor
-from rbxcompose.runtime.folder import State
+from rbxcompose.runtime.folder import RobotState
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
 from rbxcompose.runtime.processes import Process
-from rbxcompose.runtime.requests import Requests
+from rbxcompose.runtime.requests import BringDown, ReleaseRobot, RobotStatus, StopRobot
+from rbxcompose.runtime.supervision.changes import Fate
+from rbxcompose.runtime.supervision.conductor import Conductor
+from rbxcompose.runtime.supervision.request_handler import RequestHandler
 from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk import Component, Config, component
+from rbxcompose.testing.bench import Bench, instance
+from rbxcompose.typed_json import from_data
 
 PLAN = Plan("toys", "toys.yaml", (Instance("patrol", "mission", MissionConfig(), "mission"),))
+
+
+@dataclass(frozen=True, slots=True)
+class Juggle(Command):
+    about = "juggler"
+    balls: int = 3
+
+
+@component("toy_juggler")
+class Juggler(Component[Config]):
+    """A component of a stranger, with a request of its own."""
+
+    @answers(Juggle)
+    def juggle(self, request: Juggle) -> str:
+        return f"{request.balls} balls"
 
 
 class Desk:
     """A supervisor without processes: everything that it would do is noted."""
 
-    def __init__(self, *, is_stepped: bool = False) -> None:
+    def __init__(self, plan: Plan = PLAN, *, is_stepped: bool = False) -> None:
         self.sent: list[tuple[str, say.Order]] = []
         self.texts: list[str] = []
         self.replies: list[tuple[int, object, bool]] = []
-        self.conductor = Conductor(PLAN, RunOptions(is_stepped=is_stepped), Scheduler(), self, router=None)
-        self.requests = Requests(self, self, is_stepped=is_stepped)
+        self.conductor = Conductor(plan, RunOptions(is_stepped=is_stepped), Scheduler(), self, router=None)
+        self.handler = RequestHandler(self, is_stepped=is_stepped)
         self.conductor.states["patrol"] = ("active", 0)
         self.conductor.members["mission"].is_configured = True
 
-    def state(self) -> State:
-        return State("toys", "/toys.yaml", Process.of(os.getpid()), {}, ())
+    def state(self) -> RobotState:
+        return RobotState("toys", "/toys.yaml", Process.of(os.getpid()), {}, ())
 
     def send(self, process: str, message: say.Order) -> None:
         self.sent.append((process, message))
@@ -45,8 +72,8 @@ class Desk:
     def refuse(self, number: int, reason: str) -> None:
         self.replies.append((number, reason, True))
 
-    def answer(self, number: int, answer: object, *, is_refused: bool = False) -> None:
-        self.replies.append((number, answer, is_refused))
+    def answer(self, number: int, answer: object) -> None:
+        self.replies.append((number, answer, False))
 
     def fork(self, process: str, *, is_restart: bool, is_stopped: bool) -> None:
         raise AssertionError("no process is to be forked")
@@ -66,16 +93,23 @@ class Desk:
     def is_up(self) -> None:
         raise AssertionError("it is not up")
 
-    def ask(self, **request: object) -> tuple[str, bool]:
+    def ask(self, request: Request[Any]) -> tuple[object, bool]:
         """Return answer and refusal of a request that is answered at once."""
-        self.requests.handle(dict(request), 1)
+        self.handler.handle(as_data(request), 1)
         _, answer, is_refused = self.replies.pop()
-        return str(answer), is_refused
+        return answer, is_refused
+
+    def compare(self, plan: str) -> PlanComparison:
+        """Return what a plan would change, as it comes to who asked."""
+        answer, is_refused = self.ask(ComparePlan(plan))
+        assert not is_refused
+        found: PlanComparison = from_data(ComparePlan.answer_type(), json.loads(json.dumps(answer)))
+        return found
 
 
 def test_stop_reaches_all_and_is_told() -> None:
     desk = Desk()
-    assert desk.ask(verb="stop") == ("stopped; 'release' allows motion again", False)
+    assert desk.ask(StopRobot()) == ("stopped; 'release' allows motion again", False)
     assert desk.sent == [("mission", say.Stop())]
     assert desk.texts == ["stop: all that moves is held until 'release'"]
     assert desk.conductor.is_stopped
@@ -83,41 +117,91 @@ def test_stop_reaches_all_and_is_told() -> None:
 
 def test_release_opens_a_stop_and_nothing_else() -> None:
     desk = Desk()
-    assert desk.ask(verb="release") == ("the robot is not stopped", True)
-    desk.ask(verb="stop")
-    assert desk.ask(verb="release")[1] is False
+    assert desk.ask(ReleaseRobot()) == ("the robot is not stopped", True)
+    desk.ask(StopRobot())
+    assert desk.ask(ReleaseRobot())[1] is False
     assert desk.sent[-1] == ("mission", say.Release())
 
 
-def test_a_command_goes_to_the_component_of_that_type_which_answers() -> None:
+def test_the_status_comes_back_as_it_was() -> None:
     desk = Desk()
-    desk.requests.handle({"verb": "command", "to": "mission", "word": "pause"}, 5)
-    assert desk.sent == [("mission", say.Command(5, "patrol", "pause"))]
+    status, _ = desk.ask(RobotStatus())
+    assert from_data(RobotStatus.answer_type(), status) == desk.state()
+
+
+def test_a_command_goes_to_the_component_that_takes_it_which_answers() -> None:
+    desk = Desk()
+    desk.handler.handle(as_data(PauseMission()), 5)
+    assert desk.sent == [("mission", say.Ask(5, "patrol", as_data(PauseMission())))]
     assert desk.replies == []
+
+
+def test_a_component_of_a_stranger_brings_requests_of_its_own() -> None:
+    desk = Desk(replace(PLAN, instances=(*PLAN.instances, Instance("clown", "toy_juggler", Config(), "ring"))))
+    desk.conductor.states["clown"] = ("active", 0)
+    desk.handler.handle(as_data(Juggle(5)), 5)
+    ((process, asked),) = desk.sent
+    assert (process, asked) == ("ring", say.Ask(5, "clown", as_data(Juggle(5))))
+    host = Bench(instance("clown", "toy_juggler")).host
+    assert host.ask("clown", host.request("clown", as_data(Juggle(5)))) == "5 balls"
 
 
 def test_a_command_that_nobody_can_take_is_refused() -> None:
     desk = Desk()
-    assert desk.ask(verb="command", to="juggler", word="go") == ("this robot has no component of type 'juggler'", True)
+    assert desk.ask(Juggle()) == ("this robot has no component of type 'juggler'", True)
     desk.conductor.states["patrol"] = ("unconfigured", 1)
-    assert desk.ask(verb="command", to="mission", word="pause") == ("'patrol' is not active", True)
+    assert desk.ask(PauseMission()) == ("'patrol' is not active", True)
 
 
-def test_a_robot_that_goes_down_takes_no_more_commands() -> None:
+def test_a_robot_that_goes_down_takes_no_more_commands_but_answers_questions() -> None:
     desk = Desk()
-    desk.ask(verb="down")
+    desk.ask(BringDown())
     assert desk.conductor.is_going_down
-    assert desk.ask(verb="stop") == ("the robot is going down", True)
-    assert desk.ask(verb="down") == ("going down", False)
+    for command in (StopRobot(), PauseMission(), ComparePlan("")):
+        assert desk.ask(command) == ("the robot is going down", True)
+    assert desk.ask(BringDown()) == ("going down", False)
+    assert desk.ask(RobotStatus())[1] is False
+    desk.handler.handle(as_data(ListMissions()), 5)
+    assert desk.sent[-1] == ("mission", say.Ask(5, "patrol", as_data(ListMissions())))
 
 
-def test_an_unknown_request_is_refused() -> None:
-    assert Desk().ask(verb="dance") == ("there is no request 'dance'", True)
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        ({"verb": "stop"}, "this is no request of this version of rbxcompose"),
+        (["stop"], "this is no request of this version of rbxcompose"),
+        (7, "this is no request of this version of rbxcompose"),
+        ({"type": "dance"}, "there is no request 'dance'"),
+        ({"type": "robot.Dance"}, "there is no request 'robot.Dance'"),
+        ({"type": "mission.Dance"}, "there is no request 'mission.Dance'"),
+        (
+            {"type": "robot.StopRobot", "force": True},
+            "the request 'robot.StopRobot' cannot be read: 'force' is not known here",
+        ),
+        (
+            {"type": "robot.ApplyPlan", "plan": ""},
+            "the request 'robot.ApplyPlan' cannot be read: 'generation' is missing",
+        ),
+        (
+            {"type": "robot.ApplyPlan", "plan": 5, "generation": 0},
+            "the request 'robot.ApplyPlan' cannot be read: 'plan' is no text",
+        ),
+        (
+            {"type": "mission.RunMission", "mission": "patrol", "inputs": {"rounds": [1]}},
+            "the request 'mission.RunMission' cannot be read: 'inputs.rounds' is no text",
+        ),
+    ],
+)
+def test_what_is_no_request_of_this_version_is_refused_with_the_reason(data: object, reason: str) -> None:
+    desk = Desk()
+    desk.handler.handle(data, 1)
+    assert desk.replies == [(1, reason, True)]
+    assert desk.sent == []
 
 
 def test_on_a_stepped_clock_the_process_tells_the_command_itself() -> None:
     desk = Desk(is_stepped=True)
-    desk.ask(verb="stop")
+    desk.ask(StopRobot())
     assert desk.texts == []
 
 
@@ -125,24 +209,21 @@ def test_another_plan_is_compared_first_and_taken_only_if_nobody_was_faster() ->
     desk = Desk()
     desk.conductor._is_running = True
     text = dump(replace(PLAN, instances=(replace(PLAN.instances[0], restart=Restart(when="never")),)))
-    desk.requests.handle({"verb": "changes", "plan": text}, 1)
-    _, answer, is_refused = desk.replies.pop()
-    assert isinstance(answer, dict)
-    assert (is_refused, answer["generation"], answer["why_not"]) == (False, 0, "")
-    assert [one["fate"] for one in answer["components"]] == ["changed live"]
-    assert desk.ask(verb="apply", plan=text, generation=7)[0].startswith("it was changed by someone else meanwhile")
+    found = desk.compare(text)
+    assert (found.generation, found.why_not) == (0, "")
+    assert [one.fate for one in found.components] == [Fate.LIVE]
+    assert str(desk.ask(ApplyPlan(text, 7))[0]).startswith("it was changed by someone else meanwhile")
     assert desk.sent == []
 
 
 def test_a_text_that_is_no_plan_is_refused() -> None:
-    for verb in ("changes", "apply"):
-        assert Desk().ask(verb=verb, plan="{}", generation=0) == ("this is no plan of version 1", True)
+    for request in (ComparePlan("{}"), ApplyPlan("{}", 0)):
+        assert Desk().ask(request) == ("this is no plan of version 1", True)
 
 
 def test_what_cannot_be_done_now_is_refused_with_the_reason() -> None:
     desk = Desk(is_stepped=True)
     desk.conductor._is_running = True
-    text = dump(replace(PLAN, start="other"))
-    assert "'why_not': ''" in desk.ask(verb="changes", plan=text)[0]  # nothing that runs would be other
+    assert desk.compare(dump(replace(PLAN, start="other"))).why_not == ""  # nothing that runs would be other
     text = dump(replace(PLAN, instances=(replace(PLAN.instances[0], process="other"),)))
-    assert desk.ask(verb="apply", plan=text, generation=0)[0].startswith("it runs on a stepped clock")
+    assert str(desk.ask(ApplyPlan(text, 0))[0]).startswith("it runs on a stepped clock")

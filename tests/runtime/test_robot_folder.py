@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.runtime import folder as folders
-from rbxcompose.runtime.folder import BrokenStateError, ComponentState, RobotFolder, State, UnsafeFolderError
+from rbxcompose.runtime.folder import BrokenStateError, ComponentState, RobotFolder, RobotState, UnsafeFolderError
 from rbxcompose.runtime.processes import Process, boot_id
 
 
@@ -21,10 +21,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RobotFolder:
     return made
 
 
-def state(process: Process | None = None, boot: str | None = None) -> State:
+def state(process: Process | None = None, boot: str | None = None) -> RobotState:
     process = process or Process.of(os.getpid())
     component = ComponentState("base", "toy", "active", "robot", process.pid, 2)
-    return State("toys", "/toys.yaml", process, {"robot": process}, (component,), "tcp/x", boot or boot_id())
+    return RobotState("toys", "/toys.yaml", process, {"robot": process}, (component,), "tcp/x", boot or boot_id())
 
 
 def test_the_folder_is_this_users_alone(folder: RobotFolder) -> None:

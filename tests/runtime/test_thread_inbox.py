@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from rbxcompose.runtime.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import Inbox
 from rbxcompose.scheduler import Scheduler
 
 

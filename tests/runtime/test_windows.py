@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rbxcompose.runtime.handover import HandedOver
+from rbxcompose.executive.requests import ListMissions
+from rbxcompose.runtime.process_group.handover import HandedOver
 
 
 class Later:
@@ -36,11 +37,11 @@ class Later:
 
 def test_it_is_opened_and_used_by_the_schedulers_thread() -> None:
     later: Any = Later()
-    window = HandedOver(later, later).window("map", "whole map")
+    window = HandedOver(later, later).window("map", ListMissions())
     later.is_watched = True
     assert not window.is_watched
     window.put(1)
     assert (later.opened, later.news) == ([], [])
     later.turn()
-    assert (later.opened, later.news) == ([("map", "whole map")], [1])
+    assert (later.opened, later.news) == ([("map", ListMissions())], [1])
     assert window.is_watched

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import pytest
@@ -18,10 +18,11 @@ from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.host import Host
-from rbxcompose.runtime.inbox import Inbox
+from rbxcompose.requests import Command, answers
+from rbxcompose.runtime.process_group.host import Host
+from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.worker import LONGEST
 from rbxcompose.runtime.records import Record
-from rbxcompose.runtime.worker import LONGEST
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk import Calls, Component, Config, In, Out, Refused, Reply, Serves, component
 from rbxcompose.testing import Bench, instance
@@ -43,6 +44,14 @@ class Gate:
 
 class NoConfig(Config):
     """Nothing to set."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRoute(Command):
+    """Plan a route."""
+
+    about = "planner"
+    goal: str
 
 
 @component("toy_planner")
@@ -79,8 +88,9 @@ class Planner(Component[NoConfig]):
     def stop(self) -> None:
         self.stops += 1
 
-    def command(self, verb: str) -> str:
-        return verb
+    @answers(PlanRoute)
+    def plan_route(self, request: PlanRoute) -> str:
+        return f"route to {request.goal}"
 
     def deactivate(self) -> None:
         self.info("deactivated")
@@ -124,7 +134,7 @@ class Process:
             self.clock,
             self.bus,
             self._log,
-            lambda event, data: None,
+            lambda notice: None,
             post=self.inbox.put,
         )
         self.host.configure()
@@ -237,11 +247,11 @@ def test_orders_wait_for_it_and_commands_are_refused_meanwhile(process: Process)
     process.send("work", 1.0)
     process.host.stop()
     with pytest.raises(Refused, match="'planner' is busy"):
-        process.host.command("planner", "plan")
+        process.host.ask("planner", PlanRoute("dock"))
     assert process.planner.stops == 0
     Planner.gate.opened.set()
     process.until(lambda: process.planner.stops == 1 and not process.host.hosted["planner"].is_busy)
-    assert process.host.command("planner", "plan") == "plan"
+    assert process.host.ask("planner", PlanRoute("dock")) == "route to dock"
 
 
 def test_a_fault_in_its_thread_restarts_it_alone(process: Process) -> None:

@@ -7,10 +7,10 @@ import signal
 import sys
 import time
 
-from rbxcompose.cli.common.watch import run_plan
+from rbxcompose.cli.robots.run_view import run_plan
 from rbxcompose.plan.model import BusPlan, Instance, Plan
 from rbxcompose.runtime.options import RunOptions
-from rbxcompose.sdk import Component, Config, Refused, component
+from rbxcompose.sdk import Component, Config, MissionOver, MissionWaits, component
 
 SLOW = 5.0  # [s]
 
@@ -89,15 +89,8 @@ class Toy(Component[ToyConfig]):
         if self.config.runs and self.has_started and self.now >= self.config.runs:
             self.has_started = False
             is_waiting = self.config.outcome == "waiting"
-            event = "mission_waits" if is_waiting else "mission_ended"
-            self.context.notify(
-                event, mission="toy", outcome=self.config.outcome, message="waits" if is_waiting else ""
-            )
-
-    def command(self, verb: str) -> str:
-        if verb != "pause":
-            raise Refused(f"a toy cannot {verb}")
-        return "paused"
+            end = MissionOver("toy", self.config.outcome)
+            self.context.notify(MissionWaits("toy", "waits") if is_waiting else end)
 
     def deactivate(self) -> None:
         self.info("deactivated")

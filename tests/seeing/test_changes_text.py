@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from rbxcompose.runtime.changes import changes
+from rbxcompose.runtime.plan_requests import PlanComparison
+from rbxcompose.runtime.supervision.changes import changes
 from rbxcompose.seeing.changes_text import changes_text, with_places
 from rbxcompose.testing import Golden
+from rbxcompose.typed_json import to_data
 from tests.conftest import ROOT
 from tests.manifests import checked, turtlebot
 
@@ -23,7 +25,7 @@ EDITED = (
 def shown(*sets: str, text: str = "") -> str:
     found, robot = changes(turtlebot(), turtlebot(*sets, text=text)), checked(*sets, text=text).compilation.robot
     assert robot is not None
-    out = changes_text(with_places(found.data(), robot)) + "\n"
+    out = changes_text(with_places(to_data(PlanComparison.of(found, 0, "")), robot)) + "\n"
     file = checked(*sets, text=text).compilation.sources
     return out.replace(next(iter(file)), "robots/turtlebot/robot.yaml")
 

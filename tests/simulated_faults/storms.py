@@ -7,11 +7,12 @@ from collections.abc import Callable
 from random import Random
 
 from rbxcompose.bus.topics import Publisher
+from rbxcompose.executive.requests import ResumeMission
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.members import Phase
+from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.testing.invariants import Laws, Violation, violations
 from rbxcompose.testing.stories import laws_of
 from tests.simulated_faults.whole_robot import Guest, WholeRobot
@@ -115,7 +116,7 @@ class Storm:
         if self.robot.conductor.is_stopped:
             self.robot.set_stopped(False)
         if "mission" in self.robot.processes and self.robot.conductor.states["mission"][0] == "active":
-            self.robot.command("mission", "resume")
+            self.robot.command("mission", ResumeMission())
 
     def teleop(self) -> str:
         speed, turn = self._random.uniform(-0.5, 0.5), self._random.uniform(-1.5, 1.5)

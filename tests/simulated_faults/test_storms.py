@@ -12,7 +12,7 @@ from rbxcompose.plan.model import Plan
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import RecordingReader
 from rbxcompose.recording.writer import RecordingWriter
-from rbxcompose.runtime.members import Phase
+from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.sim.diff_drive import DiffDriveCore
 from rbxcompose.testing import check_file
 from rbxcompose.testing.invariants import Sent, violations

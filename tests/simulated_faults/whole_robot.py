@@ -12,17 +12,19 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.tape import Tape
+from rbxcompose.requests import Command, Refused, as_data
+from rbxcompose.robot_events import MissionWaits
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.conductor import Conductor
-from rbxcompose.runtime.driver import BEAT
-from rbxcompose.runtime.host import Host
-from rbxcompose.runtime.members import Phase
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.process_group.driver import BEAT
+from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.records import Record
+from rbxcompose.runtime.supervision.conductor import Conductor
+from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.scheduler import Scheduler
-from rbxcompose.sdk.bound import Refused
 from rbxcompose.testing.invariants import ROBOT, Event, Ordered
 from rbxcompose.testing.stories import events_of, laws_of
+from rbxcompose.typed_json import to_data
 from tests.simulated_faults.network import Network, Weather
 
 FORK = 0.01  # [s] until a process listens
@@ -119,11 +121,11 @@ class SimulatedProcess(Turned):
                 host.lost(names, cause)
             case say.Blocked(causes):
                 host.statuses.block(causes)
-            case say.Command(number, instance, verb):
+            case say.Ask(number, instance, request):
                 try:
-                    self._say(say.Answer(number, host.command(instance, verb)))
+                    self._say(say.Answered(number, to_data(host.ask(instance, host.request(instance, request)))))
                 except Refused as refusal:
-                    self._say(say.Answer(number, str(refusal), is_refused=True))
+                    self._say(say.Refusal(number, str(refusal)))
             case say.Shutdown():
                 self._say(say.Summary(self.robot.clock.now(), host.summary()))
                 host.shutdown()
@@ -140,7 +142,7 @@ class SimulatedProcess(Turned):
             robot.clock,
             self.open_bus(),
             self._record,
-            lambda event, data: self._say(say.Notify(event, data)),
+            self._notify,
             is_stopped=self._is_stopped,
             is_restart=self._is_restart,
             told=self._told,
@@ -150,7 +152,11 @@ class SimulatedProcess(Turned):
         self._say(say.Configured())
         self.scheduler.every(BEAT, "beat", lambda dt: self._say(say.Alive(self.robot.clock.now())))
 
-    def _told(self, verb: str, *words: str) -> None:
+    def _notify(self, notice: Notice) -> None:
+        if not isinstance(notice, MissionWaits):  # it is not told to the supervisor
+            self._say(notice)
+
+    def _told(self, verb: str, *words: object) -> None:
         self.robot.told.append(Ordered(self.robot.clock.now(), self.name, verb))
 
     def _record(self, record: Record) -> None:
@@ -174,7 +180,7 @@ class WholeRobot:
         self.births = 0
         self.told: list[Recorded | Ordered] = []
         self.records: list[Record] = []
-        self.answers: list[tuple[str, bool]] = []
+        self.answers: list[tuple[object, bool]] = []
         self.conductor = Conductor(self.plan, RunOptions(is_detached=True), self.scheduler, self, router=None)
         self.conductor.begin()
 
@@ -205,10 +211,10 @@ class WholeRobot:
         """Return the log."""
         return [f"{one.time:.3f} {one.source}: {one.text}" for one in self.records]
 
-    def command(self, instance: str, word: str) -> None:
-        """Pass a person's word on to a component."""
+    def command(self, instance: str, command: Command) -> None:
+        """Pass a person's command on to a component."""
         process = next(one.process for one in self.plan.instances if one.name == instance)
-        self.send(process, say.Command(0, instance, word))
+        self.send(process, say.Ask(0, instance, as_data(command)))
 
     def set_stopped(self, is_stopped: bool) -> None:
         """Stop the robot, or release it."""
@@ -277,5 +283,8 @@ class WholeRobot:
     def states_changed(self) -> None:
         """There is no state file."""
 
-    def answer(self, number: int, text: str, *, is_refused: bool) -> None:
-        self.answers.append((text, is_refused))
+    def answer(self, number: int, answer: object) -> None:
+        self.answers.append((answer, False))
+
+    def refuse(self, number: int, reason: str) -> None:
+        self.answers.append((reason, True))

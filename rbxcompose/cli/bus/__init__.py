@@ -1,0 +1,1 @@
+"""The bus as a visitor sees it: topics, services, actions and their messages."""

@@ -1,0 +1,196 @@
+"""What the verbs about topics, services and actions share."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from rbxcompose.bus.graph import End, Name, find
+from rbxcompose.cli.bus.guest import Guest
+from rbxcompose.cli.bus.place import add_bus_options, find_place
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.findings import kind
+from rbxcompose.plain import plain
+from rbxcompose.units import FREQUENCY, TIME, Dimension, UnitError, to_si
+
+Do = Callable[[Guest, argparse.Namespace], int]
+
+NO_NAME = kind(
+    "RBX9022",
+    """Nothing of that name is on the bus
+
+Topics, services and actions exist while somebody publishes, subscribes, serves or calls. `rbxcompose topic ls`,
+`service ls` and `action ls` list those that are there.
+
+Bad: `rbxcompose topic echo /odometry`
+Good: `rbxcompose topic echo /odom`
+""",
+)
+NOBODY = kind(
+    "RBX9025",
+    """Nobody answers in time
+
+Nobody subscribes to the topic with this type, or the server did not answer within the timeout.
+
+Bad: `rbxcompose topic pub /nobody_listens std_msgs/Empty --timeout 1s`
+Good: `rbxcompose topic pub /cmd_vel/teleop geometry_msgs/Twist '{angular: {z: 0.5}}'`
+""",
+)
+SAID_NO = kind(
+    "RBX9026",
+    """The server refuses
+
+The request or the goal has reached its server, which did not carry it out; the message says why.
+
+Bad: a goal outside of the map.
+Good: a goal that the robot can reach.
+""",
+)
+
+
+def visit(arguments: argparse.Namespace, do: Callable[[Guest], int]) -> int:
+    """Join the bus that is meant, do something there, and return the exit code."""
+    try:
+        with Guest(find_place(arguments)) as guest:
+            return do(guest)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def wanted(names: Sequence[Name], name: str, what: str) -> Name:
+    """Return the topic, service or action of that name.
+
+    Raises:
+        NotDoneError: if there is none.
+    """
+    found = find(names, name)
+    if found is None:
+        words = f"there is no {what} '{name}'"
+        raise NotDoneError(NO_NAME.misspelt(None, words, name, [one.name for one in names], f"{what}s"))
+    return found
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows of cells as lines with columns; foreign names in them are made fit for a terminal."""
+    cells = [[plain(cell) for cell in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells
+    )
+
+
+def tell_list(names: Sequence[Name], ends: tuple[str, str], arguments: argparse.Namespace) -> int:
+    """List names with their types and how many there are of both `ends`; hidden ones only if all are wanted."""
+    listed = [one for one in names if arguments.all or not one.is_hidden]
+    if arguments.json:
+        tell(json.dumps([_short(one, ends) for one in listed]))
+        return 0
+    rows = [
+        (one.name, ", ".join(one.types), str(len(one.givers)), str(len(one.takers)), one.clash and f"! {one.clash}")
+        for one in listed
+    ]
+    tell(table([("name", "type", *ends, ""), *rows]))
+    return 0
+
+
+def described(one: Name, ends: tuple[str, str]) -> dict[str, Any]:
+    """Return all that is known of a name, for JSON."""
+    return {
+        "name": one.name,
+        "types": one.types,
+        "clash": one.clash,
+        ends[0]: [_end(end) for end in one.givers],
+        ends[1]: [_end(end) for end in one.takers],
+    }
+
+
+def add_server_verbs(
+    parser: argparse.ArgumentParser, noun: str, verb: tuple[str, str], content: str, example: str, do: Sequence[Do]
+) -> None:
+    """Declare what can be done with services and actions: `ls`, and a `verb` with its help, which sends a `content`.
+
+    `do` is what carries them out, in this order.
+    """
+    actions = parser.add_subparsers(dest="action", metavar=f"ls|{verb[0]}", required=True)
+    ls = actions.add_parser("ls", help=f"list the {noun}s with their types")
+    add_ls_options(ls)
+    send = actions.add_parser(verb[0], help=verb[1])
+    send.add_argument("name", metavar=noun.upper(), help=f"its name, such as {example}")
+    send.add_argument(
+        "content", metavar=content.upper(), nargs="?", default="", help="YAML; what it leaves out is zero"
+    )
+    add_timeout_option(send, "5s")
+    add_json_option(send)
+    for one, done in zip((ls, send), do, strict=True):
+        one.set_defaults(do=done)
+        add_bus_options(one)
+
+
+def add_ls_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--all` and `--json`."""
+    parser.add_argument("-a", "--all", action="store_true", help="also those that tools hide, such as parts of actions")
+    add_json_option(parser)
+
+
+def add_json_option(parser: argparse.ArgumentParser) -> None:
+    """Declare `--json`."""
+    parser.add_argument("--json", action="store_true", help="answer in JSON, one line for each answer")
+
+
+def add_timeout_option(parser: argparse.ArgumentParser, default: str) -> None:
+    """Declare `--timeout 5s`."""
+    words = f"how long to wait for the other side (default: {default})"
+    parser.add_argument("--timeout", type=seconds, default=seconds(default), metavar="T", help=words)
+
+
+def add_count_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--once` and `-n`."""
+    counts = parser.add_mutually_exclusive_group()
+    counts.add_argument("--once", dest="count", action="store_const", const=1, help="end after one")
+    counts.add_argument("-n", "--count", type=count, metavar="N", help="end after so many")
+
+
+def seconds(text: str) -> float:
+    """Read `30s` or `2 min` [s]."""
+    return _positive(text, TIME)
+
+
+def hertz(text: str) -> float:
+    """Read `10Hz` [Hz]."""
+    return _positive(text, FREQUENCY)
+
+
+def positive(dimension: Dimension) -> Callable[[str], float]:
+    """Return a reader of quantities of this dimension that are more than nothing [SI]."""
+    return lambda text: _positive(text, dimension)
+
+
+def count(text: str) -> int:
+    """Read a number from 1 on."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 1 on")
+    return int(text)
+
+
+def _positive(text: str, dimension: Dimension) -> float:
+    try:
+        value = to_si(text, dimension)
+    except UnitError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    if value <= 0:
+        raise argparse.ArgumentTypeError("must be more than nothing")
+    return value
+
+
+def _short(one: Name, ends: tuple[str, str]) -> dict[str, Any]:
+    counts = {ends[0]: len(one.givers), ends[1]: len(one.takers)}
+    return {"name": one.name, "types": one.types, "clash": one.clash, **counts}
+
+
+def _end(end: End) -> dict[str, Any]:
+    qos = None if end.qos is None else asdict(end.qos)
+    return {"node": end.node, "type": end.kind.type, "hash": end.kind.hash, "gid": end.gid.hex(), "qos": qos}

@@ -1,0 +1,214 @@
+"""A visitor on a bus: a session for the time of one command, with a loop of its own."""
+
+from __future__ import annotations
+
+import math
+import selectors
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import FrameType, TracebackType
+from typing import TYPE_CHECKING, Self
+
+import zenoh
+
+from rbxcompose.bus.attachment import Attachment, decode_attachment
+from rbxcompose.bus.graph import Graph, Kind, Name
+from rbxcompose.bus.inbox import Inbox as Queue
+from rbxcompose.bus.names import data_key
+from rbxcompose.bus.tokens import SPACE
+from rbxcompose.bus.transport import Arrival
+from rbxcompose.bus.zenoh_session import open_client, open_peer
+from rbxcompose.bus.zenoh_transport import ZenohTransport
+from rbxcompose.cli.bus.place import BusPlace
+from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.clock import MonotonicClock
+from rbxcompose.findings import kind
+from rbxcompose.qos import Qos
+from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.scheduler import Scheduler
+
+if TYPE_CHECKING:
+    from rbxcompose.bus.bus import Bus
+
+NAME = "_rbxcompose"  # of the node; tools do not list what begins with `_`
+LONGEST_QUEUE = 1000  # messages that wait to be shown
+PATIENCE = 2.0  # [s] for an answer of the router
+_PAUSE = 0.01  # [s] between two looks for the router
+NO_HASHES = "TypeHashNotSupported"  # what ROS 2 Humble writes in the place of a hash
+
+NO_ROUTER = kind(
+    "RBX9020",
+    """No router answers
+
+The command reaches a robot's bus through its Zenoh router, at the endpoint that `rbxcompose ps` shows, or at the one
+that `--router` names. Nobody answers there.
+
+Bad: `rbxcompose topic ls --router tcp/127.0.0.1:1`
+Good: `rbxcompose topic ls --router tcp/127.0.0.1:7447`
+""",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A message as it came: when [s of the guest's clock], of which type, and its bytes."""
+
+    time: float
+    kind: Kind
+    arrival: Arrival
+
+    @property
+    def sender(self) -> bytes:
+        """Return the GID of who sent it, or nothing if it does not say."""
+        return self._attachment.gid
+
+    @property
+    def stamp(self) -> int:
+        """Return when it was sent, by the sender's clock [ns], or 0 if it does not say."""
+        return self._attachment.stamp
+
+    @property
+    def _attachment(self) -> Attachment:
+        try:
+            return decode_attachment(self.arrival.attachment)
+        except ValueError:
+            return Attachment(0, 0, b"")
+
+
+class Guest:
+    """Reads who is on the bus, listens, and lends a bus of its own to who wants to speak."""
+
+    def __init__(self, place: BusPlace, *, stays: bool = False) -> None:
+        """Join the bus: for a question by its router, or to stay, with links of its own to all others.
+
+        Who stays loses nothing when the router ends and is started again.
+
+        Raises:
+            NotDoneError: if no router answers.
+        """
+        self.clock = MonotonicClock()
+        self._session = self._lasting(place.router) if stays else _short(place.router)
+        self.domain, self.scheduler = place.domain, Scheduler()
+        self.is_interrupted = False
+        self._inbox = Inbox()
+        self.transport = ZenohTransport(self._session, self._inbox.put)
+        self._bus: Bus | None = None
+        self._queues: list[Queue[Heard]] = []
+        self._selector = selectors.SelectSelector()  # unlike others it can wait for less than a millisecond
+        self._selector.register(self._inbox, selectors.EVENT_READ, lambda: None)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        (self._bus or self.transport).close()
+        self._selector.close()
+        self._inbox.close()
+
+    def graph(self) -> Graph:
+        """Return who is there now."""
+        replies: Iterator[zenoh.Reply] = iter(
+            self._session.liveliness().get(f"{SPACE}/{self.domain}/**", timeout=PATIENCE)
+        )
+        return Graph.of(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
+
+    def bus(self, kind: Kind | None = None) -> Bus:
+        """Return a bus to speak on, in the way of those who have this kind of data; the same one each time."""
+        from rbxcompose.bus.bus import Bus  # takes as long as all that a list needs
+
+        if self._bus is None:
+            wire = "humble" if kind is not None and kind.hash == NO_HASHES else "jazzy"
+            self._bus = Bus(
+                self.scheduler, self.clock, domain=self.domain, wire=wire, transport=self.transport, log=_complain
+            )
+        return self._bus
+
+    def listen(self, topic: Name, heard: Callable[[Heard], None]) -> None:
+        """Have each message of a topic handed over undecoded; of latched ones also what was sent before."""
+        is_latched = any(end.qos is not None and end.qos.is_transient_local for end in topic.givers)
+        queue: Queue[Heard] = Queue(NAME, LONGEST_QUEUE, heard, self.scheduler.post)
+        self._queues.append(queue)
+        for one in topic.kinds:
+            if one.type.count("/") == 2:
+                key = data_key(self.domain, topic.name, one.type, one.hash)
+                self.transport.subscribe(key, Qos.LATCHED if is_latched else Qos.EVENT, self._arrived(queue, one))
+
+    @property
+    def dropped(self) -> int:
+        """Return how many messages came too fast to be handed over."""
+        return sum(queue.dropped for queue in self._queues)
+
+    def watch(self, descriptor: int, ready: Callable[[], None]) -> None:
+        """Have `ready` called when there is something to read."""
+        self._selector.register(descriptor, selectors.EVENT_READ, ready)
+
+    def run(self, until: Callable[[], bool], timeout: float = math.inf) -> bool:
+        """Let things happen until something holds, or for `timeout` [s], and tell whether it does."""
+        deadline = self.clock.now() + timeout
+        while True:
+            self.scheduler.advance(self.clock.now())
+            if until():
+                return True
+            now, due = self.clock.now(), self.scheduler.next_due()
+            if now >= deadline:
+                return False
+            pause = min(deadline, math.inf if due is None else due) - now
+            for key, _ in self._selector.select(None if pause == math.inf else max(0.0, pause)):
+                key.data()
+            self._inbox.drain(self.scheduler)
+
+    @contextmanager
+    def interruptible(self, interrupted: Callable[[], None] = lambda: None) -> Iterator[None]:
+        """Have an interrupt, or the end of the terminal, call `interrupted` in the loop instead of ending the process.
+
+        A second one ends it.
+        """
+        numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        before = {number: signal.getsignal(number) for number in numbers}
+
+        def note(number: int, frame: FrameType | None) -> None:
+            self.is_interrupted = True
+            signal.signal(number, before[signal.Signals(number)])
+            self._inbox.put(NAME, interrupted)
+
+        for number in numbers:
+            signal.signal(number, note)
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def _lasting(self, router: str) -> zenoh.Session:
+        try:
+            session = open_peer(router)
+        except zenoh.ZError as error:  # a router that is not there yet is no error
+            raise NotDoneError(NO_ROUTER.at(None, f"'{router}' is no endpoint of a router")) from error
+        deadline = self.clock.now() + PATIENCE
+        while not session.info.routers_zid():
+            if self.clock.now() > deadline:
+                session.close()  # type: ignore[no-untyped-call]
+                raise NotDoneError(NO_ROUTER.at(None, f"no router answers at {router}"))
+            time.sleep(_PAUSE)
+        return session
+
+    def _arrived(self, queue: Queue[Heard], kind: Kind) -> Callable[[Arrival], None]:
+        # In a thread of the transport: a message has the time at which it came, not that at which it is shown.
+        return lambda arrival: queue.put(Heard(self.clock.now(), kind, arrival), self.transport.wake)
+
+
+def _short(router: str) -> zenoh.Session:
+    try:
+        return open_client(router)
+    except OSError as error:
+        raise NotDoneError(NO_ROUTER.at(None, error.strerror or str(error))) from error
+
+
+def _complain(owner: str, text: str) -> None:
+    sys.stderr.write(f"{text}\n")

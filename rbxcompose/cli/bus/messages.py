@@ -1,0 +1,150 @@
+"""Messages on the command line: read from YAML with places, shown as YAML or as lines of JSON; and their types."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import yaml
+
+from rbxcompose.bus.graph import Kind
+from rbxcompose.cli.output.console import tell_report
+from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.findings import Report, Span, kind
+from rbxcompose.manifest.reader import read_text
+from rbxcompose.manifest.scalars import plain_value
+from rbxcompose.manifest.tree import Mapping, Node, Scalar, key_span, value_span
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.plain import Path, from_plain
+from rbxcompose.msgs.types import Interface, Message
+from rbxcompose.plain import FORBIDDEN
+
+NO_TYPE = kind(
+    "RBX9021",
+    """A type that is not known here
+
+rbxcompose reads and writes the messages, services and actions whose definitions it has, and those of packages that are
+installed. Whatever has another type, or another definition of the same type, can be seen and measured, but not read.
+
+Bad: `rbxcompose topic pub /word std_msgs/Strin 'data: hello'`
+Good: `rbxcompose topic pub /word std_msgs/String 'data: hello'`
+""",
+)
+
+MOST_SHOWN = 128  # values of a list, in text; JSON has all of them
+_SHOWN = "MESSAGE"  # the name of the text in findings
+
+M = TypeVar("M", bound=Message)
+T = TypeVar("T", bound=Interface)
+
+
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Places within a tree."""
+
+    root: Node
+
+    def key(self, path: Path) -> Span:
+        """Return the place of a key."""
+        return key_span(self.root, path)
+
+    def value(self, path: Path) -> Span:
+        """Return the place of a value."""
+        return value_span(self.root, path)
+
+
+def message_from(message: type[M], text: str) -> M | None:
+    """Read a message from YAML, where nothing stands for all defaults; tell what is wrong with it and return None."""
+    if not text.strip():
+        return message()
+    root, findings = read_text(text, _SHOWN)
+    made: M | None = None
+    if root is not None and not findings:
+        made, findings = from_plain(message, _data(root), _Places(root))
+    if findings:
+        report = Report()
+        report.extend(findings)
+        tell_report(report, {_SHOWN: text})
+        return None
+    return made
+
+
+def _data(node: Node) -> object:
+    match node:
+        case Scalar():
+            return plain_value(node)
+        case Mapping(entries=entries):
+            return {name: _data(entry.value) for name, entry in entries.items()}
+    return [_data(item) for item in node.items]
+
+
+def to_text(data: object) -> str:
+    """Return plain data as YAML that could be given back; only long lists are cut."""
+    shown = yaml.safe_dump(_cut(data), sort_keys=False, default_flow_style=None, width=math.inf, allow_unicode=True)
+    return FORBIDDEN.sub("?", str(shown)).removesuffix("\n...\n").rstrip("\n")
+
+
+def to_json(data: object) -> str:
+    """Return plain data as one line of JSON, in which a number that is not finite is null."""
+    return json.dumps(_finite(data), ensure_ascii=True)
+
+
+def shown(data: object, as_json: bool) -> str:
+    """Return plain data as JSON or as text."""
+    return to_json(data) if as_json else to_text(data)
+
+
+def message_type(name: str) -> type[Message]:
+    """Return the message of that name.
+
+    Raises:
+        NotDoneError: if there is none.
+    """
+    return _known(name, "msg", registry.message)
+
+
+def type_of(
+    one: Kind,
+    category: str,
+    look: Callable[[str], type[T]],
+    hash_of: Callable[[type[T]], str] = lambda found: found.HASH,
+) -> type[T]:
+    """Return the type that others on the bus have; `hash_of` gives the hash by which it is known there.
+
+    Raises:
+        NotDoneError: if we do not have it, or define it in another way.
+    """
+    found = _known(one.type, category, look)
+    if one.hash.startswith("RIHS01_") and one.hash != hash_of(found):
+        words = f"the bus has another definition of '{one.type}' ({one.hash}) than this program ({hash_of(found)})"
+        raise NotDoneError(NO_TYPE.at(None, words))
+    return found
+
+
+def _known(name: str, category: str, look: Callable[[str], type[T]]) -> type[T]:
+    try:
+        return look(name)
+    except KeyError:
+        full = registry.full_name(name, category)
+        words = f"'{full}' is not a type that is known here"
+        raise NotDoneError(NO_TYPE.misspelt(None, words, full, registry.names(category), "known types")) from None
+
+
+def _cut(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {name: _cut(value) for name, value in data.items()}
+    if isinstance(data, list):
+        rest = len(data) - MOST_SHOWN
+        return [_cut(one) for one in data[:MOST_SHOWN]] + ([f"... and {rest} more"] if rest > 0 else [])
+    return data
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {name: _finite(value) for name, value in data.items()}
+    if isinstance(data, list):
+        return [_finite(one) for one in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data

@@ -1,0 +1,81 @@
+"""`topic echo`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from rbxcompose.bus.graph import Kind, Name
+from rbxcompose.cli.bus.entities import wanted
+from rbxcompose.cli.bus.guest import Guest, Heard
+from rbxcompose.cli.bus.messages import shown, type_of
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.cdr import CdrError, decode
+from rbxcompose.msgs.plain import to_plain
+from rbxcompose.msgs.types import Message
+
+_PERIOD = 1.0  # [s] between two words on what was left out
+
+
+class Reader:
+    """Decodes what is heard on a topic; what it cannot read it counts, and says so once for each type."""
+
+    def __init__(self, topic: Name) -> None:
+        self.malformed = 0
+        self._types: dict[Kind, type[Message]] = {}
+        for kind in topic.kinds:
+            try:
+                self._types[kind] = type_of(kind, "msg", registry.message)
+            except NotDoneError as error:
+                refuse(error.finding)
+        self.is_useless = not self._types
+
+    def read(self, heard: Heard) -> Message | None:
+        """Return the message, or None if it cannot be read."""
+        if heard.kind not in self._types:
+            return None
+        try:
+            return decode(self._types[heard.kind], heard.arrival.payload)
+        except CdrError as error:
+            self.malformed += 1
+            if self.malformed == 1:
+                sys.stderr.write(f"left out: {error}\n")
+            return None
+
+
+class _Echo:
+    """Prints messages until there are enough."""
+
+    def __init__(self, topic: Name, arguments: argparse.Namespace) -> None:
+        self.reader = Reader(topic)
+        self._arguments, self._count = arguments, 0
+
+    @property
+    def is_over(self) -> bool:
+        """Tell whether enough has been printed."""
+        return self._arguments.count is not None and self._count >= self._arguments.count
+
+    def heard(self, heard: Heard) -> None:
+        """Print a message, unless it is one too many."""
+        message = None if self.is_over else self.reader.read(heard)
+        if message is not None:
+            self._count += 1
+            text = shown(to_plain(message), self._arguments.json)
+            tell(text if self._arguments.json else f"{text}\n---")
+
+
+def echo(guest: Guest, arguments: argparse.Namespace) -> int:
+    """Print the messages of a topic."""
+    topic = wanted(guest.graph().topics, arguments.topic, "topic")
+    told = _Echo(topic, arguments)
+    if told.reader.is_useless:
+        return 1
+    guest.listen(topic, told.heard)
+    dropped = 0
+    while not guest.run(lambda: told.is_over, _PERIOD):
+        if guest.dropped > dropped:
+            sys.stderr.write(f"left out: {guest.dropped - dropped} messages, they come too fast to be shown\n")
+            dropped = guest.dropped
+    return 0

@@ -1,0 +1,133 @@
+"""What can be completed beside words of the program: files, robots that are up, their components and topics."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from threading import Thread
+
+from rbxcompose.bus.graph import Graph
+from rbxcompose.cli.bus.place import BusPlace, place_of
+from rbxcompose.cli.completions.candidates import candidates, for_shell
+from rbxcompose.cli.robots.lookup import NotDoneError, find_robot, known_state
+from rbxcompose.runtime.folder import all_folders
+
+PATIENCE = 0.3  # [s] in which the bus must tell; who waits for a key does not wait for longer
+_MANIFESTS = (".yaml", ".yml")
+_BUS = {"TOPIC": "topics", "PATTERN": "topics", "SERVICE": "services", "ACTION": "actions"}  # what tells them
+
+Tell = Callable[[BusPlace], Graph]
+
+
+class KnownValues:
+    """Finds values; `graph` tells who is on a bus."""
+
+    def __init__(self, graph: Tell) -> None:
+        self._graph = graph
+
+    def of(self, metavar: str, dest: str, current: str, given: Mapping[str, str]) -> Iterable[str]:
+        """Return what may stand for an argument."""
+        if dest == "robot" and metavar == "NAME":
+            return robots()
+        return [one for what in metavar.split("|") for one in self._of(what, current, given)]
+
+    def _of(self, what: str, current: str, given: Mapping[str, str]) -> Iterable[str]:
+        match what:
+            case "TOPIC" | "PATTERN" | "SERVICE" | "ACTION":
+                return self._names(_BUS[what], current, given)
+            case "ROBOT":
+                return [*robots(), *files(current, _MANIFESTS)]
+            case "PATH":
+                return files(current, _MANIFESTS)
+            case "FILE" | "DIR":
+                return files(current)
+            case "COMPONENT":
+                return self._components(given)
+            case "TYPE":
+                return _types()
+        return ()
+
+    def _names(self, what: str, current: str, given: Mapping[str, str]) -> list[str]:
+        try:
+            graph = self._graph(_place(given))
+        except NotDoneError:
+            return []
+        names = [one.name for one in getattr(graph, what) if not one.is_hidden]
+        return names if current[:1] in ("/", "") else [name.removeprefix("/") for name in names]
+
+    def _components(self, given: Mapping[str, str]) -> list[str]:
+        try:
+            state = known_state(find_robot(given.get("robot")))
+        except NotDoneError:
+            return []
+        return [one.name for one in state.components] if state else []
+
+
+def _place(given: Mapping[str, str]) -> BusPlace:
+    domain = given.get("domain", "")
+    number = int(domain) if domain.isdecimal() else None
+    if "router" in given:
+        return BusPlace(given["router"], number or 0)
+    found = place_of(find_robot(given.get("robot")))
+    return found if number is None else BusPlace(found.router, number)
+
+
+def robots() -> list[str]:
+    """Return the names of robots that are up."""
+    return [folder.path.name for folder in all_folders()]
+
+
+def files(current: str, endings: tuple[str, ...] = ("",)) -> list[str]:
+    """Return folders, with a slash, and files with one of `endings`, that go on from what has been typed."""
+    head, slash, start = current.rpartition("/")
+    try:
+        found = sorted(Path(os.path.expanduser(head + slash) or ".").iterdir())
+    except OSError:
+        return []
+    names = [f"{one.name}/" if one.is_dir() else one.name for one in found]
+    return [
+        f"{head}{slash}{name}"
+        for name in names
+        if name.startswith(start) and name.endswith(("/", *endings)) and (start or not name.startswith("."))
+    ]
+
+
+def _types() -> list[str]:
+    from rbxcompose.msgs import registry
+    from rbxcompose.msgs.joined import short
+
+    return [short(name) for name in registry.names("msg")]
+
+
+def complete(words: Sequence[str]) -> int:
+    """Print what may stand at the end of a command line, one in a line: `rbxcompose __complete SHELL WORD ...`."""
+    if not words:
+        return 2
+    found = for_shell(words[0], words[1:], partial(candidates, values=KnownValues(_at_once)))
+    sys.stdout.write("".join(f"{one}\n" for one in found))
+    sys.stdout.flush()
+    return 0
+
+
+def _at_once(place: BusPlace) -> Graph:
+    """Ask a bus, but not for long: a router that was stopped takes connections and says nothing."""
+    told: list[Graph] = []
+    asking = Thread(target=lambda: told.extend(_ask(place)), daemon=True)
+    asking.start()
+    asking.join(PATIENCE)
+    if asking.is_alive():
+        os._exit(0)  # nothing has been printed; the thread cannot be ended in another way
+    return told[0] if told else Graph((), (), (), ())
+
+
+def _ask(place: BusPlace) -> Iterable[Graph]:
+    from rbxcompose.cli.bus.guest import Guest  # with the bus, which few arguments need
+
+    try:
+        with Guest(place) as guest:
+            yield guest.graph()
+    except NotDoneError:
+        return

@@ -1,0 +1,87 @@
+"""A mission that runs, live: its nodes with how they stand, its data, its last transitions."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import shutil
+import sys
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from rbxcompose.cli.output.console import has_colour, tell
+from rbxcompose.cli.output.terminal import full_screen, raw, show
+from rbxcompose.cli.robots.lookup import answer_of
+from rbxcompose.executive.requests import LookAtMission, ShowPicture
+from rbxcompose.expressions.text import show_value
+from rbxcompose.expressions.values import NOT_ARRIVED
+from rbxcompose.missions.mirror import ACTIVE, joined, status_list
+from rbxcompose.missions.picture import Picture, picture_from_data
+from rbxcompose.missions.snapshot import from_plain
+from rbxcompose.plain import fitted, plain
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.seeing.mission_text import mission_lines
+
+MOST = 5  # transitions that are shown
+_WIDTH = 120  # of a picture for no terminal
+
+
+def lines_of(picture: Picture, seen: Mapping[str, Any], width: int, *, colour: bool = False) -> list[str]:
+    """Return the lines that show how a mission stands."""
+    statuses = status_list(joined({"statuses": {}, "data": {}}, seen), picture.count)
+    lines = [fitted(f"mission {plain(seen['mission'])}: {seen['state']}", width)]
+    lines += mission_lines(picture, statuses, width=width, colour=colour)
+    if seen["data"]:
+        values = ", ".join(f"{name} {_value(from_plain(data))}" for name, data in seen["data"].items())
+        lines.append(fitted(f"data: {plain(values, 400)}", width))
+    for one in seen["transitions"][-MOST:]:
+        lines.append(fitted(f"{one['time']:9.2f}  {one['state']} -> {one['to']}  ({one['outcome']})", width))
+    return lines
+
+
+def _value(value: Any) -> str:
+    if value is NOT_ARRIVED:
+        return "(nothing yet)"
+    return show_value("", value) or "(empty)"
+
+
+def follow(folder: RobotFolder, name: str, period: float) -> int:
+    """Tell a mission as JSON until it ends, or until Ctrl-C: at first the whole, then a line with what has changed."""
+    seen = answer_of(folder, LookAtMission(name))
+    told: Mapping[str, Any] = {}
+    try:
+        while True:
+            if any(told.get(key) != seen[key] for key in ("version", "state")):
+                tell(json.dumps(seen))
+            if seen["state"] not in ACTIVE:
+                return 0
+            told = seen
+            time.sleep(period)
+            seen = answer_of(folder, LookAtMission(name, seen["version"]))
+    except KeyboardInterrupt:
+        return 0
+
+
+def watch(folder: RobotFolder, name: str, period: float) -> int:
+    """Show a mission until it ends, or until q or Ctrl-C; without a terminal once."""
+    picture = picture_from_data(answer_of(folder, ShowPicture(name)))
+    seen = joined({"statuses": {}, "data": {}}, answer_of(folder, LookAtMission(name)))
+    colour = has_colour(sys.stdout)
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        tell("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))
+        return 0
+    keyboard = sys.stdin.fileno()
+    try:
+        with raw(keyboard), full_screen(sys.stdout):
+            while seen["state"] in ACTIVE:
+                size = shutil.get_terminal_size()  # of a terminal that says 0 x 0 it makes 80 x 24
+                show(sys.stdout, lines_of(picture, seen, size.columns, colour=colour)[: size.lines])
+                if select.select([keyboard], [], [], period)[0] and os.read(keyboard, 100).lower().count(b"q"):
+                    return 0
+                seen = joined(seen, answer_of(folder, LookAtMission(name, seen["version"])))
+    except KeyboardInterrupt:
+        return 0
+    tell("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))
+    return 0

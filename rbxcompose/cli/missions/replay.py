@@ -1,0 +1,93 @@
+"""`mission replay`: runs missions again from their log, and tells where they do something else than they did then."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rbxcompose.cli.missions.files import mission_in, robot_of
+from rbxcompose.cli.output.console import FINDINGS, tell
+from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.findings import kind
+from rbxcompose.missions.logbook import INPUTS, Record, ReplayError, replay
+from rbxcompose.model.robot import Robot
+
+_OWN = ("mission", "run")  # of a record, about which run it is
+
+NO_LOG = kind(
+    "RBX9041",
+    """The file is no log of a mission
+
+`rbxcompose mission replay` reads what `rbxcompose mission log --all` has told: a JSON record a line, each run from its
+beginning. Without `--all`, what came in is not in it, and nothing can be run again.
+
+Bad: `rbxcompose mission log > patrol.log; rbxcompose mission replay patrol.log robots/turtlebot`
+Good: `rbxcompose mission log --all > patrol.log; rbxcompose mission replay patrol.log robots/turtlebot`
+""",
+)
+
+
+def replay_log(arguments: argparse.Namespace) -> int:
+    """Run all that is in a log again; the code is 1 if anything differs.
+
+    Raises:
+        NotDoneError: if the file is no log, or the robot has not its missions.
+    """
+    runs = runs_in(arguments.log)
+    robot = robot_of(arguments.path)
+    if robot is None:
+        return FINDINGS
+    differs = False
+    for (name, number), records in runs.items():
+        found = difference(records, name, robot, arguments.log)
+        differs = differs or bool(found)
+        tell(f"{name}, run {number}: {found or f'the same, {len(records)} records'}")
+    return FINDINGS if differs else 0
+
+
+def runs_in(file: str) -> dict[tuple[str, int], list[Record]]:
+    """Return the records of a log by mission and run.
+
+    Raises:
+        NotDoneError: if it cannot be read.
+    """
+    runs: dict[tuple[str, int], list[Record]] = {}
+    try:
+        for line in Path(file).read_text(encoding="utf-8").splitlines():
+            record = json.loads(line)
+            runs.setdefault((record["mission"], record["run"]), []).append(record)
+    except OSError as error:
+        raise NotDoneError(NO_LOG.at(None, f"'{file}' cannot be read: {error.strerror}")) from error
+    except (ValueError, TypeError, KeyError) as error:
+        raise NotDoneError(NO_LOG.at(None, f"'{file}' is no log: each line is a record in JSON")) from error
+    if not runs:
+        raise NotDoneError(NO_LOG.at(None, f"'{file}' is empty"))
+    return runs
+
+
+def difference(records: Sequence[Record], name: str, robot: Robot, file: str) -> str:
+    """Return in words the first record that is another one now; empty if all are the same."""
+    then = [_told(record) for record in records if record["event"] not in INPUTS]
+    try:
+        again = replay(records, mission_in(robot, name), robot.names)
+    except ReplayError as error:
+        raise NotDoneError(NO_LOG.at(None, f"'{file}' cannot be replayed: {error}")) from error
+    except LookupError:  # a result of a leaf that is not there any more
+        return "the log has results of nodes that the mission does not have: it was changed too much to go on"
+    now = [_told(record) for record in json.loads(json.dumps(again))]
+    for number in range(max(len(then), len(now))):
+        before, after = then[number : number + 1], now[number : number + 1]
+        if before != after:
+            return f"differs\n  then: {_shown(before)}\n  now:  {_shown(after)}"
+    return ""
+
+
+def _told(record: Record) -> dict[str, Any]:
+    return {key: value for key, value in record.items() if key not in _OWN}
+
+
+def _shown(records: Sequence[Record]) -> str:
+    return json.dumps(records[0]) if records else "nothing"

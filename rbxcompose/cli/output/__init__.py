@@ -1,0 +1,1 @@
+"""What commands write: answers on stdout, what is wrong on stderr."""

@@ -1,0 +1,1 @@
+"""Recordings: what takes and sends messages, options, one component run again."""

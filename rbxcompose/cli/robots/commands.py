@@ -1,0 +1,27 @@
+"""Verbs that pass one command to a running robot and print what it answers."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot
+from rbxcompose.requests import Command
+
+
+def add_asking_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--robot NAME` and `--json`."""
+    add_robot_option(parser)
+    parser.add_argument("--json", action="store_true", help="answer in JSON")
+
+
+def pass_on(arguments: argparse.Namespace, command: Command) -> int:
+    """Send a command, print the answer, return the exit code."""
+    try:
+        folder = find_robot(arguments.robot)
+        answer = answer_of(folder, command)
+    except NotDoneError as error:
+        return refuse(error.finding)
+    tell(json.dumps({"robot": folder.path.name, "answer": answer}) if arguments.json else answer)
+    return 0

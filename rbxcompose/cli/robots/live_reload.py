@@ -1,0 +1,79 @@
+"""`up --watch`: compiles a running robot again when one of its files changes, and lets it take the difference."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Set
+from pathlib import Path
+
+from rbxcompose.cli.output.console import refuse, tell, tell_report
+from rbxcompose.cli.robots.file_watch import FileWatch
+from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.cli.robots.proposal import Proposal
+from rbxcompose.compiler import Compilation
+from rbxcompose.manifest.library import PREFIX
+from rbxcompose.manifest.overlay import SET
+
+_LOOK = 0.25  # [s] between looks at the files; a change is taken at the second look at which it is the same
+_AGAIN = 0.5  # [s] between tries of what the robot cannot do now
+
+
+class LiveReload:
+    """Follows the files of a robot that runs. What it cannot do while it moves waits; that is said once."""
+
+    def __init__(self, compiled: Callable[[], Compilation], first: Compilation) -> None:
+        self._compiled, self._newest = compiled, first
+        self._files = FileWatch(files_of(first))
+        self._is_pending = False  # the newest is to be taken as soon as it can
+        self._told = ""  # why it has to wait, as it was said
+        self._next_look = self._next_try = 0.0  # [s, monotonic]
+
+    def look(self) -> None:
+        """Do what is due; call it often."""
+        now = time.monotonic()
+        if now >= self._next_look:
+            self._next_look = now + _LOOK
+            if self._files.look():
+                self._compile()
+        if self._is_pending and now >= self._next_try:
+            self._next_try = now + _AGAIN
+            self._take()
+
+    def _compile(self) -> None:
+        self._newest = found = self._compiled()
+        self._files.follow(files_of(found))
+        tell_report(found.report, found.sources)
+        self._told = ""
+        self._is_pending = found.plan is not None
+        self._next_try = 0.0
+        if found.plan is None:
+            tell("the files have changed and have mistakes: the robot stays as it is")
+
+    def _take(self) -> None:
+        """Show the difference and let the robot take it, or wait."""
+        if self._newest.plan is None or self._newest.robot is None:
+            return
+        try:
+            proposal = Proposal.of(self._newest.plan, self._newest.robot)
+            is_impossible = bool(proposal.found.impossible)
+            self._is_pending = bool(proposal.why_not) and not is_impossible
+            if proposal.is_empty:
+                tell("the files have changed, the robot stays the same")
+                return
+            if not self._told:
+                tell(proposal.text())
+            if not proposal.why_not:
+                tell(f"the robot is changed: {proposal.apply()}")
+            elif not self._told:
+                tell(f"{'not done' if is_impossible else 'waits'}: {proposal.why_not}")
+            self._told = self._told or proposal.why_not
+        except NotDoneError as error:
+            self._is_pending = False
+            refuse(error.finding)
+
+
+def files_of(found: Compilation) -> Set[Path]:
+    """Return the files that a robot was read from; after mistakes also their folders: one may be missing there."""
+    names = (name for name in found.sources if name != SET and not name.startswith(PREFIX))
+    files = {Path(name).absolute() for name in names}
+    return files | {path.parent for path in files} if found.plan is None else files

@@ -1,0 +1,144 @@
+"""Which robot a command means: by `--robot NAME`, by its name or its file, or the only one that is up."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterable
+from typing import TypeVar
+
+from rbxcompose.findings import Finding, kind, suggest
+from rbxcompose.requests import Refused, Request
+from rbxcompose.runtime.control import ANSWER, NoAnswerError, ask
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, all_folders
+
+A = TypeVar("A")
+
+ALREADY_UP = kind(
+    "RBX9001",
+    """The robot is already up
+
+A robot runs once per user. `rbxcompose ps` shows it; `rbxcompose down` ends it.
+""",
+)
+NOT_UP = kind(
+    "RBX9002",
+    """No such robot is up
+
+The command needs a running robot. `rbxcompose up PATH` starts one.
+""",
+)
+WHICH = kind(
+    "RBX9003",
+    """Several robots are up
+
+The command is for one robot: name it with `--robot NAME`.
+""",
+)
+REFUSED = kind(
+    "RBX9004",
+    """The robot refuses
+
+The command reached the robot, which cannot do it now; the message says why.
+""",
+)
+NO_ANSWER = kind(
+    "RBX9005",
+    """The robot does not answer
+
+Its supervisor is dead or stopped. `rbxcompose down` ends what is left of it.
+""",
+)
+UNSAFE = kind(
+    "RBX9006",
+    """The robot's folder is not safe
+
+Lock, state and control socket of a robot lie in a folder that nobody else may open.
+""",
+)
+
+
+class NotDoneError(Exception):
+    """Raised with the finding when it is not clear which robot is meant, or none is up."""
+
+    def __init__(self, finding: Finding) -> None:
+        super().__init__(finding.message)
+        self.finding = finding
+
+
+def add_robot_option(parser: argparse.ArgumentParser) -> None:
+    """Declare `--robot NAME`."""
+    parser.add_argument("--robot", metavar="NAME", help="the robot that is meant, when several are up")
+
+
+def find_robot(wanted: str | None) -> RobotFolder:
+    """Return the folder of the robot that is meant by a name or a path, or of the only one.
+
+    Raises:
+        NotDoneError: if there is none or more than one.
+    """
+    found = {folder.path.name: folder for folder in all_folders()}
+    if wanted is None:
+        return _only(found)
+    if wanted in found:
+        return found[wanted]
+    files = {_file_of(folder): folder for folder in found.values()}
+    for path in _possible_files(wanted):
+        if path in files:
+            return files[path]
+    raise NotDoneError(NOT_UP.at(None, f"no robot '{wanted}' is up", help=suggest(wanted, found, "robots that are up")))
+
+
+def _only(found: dict[str, RobotFolder]) -> RobotFolder:
+    if not found:
+        raise NotDoneError(NOT_UP.at(None, "no robot is up", help="start one with 'rbxcompose up PATH'"))
+    if len(found) > 1:
+        names = ", ".join(found)
+        raise NotDoneError(WHICH.at(None, f"several robots are up: {names}", help="name one with '--robot NAME'"))
+    return next(iter(found.values()))
+
+
+def _file_of(folder: RobotFolder) -> str:
+    state = known_state(folder)
+    return state.file if state else ""
+
+
+def _possible_files(path: str) -> Iterable[str]:
+    yield os.path.realpath(path)
+    yield os.path.realpath(os.path.join(path, "robot.yaml"))
+
+
+def known_state(folder: RobotFolder) -> RobotState | None:
+    """Return the state that the folder tells, or None if it tells none that can be read."""
+    try:
+        return folder.read_state()
+    except BrokenStateError:
+        return None
+
+
+def answer_of(folder: RobotFolder, request: Request[A], *, timeout: float = ANSWER) -> A:
+    """Return a robot's answer to a request, which may take `timeout` [s].
+
+    Raises:
+        NotDoneError: if it refuses or does not answer.
+    """
+    name = folder.path.name
+    try:
+        return ask(folder, request, timeout=timeout)
+    except Refused as refusal:
+        raise NotDoneError(REFUSED.at(None, f"'{name}' refuses: {refusal}")) from refusal
+    except NoAnswerError as error:
+        raise NotDoneError(no_answer(folder)) from error
+
+
+def no_answer(folder: RobotFolder) -> Finding:
+    """Return that a robot does not answer, with the reason if its state tells it."""
+    name, state = folder.path.name, known_state(folder)
+    why = ""
+    if state is not None and not state.is_supervised:
+        why = ": its supervisor has died, without which it brakes and ends"
+    elif state is not None and state.supervisor.is_stopped:
+        why = ": its supervisor is suspended"
+    return NO_ANSWER.at(
+        None, f"'{name}' does not answer{why}", help=f"'rbxcompose down {name}' ends what is left of it"
+    )

@@ -1,0 +1,64 @@
+"""Comparing a compiled robot with the one that runs, and letting it take the changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rbxcompose.cli.robots.lookup import answer_of, find_robot
+from rbxcompose.model.robot import Robot
+from rbxcompose.plan.dump import dump
+from rbxcompose.plan.model import Plan
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
+from rbxcompose.runtime.supervision.changes import Fate
+from rbxcompose.runtime.supervision.changing import LONGEST
+from rbxcompose.seeing.changes_text import changes_text, with_places
+from rbxcompose.typed_json import to_data
+
+_COMPARE = 10.0  # [s] for the supervisor to read a plan
+_APPLY = LONGEST + _COMPARE  # [s]
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """What another plan would change in a robot that runs, and why it cannot now, if so."""
+
+    folder: RobotFolder
+    plan: str
+    found: PlanComparison
+    data: dict[str, Any]
+    """What was found, with places in the robot's files, for programs."""
+
+    @classmethod
+    def of(cls, plan: Plan, robot: Robot) -> Proposal:
+        """Ask the running robot of this name what the plan would change.
+
+        Raises:
+            NotDoneError: if none is up, or it does not answer.
+        """
+        folder, text = find_robot(plan.robot), dump(plan, reveals_secrets=True)  # the socket is this user's alone
+        found = answer_of(folder, ComparePlan(text), timeout=_COMPARE)
+        return cls(folder, text, found, with_places(to_data(found), robot))
+
+    @property
+    def is_empty(self) -> bool:
+        """Tell whether there is nothing to do."""
+        return not self.found.impossible and all(one.fate is Fate.KEPT for one in self.found.components)
+
+    @property
+    def why_not(self) -> str:
+        """Return why it cannot be done now, or nothing if it can."""
+        return self.found.why_not
+
+    def text(self) -> str:
+        """Return the difference for people."""
+        return changes_text(self.data)
+
+    def apply(self) -> str:
+        """Let the robot take the changes and return what it tells of it.
+
+        Raises:
+            NotDoneError: if it refuses, does them only in part, or does not answer.
+        """
+        return answer_of(self.folder, ApplyPlan(self.plan, self.found.generation), timeout=_APPLY)

@@ -1,0 +1,109 @@
+"""Running a plan and telling it as it goes: the log is followed as `logs -f` does, the rest the supervisor reports."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+
+from rbxcompose.cli.output.console import has_colour, refuse, tell
+from rbxcompose.cli.robots.live_reload import LiveReload
+from rbxcompose.cli.robots.lookup import ALREADY_UP, UNSAFE
+from rbxcompose.cli.robots.story import Story, summary
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plan.model import Plan, extent
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.runtime.follow import Follower
+from rbxcompose.runtime.log import NAME
+from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.records import Record
+from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
+from rbxcompose.runtime.supervision.launch import (
+    AlreadyUp,
+    Begun,
+    Report,
+    RunEnded,
+    Started,
+    Unsafe,
+    Up,
+    start_supervisor,
+)
+
+_LOOK = 0.05  # [s] between looks at the log
+
+
+def run_plan(plan: Plan, options: RunOptions, reload: LiveReload | None = None) -> int:
+    """Run a robot to its end, or until all is active if detached, and return the exit code.
+
+    `reload` follows its files meanwhile.
+    """
+    plan = plan.in_one_process() if options.is_stepped else plan
+    started = start_supervisor(plan, options)
+    return _Watch(plan, options, started, reload).run()
+
+
+class _Watch:
+    """Watches one run from its first report to its last."""
+
+    def __init__(self, plan: Plan, options: RunOptions, started: Started, reload: LiveReload | None) -> None:
+        self._plan, self._options, self._started, self._reload = plan, options, started, reload
+        self._is_up = False
+        self._story = Story([one.name for one in plan.instances], colour=has_colour(sys.stdout))
+        self._log: Follower | None = None  # none before the log of this run has begun
+
+    def run(self) -> int:
+        """Watch until the robot is down, or up if detached, and return the exit code."""
+        try:
+            while True:
+                records = self._records()
+                report = self._started.wait_for_report(0.0 if records else _LOOK)
+                exit_code = self._tell(report) if isinstance(report, Up) else None  # comes before what starts with it
+                self._tell_story([*records, *self._records()])
+                if self._reload is not None and self._is_up and exit_code is None:
+                    self._reload.look()
+                if report is not None and not isinstance(report, Up):
+                    exit_code = self._tell(report)
+                if exit_code is not None:
+                    return exit_code
+        except EOFError:
+            self._tell_story(self._records())
+            sys.stderr.write("rbxcompose up: the supervisor was killed; its processes come to rest by themselves\n")
+            self._started.wait()
+            return ROBOT_FAILED
+        finally:
+            if self._log is not None:
+                self._log.close()
+
+    def _records(self) -> list[Record]:
+        """Return what has been logged since the last call."""
+        return self._log.read() if self._log is not None else []
+
+    def _tell_story(self, records: Iterable[Record]) -> None:
+        for record in records:
+            if record.level is not Level.OK or not self._options.is_detached:
+                tell(self._story.line(record))
+
+    def _tell(self, report: Report) -> int | None:
+        """Tell a report and return the exit code if it is the last."""
+        name = self._plan.robot
+        match report:
+            case Begun():
+                self._log = Follower(RobotFolder.of(name).path / NAME)
+                return None
+            case Up(components, processes, seconds):
+                self._is_up = True
+                tell(f"{name} is up: {extent(components, processes)}, {seconds:.2f} s")
+                if self._options.is_detached:
+                    self._started.let_go()
+                    return 0
+                return None
+            case AlreadyUp(pid):
+                self._started.wait()
+                shown = f" (pid {pid})" if pid else ""
+                return refuse(ALREADY_UP.at(None, f"'{name}' is already up{shown}", help=f"rbxcompose down {name}"))
+            case Unsafe(reason):
+                self._started.wait()
+                return refuse(UNSAFE.at(None, reason))
+            case RunEnded(exit_code, reason, time, facts):
+                tell(summary(name, reason, time, facts))
+                self._started.wait()
+                return exit_code

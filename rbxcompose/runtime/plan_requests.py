@@ -1,0 +1,62 @@
+"""Requests to a supervisor about another plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rbxcompose.plan.diff import Change
+from rbxcompose.requests import Command, Query
+from rbxcompose.runtime.requests import ROBOT
+from rbxcompose.runtime.supervision.changes import Changes, Fate
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentChange:
+    """What becomes of a component, and why."""
+
+    name: str
+    type: str
+    process: str
+    fate: Fate
+    reasons: tuple[Change, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PlanComparison:
+    """What another plan would change in the robot that runs.
+
+    `impossible` are reasons for which it never can be done while the robot is up, `why_not` is why it cannot be done
+    now; `generation` counts the plans that the robot has had.
+    """
+
+    robot: str
+    components: tuple[ComponentChange, ...]
+    impossible: tuple[str, ...]
+    generation: int
+    why_not: str
+
+    @classmethod
+    def of(cls, found: Changes, generation: int, why_not: str) -> PlanComparison:
+        """Return what changes tell people and programs."""
+        components = tuple(
+            ComponentChange(one.instance.name, one.instance.type, one.instance.process, one.fate, one.reasons)
+            for one in found.fated
+        )
+        return cls(found.before.robot, components, found.impossible, generation, why_not)
+
+
+@dataclass(frozen=True, slots=True)
+class ComparePlan(Query[PlanComparison]):
+    """Ask what a plan, as text, would change; nothing happens."""
+
+    about = ROBOT
+    plan: str
+
+
+@dataclass(frozen=True, slots=True)
+class ApplyPlan(Command):
+    """Let a plan hold that was compared in this generation; answered when all that is new is active."""
+
+    about = ROBOT
+    plan: str
+    generation: int

@@ -1,0 +1,68 @@
+"""Opening the bus of a process, over a session that is opened anew when it is stuck."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rbxcompose.bus import shared_memory
+from rbxcompose.bus.bus import Bus
+from rbxcompose.bus.renewal import RenewableTransport
+from rbxcompose.bus.zenoh_session import open_peer
+from rbxcompose.bus.zenoh_transport import ZenohTransport
+from rbxcompose.clock import Clock
+from rbxcompose.plan.model import Plan
+from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.lifeline import Lifeline
+from rbxcompose.scheduler import Scheduler
+
+if TYPE_CHECKING:
+    from rbxcompose.recording.tape import Tape
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """The bus of a process and what watches over its session."""
+
+    bus: Bus
+    lifeline: Lifeline
+
+
+def open_bus(
+    plan: Plan,
+    router: str,
+    scheduler: Scheduler,
+    clock: Clock,
+    inbox: Inbox,
+    log: Callable[[str, str], None],
+    tape: Tape | None = None,
+) -> Connection:
+    """Open a Zenoh session that finds the robot's other processes at `router`, and the bus over it."""
+
+    def opened() -> ZenohTransport:
+        return ZenohTransport(open_peer(router), inbox.put)
+
+    if reason := shared_memory.problem():
+        log("robot", f"large messages do without shared memory: {reason}")
+    transport = RenewableTransport(opened())
+    bus = Bus(
+        scheduler,
+        clock,
+        domain=plan.bus.domain,
+        namespace=plan.bus.namespace,
+        wire=plan.bus.wire,
+        transport=tape.around(transport) if tape else transport,
+        witness=tape.witness if tape else None,
+        log=log,
+    )
+    lifeline = Lifeline(
+        plan.robot,
+        transport,
+        opened,
+        router,
+        owns_router=plan.bus.router is None,
+        post=inbox.put,
+        log=lambda text: log("robot", text),
+    )
+    return Connection(bus, lifeline)

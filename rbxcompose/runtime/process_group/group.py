@@ -1,0 +1,365 @@
+"""The main of a process group: its scheduler, clock, bus, host and driver, led by the supervisor's messages."""
+
+from __future__ import annotations
+
+import faulthandler
+import gc
+import math
+import os
+import signal
+import threading
+from collections.abc import Sequence
+from types import FrameType
+from typing import TYPE_CHECKING
+
+from rbxcompose.bus.bus import Bus
+from rbxcompose.clock import DISPUTE, ExternalClock, MonotonicClock, SteppedClock, Turn
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.msgs.rosgraph_msgs import Clock as ClockMessage
+from rbxcompose.msgs.stamps import to_nanoseconds
+from rbxcompose.plan.dump import load
+from rbxcompose.plan.model import Plan
+from rbxcompose.qos import Qos
+from rbxcompose.requests import Command, Refused
+from rbxcompose.robot_events import MissionOver, MissionWaits
+from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.log import LogFile
+from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.process_group.capture import Capture, take_printed
+from rbxcompose.runtime.process_group.connection import open_bus
+from rbxcompose.runtime.process_group.driver import Driver, ExternalDriver, RealTimeDriver, SteppedDriver
+from rbxcompose.runtime.process_group.host import Host, Notice
+from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.lifeline import Lifeline
+from rbxcompose.runtime.records import Record
+from rbxcompose.scheduler import Scheduler
+from rbxcompose.typed_json import to_data
+
+if TYPE_CHECKING:
+    from rbxcompose.runtime.process_group.taping import Taping
+
+HANG = 2.0  # [s] without a turn of the loop after which the process ends itself
+LONGEST_CONFIGURE = 30.0  # [s]
+LONGEST_CLOSE = 1.0  # [s] to deactivate, clean up and leave the bus
+REST_BOUND = 1.0  # [s] of robot time to come to rest when the supervisor has gone
+STEPPED_REST_BOUND = 2.0  # [s] of robot time to come to rest on a stepped clock
+CLOCK_TOPIC = "/clock"
+CLOCK_STATUS = "bus.clock"  # what diagnostics call it: no component has a dot in its name
+_TOLD = {
+    Turn.GOES: (Level.OK, f"{CLOCK_TOPIC} goes: robot time goes with it, and each deadline counts anew"),
+    Turn.STANDS: (Level.STALE, f"{CLOCK_TOPIC} does not go on: robot time stands still, only rest is commanded"),
+    Turn.JUMPED: (Level.WARN, f"{CLOCK_TOPIC} has jumped: robot time goes on from here, each deadline counts anew"),
+    Turn.DISPUTED: (
+        Level.ERROR,
+        f"{CLOCK_TOPIC} jumps back and forth: more than one source must be telling it; robot time stands still, only "
+        f"rest is commanded, until there has been no jump for {DISPUTE:g} s",
+    ),
+}
+
+
+class Group:
+    """One process group, from `Configure` to `Shutdown`. It stops by itself when the supervisor has gone."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        name: str,
+        options: RunOptions,
+        log: LogFile,
+        channel: say.Channel,
+        *,
+        start: float,
+        is_restart: bool = False,
+        is_stopped: bool = False,
+    ) -> None:
+        """Take `start`, the robot's start on the monotonic clock [s]."""
+        self.is_over = False
+        self._plan, self._name, self._options, self._log, self._channel = plan, name, options, log, channel
+        self._is_restart, self._is_stopped = is_restart, is_stopped
+        self._clock = self._made_clock(start)
+        self._scheduler = Scheduler()
+        self._inbox = Inbox()
+        self._bus: Bus | None = None
+        self._lifeline: Lifeline | None = None
+        self._taping: Taping | None = None
+        self._host: Host | None = None
+        self._driver = self._made_driver()
+        self._has_begun = False  # something has been activated, and may move
+        self._is_ending = False  # nothing is to come any more; brake at the end of this instant
+        self._is_orphaned = False
+        self._rest_deadline: float | None = None  # [s] of robot time; None: not braking
+        self._is_settled = False  # at rest for good
+
+    def run(self) -> None:
+        """Run until the supervisor says so or has gone."""
+        signal.signal(signal.SIGTERM, self._on_sigterm)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGTERM])
+        try:
+            with Capture(self._printed):
+                self._driver.run()
+        finally:
+            if self._bus is not None:
+                self._bus.close()
+            if self._taping is not None:
+                self._taping.finish()
+
+    # What the driver asks
+
+    def handle(self, message: say.Message) -> None:
+        """Carry out a message from the supervisor."""
+        if isinstance(message, say.Stop | say.Release):
+            self._mind_outside(type(message).__name__.lower())
+        match message:
+            case say.Configure(str(router), time):
+                self._configure(router, time)
+            case say.Activate(names):
+                self._activate(names)
+            case say.Start():
+                self._start()
+            case say.Stop():
+                self._made_host().stop()
+            case say.Release():
+                self._made_host().release()
+            case say.Brake():
+                self._is_ending = True
+            case say.Lost(names, cause):
+                self._made_host().lost(names, cause)
+            case say.Ask():
+                self._channel.send(self._answer(self._made_host(), message))
+            case say.Adopt(plan):
+                self._plan = load(plan)
+            case say.Retire() | say.Prepare() | say.Reconfigure():
+                self._change(self._made_host(), message)
+            case say.Blocked(causes):
+                self._made_host().statuses.block(causes)
+            case say.Shutdown():
+                self._shutdown()
+            case _:
+                raise RuntimeError(f"not a message for a process group: {message}")
+
+    def orphaned(self) -> None:
+        """Come to rest and end: the supervisor has gone."""
+        self._is_orphaned = self._is_ending = True
+        self._is_settled = self._is_settled or self._host is None
+
+    def beat(self) -> None:
+        """Tell the supervisor, and the watchdog, that the loop turns."""
+        self._watch(HANG)
+        if self._taping is not None:
+            self._taping.keep()
+        if not self._options.is_stepped:  # its log must be the same in each run
+            for line in take_printed():
+                self._printed(Level.WARN, line, "")
+        if self._lifeline is not None and not self._options.is_stepped:  # then all is in this process
+            self._lifeline.beat()
+        if self._host is not None:
+            self._host.look_at_workers()
+        self._channel.flush()
+        if not self._channel.is_behind:
+            moves, runs = self._host.work() if self._host is not None else ([], {})
+            self._channel.send(say.Alive(self._clock.now(), moves, runs))
+
+    def settle(self) -> None:
+        """Look whether the run is to end, whether it has come to rest, and whether nobody leads it any more."""
+        if self._time_is_up():
+            self._is_ending = True
+            self._channel.send(say.TimeIsUp())
+        if self._is_ending and self._rest_deadline is None and self._host is not None:
+            self._brake(self._host)
+        if self._rest_deadline is not None and not self._is_settled:
+            self._look_for_rest(self._made_host(), self._rest_deadline)
+        if self._is_orphaned and self._is_settled and not self.is_over:
+            self._shutdown()
+
+    # Messages
+
+    def _configure(self, router: str, time: float) -> None:
+        self._watch(LONGEST_CONFIGURE)
+        if isinstance(self._clock, ExternalClock):
+            self._clock.join(time)
+            self._scheduler.advance(time)
+        instances = self._plan.of_group(self._name)
+        if self._options.record is not None:
+            from rbxcompose.runtime.process_group.taping import Taping  # only a recorded run needs MCAP
+
+            self._taping = Taping(
+                self._options.record, self._plan, self._clock, lambda text: self._complain("robot", text)
+            )
+        tape = self._taping.tape if self._taping else None
+        connection = open_bus(self._plan, router, self._scheduler, self._clock, self._inbox, self._complain, tape)
+        self._bus, self._lifeline = connection.bus, connection.lifeline
+        self._host = Host(
+            self._plan,
+            instances,
+            self._scheduler,
+            self._clock,
+            self._bus,
+            self._log.write,
+            self._notify,
+            is_stopped=self._is_stopped,
+            is_restart=self._is_restart,
+            **({"told": tape.order} if tape else {}),
+            post=self._inbox.put if isinstance(self._clock, MonotonicClock) else None,
+        )
+        if isinstance(self._driver, ExternalDriver):
+            self._follow(self._driver, self._host)
+        self._host.configure()
+        self._watch(HANG)
+        self._channel.send(say.Configured())
+
+    def _activate(self, names: Sequence[str]) -> None:
+        self._has_begun = True
+        self._made_host().activate(names)
+        self._channel.send(say.States(self._made_host().states()))
+
+    def _start(self) -> None:
+        gc.collect()
+        gc.freeze()  # what lives now lives until the end: later collections need not look at it
+        self._made_host().start()
+        if isinstance(self._driver, SteppedDriver):
+            self._driver.go(self._options.duration)
+
+    def _answer(self, host: Host, asked: say.Ask) -> say.Answered | say.Refusal:
+        try:
+            request = host.request(asked.instance, asked.request)
+            if isinstance(request, Command):
+                self._mind_outside(f"{asked.instance} {request.words}")
+            return say.Answered(asked.number, to_data(host.ask(asked.instance, request)))
+        except Refused as refusal:
+            return say.Refusal(asked.number, str(refusal))
+
+    def _change(self, host: Host, message: say.Retire | say.Prepare | say.Reconfigure) -> None:
+        self._watch(LONGEST_CONFIGURE)
+        match message:
+            case say.Retire(names):
+                host.retire(names)
+                self._channel.send(say.Retired())
+            case say.Prepare(plan):
+                host.prepare(load(plan).instances)
+                self._channel.send(say.Configured())
+            case say.Reconfigure(plan, keys):
+                self._channel.send(say.Reconfigured(host.follow(load(plan).instances, keys)))
+        self._watch(HANG)
+
+    def _shutdown(self) -> None:
+        self._watch(LONGEST_CLOSE)  # nothing moves any more: what hangs now is cut off
+        if self._host is not None:
+            if self._rest_deadline is None:
+                self._host.brake()  # the order to brake came together with this one
+            self._channel.send(say.Summary(self._clock.now(), self._host.summary()))
+            self._host.shutdown()
+        self.is_over = True
+
+    def _mind_outside(self, words: str) -> None:
+        if self._options.is_stepped:
+            text = f"from outside: {words}; this run is not reproducible"
+            self._log.write(Record(self._clock.now(), Level.WARN, "robot", text))
+
+    # Coming to rest
+
+    def _time_is_up(self) -> bool:
+        # In real time the supervisor counts; on a stepped clock it could only be late.
+        duration = self._options.duration
+        is_counting = self._options.is_stepped and not self._is_ending and duration is not None
+        return is_counting and duration is not None and self._clock.now() >= duration
+
+    def _brake(self, host: Host) -> None:
+        host.brake()
+        bound = STEPPED_REST_BOUND if self._options.is_stepped else REST_BOUND
+        self._rest_deadline = self._clock.now() + bound
+        if isinstance(self._driver, SteppedDriver):
+            self._driver.hurry()
+            self._driver.go(self._rest_deadline)
+
+    def _look_for_rest(self, host: Host, deadline: float) -> None:
+        stands_still = isinstance(self._clock, ExternalClock) and self._clock.is_standing
+        if not host.is_at_rest and self._clock.now() < deadline and not stands_still:
+            return
+        self._is_settled = True
+        if isinstance(self._driver, SteppedDriver):
+            self._driver.halt()
+        self._channel.send(say.AtRest())
+
+    # Time from outside
+
+    def _follow(self, driver: ExternalDriver, host: Host) -> None:
+        """Take robot time from the bus; until it goes, everything is held."""
+        host.hold()
+        host.bus.subscribe(
+            host.owner,
+            CLOCK_TOPIC,
+            ClockMessage,
+            Qos.COMMAND,
+            lambda message: driver.hear(to_nanoseconds(message.clock)),
+            max_rate=math.inf,  # it is counted in robot time, which might stand still until this brings it on
+        )
+        driver.follow(MonotonicClock())
+
+    def _turned(self, turn: Turn) -> None:
+        """Hold, or go on, with a time that is told from outside; one process tells it for all."""
+        if self._host is None:
+            return
+        if turn is not Turn.GOES:
+            self._host.hold()
+        if turn not in (Turn.STANDS, Turn.DISPUTED):
+            self._host.go_on()
+        if self._name == self._plan.groups[0]:
+            level, text = _TOLD[turn]
+            self._host.log("robot", level, text)
+            self._host.statuses.set(CLOCK_STATUS, Level.OK if turn is Turn.JUMPED else level, text, {})
+
+    # Parts
+
+    def _made_clock(self, start: float) -> MonotonicClock | SteppedClock:
+        if self._options.is_stepped:
+            return SteppedClock()
+        return ExternalClock() if self._plan.follows_clock else MonotonicClock(start)
+
+    def _made_driver(self) -> Driver:
+        if isinstance(self._clock, ExternalClock):
+            return ExternalDriver(self._scheduler, self._clock, self._inbox, self._channel, self, self._turned)
+        if isinstance(self._clock, SteppedClock):
+            rate = self._options.rate
+            return SteppedDriver(self._scheduler, self._clock, self._inbox, self._channel, self, rate=rate)
+        return RealTimeDriver(self._scheduler, self._clock, self._inbox, self._channel, self)
+
+    def _made_host(self) -> Host:
+        if self._host is None:
+            raise RuntimeError("the process group has not been configured")
+        return self._host
+
+    def _notify(self, notice: Notice) -> None:
+        if isinstance(notice, MissionWaits):  # on a stepped clock nothing comes from outside: it would wait for ever
+            if self._options.is_stepped:
+                self._notify(MissionOver(notice.mission, "failure", notice.message))
+            return
+        self._channel.send(notice)
+        is_the_end = isinstance(notice, MissionOver) and notice.mission == self._plan.start
+        if is_the_end and self._options.is_stepped and not self._options.is_detached:
+            self._is_ending = True  # here and not by a message, which would come at another instant in each run
+
+    def _printed(self, level: Level, text: str, detail: str) -> None:
+        """Log what was printed, as told by the component that runs in the thread that printed, else by the process."""
+        host, thread = self._host, threading.current_thread()
+        if host is None:
+            self._log.write(Record(self._clock.now(), level, self._name, text, detail))
+            return
+        is_here = thread is threading.main_thread()
+        name = host.at_work if is_here else thread.name
+        source = name if name in host.hosted else self._name
+        if is_here:
+            host.log(source or self._name, level, text, detail)
+        else:
+            self._inbox.put("", lambda: host.log(source or self._name, level, text, detail))
+
+    def _complain(self, owner: str, text: str) -> None:
+        self._log.write(Record(self._clock.now(), Level.WARN, owner, text))
+
+    def _watch(self, seconds: float) -> None:
+        if not self._options.is_stepped:
+            faulthandler.dump_traceback_later(seconds, exit=True)
+
+    def _on_sigterm(self, number: int, frame: FrameType | None) -> None:
+        if not self._has_begun:
+            os._exit(0)  # nothing can move yet, and configuring may take long
+        self._inbox.put("", self.orphaned)

@@ -1,0 +1,196 @@
+"""The ports and the context of a component that runs in a thread of its own.
+
+What it reads, it reads at once; what it does to the bus is sent to the scheduler's thread, which is the only one that
+touches it, and what comes back is handed over as any other call.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from rbxcompose.clock import Clock
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.requests import Command, Query
+from rbxcompose.robot_events import RobotEvent
+from rbxcompose.runtime.process_group.worker import Worker
+from rbxcompose.sdk.bound import Window
+from rbxcompose.sdk.component import Context
+from rbxcompose.sdk.ports import Calls, CallsAction, Out, Port, ServesAction
+
+
+def handed_over(end: Any, port: Port[Any], worker: Worker) -> Any:
+    """Return an end of the bus for use in the worker's thread."""
+    match port:
+        case Out():
+            return lambda message: worker.send(partial(end, message))
+        case Calls():
+            return _Caller(end, worker)
+        case CallsAction():
+            return _ActionCaller(end, worker)
+        case ServesAction():
+            return _ActionServer(end, worker)
+        case _:
+            return end  # it is only read
+
+
+def _answering(worker: Worker, label: str, then: Callable[[Any], None]) -> Callable[[Any], None]:
+    return lambda reply: worker.submit(label, partial(then, reply))
+
+
+class _Caller:
+    """A client of a service."""
+
+    def __init__(self, end: Any, worker: Worker) -> None:
+        self._end, self._worker = end, worker
+
+    @property
+    def is_available(self) -> bool:
+        return bool(self._end.is_available)
+
+    def __call__(self, request: Any, then: Callable[[Any], None], /, *, timeout: float = 5.0) -> None:
+        answered = _answering(self._worker, "a reply", then)
+        self._worker.send(lambda: self._end(request, answered, timeout=timeout))
+
+
+class _ActionCaller(_Caller):
+    """A client of an action."""
+
+    def __call__(  # type: ignore[override]
+        self, goal: Any, then: Callable[[Any], None], feedback: Callable[[Any], None] | None = None, /
+    ) -> _SentGoal:
+        ended = _answering(self._worker, "the end of a goal", then)
+        told = _answering(self._worker, "feedback", feedback) if feedback is not None else None
+        sent = _SentGoal(self._worker)
+        self._worker.send(lambda: sent.follow(self._end(goal, ended, told)))
+        return sent
+
+
+class _SentGoal:
+    """A goal that is sent as soon as the scheduler comes to it."""
+
+    def __init__(self, worker: Worker) -> None:
+        self._worker = worker
+        self._goal: Any = None
+
+    def follow(self, goal: Any) -> None:
+        """Take the goal as it was sent; in the scheduler's thread."""
+        self._goal = goal
+
+    def cancel(self) -> None:
+        """Ask the server to end it."""
+        self._worker.send(lambda: self._goal.cancel())
+
+
+class _ActionServer:
+    """The goal that is carried out."""
+
+    def __init__(self, end: Any, worker: Worker) -> None:
+        self._end, self._worker = end, worker
+        self._current: _ServedGoal | None = None
+
+    @property
+    def current(self) -> _ServedGoal | None:
+        goal = self._end.current
+        if goal is None:
+            return None
+        if self._current is None or self._current.goal is not goal:
+            self._current = _ServedGoal(goal, self._worker)
+        return None if self._current.has_ended else self._current
+
+
+class _ServedGoal:
+    """A goal; that it has ended is known here before the scheduler has come to it."""
+
+    def __init__(self, goal: Any, worker: Worker) -> None:
+        self.goal, self._worker = goal, worker
+        self.has_ended = False
+
+    @property
+    def request(self) -> Any:
+        return self.goal.request
+
+    @property
+    def cancel_requested(self) -> bool:
+        return bool(self.goal.cancel_requested)
+
+    @property
+    def is_paused(self) -> bool:
+        return bool(self.goal.is_paused)
+
+    def feedback(self, message: Any, /) -> None:
+        self._worker.send(lambda: self.goal.feedback(message))
+
+    def succeeded(self, result: Any = None, /) -> None:
+        self._end(lambda: self.goal.succeeded(result))
+
+    def aborted(self, reason: str = "", result: Any = None, /) -> None:
+        self._end(lambda: self.goal.aborted(reason, result))
+
+    def canceled(self, result: Any = None, /) -> None:
+        self._end(lambda: self.goal.canceled(result))
+
+    def _end(self, how: Callable[[], None]) -> None:
+        self.has_ended = True
+        self._worker.send(how)
+
+
+class HandedOver:
+    """What the runtime gives to the component besides its ports."""
+
+    def __init__(self, context: Context, worker: Worker) -> None:
+        self.clock: Clock = context.clock
+        self._context, self._worker = context, worker
+
+    @property
+    def is_stopped(self) -> bool:
+        """Tell whether the robot is held by a stop."""
+        return self._context.is_stopped
+
+    def log(self, level: Level, text: str) -> None:
+        """Write one event of the robot's story."""
+        self._worker.send(lambda: self._context.log(level, text))
+
+    def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
+        """Tell diagnostics how the component is."""
+        self._worker.send(lambda: self._context.status(level, message, values))
+
+    def wake_at(self, time: float) -> None:
+        """Call the component's `wake` at robot time `time` [s]."""
+        self._worker.send(lambda: self._context.wake_at(time))
+
+    def notify(self, event: RobotEvent) -> None:
+        """Tell the supervisor of something that concerns the whole robot."""
+        self._worker.send(lambda: self._context.notify(event))
+
+    def repeat(self, requests: Sequence[Command]) -> None:
+        """Have the component told these again after it was restarted."""
+        self._worker.send(lambda: self._context.repeat(requests))
+
+    def window(self, path: str, question: Query[Any]) -> Window:
+        """Open a window for tools outside at `path`."""
+        return _Window(self._context, self._worker, path, question)
+
+
+class _Window:
+    """A window that the scheduler's thread opens as soon as it comes to it."""
+
+    def __init__(self, context: Context, worker: Worker, path: str, question: Query[Any]) -> None:
+        self._worker = worker
+        self._window: Window | None = None
+        worker.send(lambda: self._open(context, path, question))
+
+    @property
+    def is_watched(self) -> bool:
+        return self._window is not None and self._window.is_watched
+
+    def put(self, value: object, /) -> None:
+        self._worker.send(lambda: self._put(value))
+
+    def _open(self, context: Context, path: str, question: Query[Any]) -> None:
+        self._window = context.window(path, question)
+
+    def _put(self, value: object) -> None:
+        if self._window is not None:
+            self._window.put(value)

@@ -1,0 +1,367 @@
+"""The host of a process: carries its components through their lifecycle and keeps their mistakes apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any, TypeVar
+
+from rbxcompose.bus.bus import Bus
+from rbxcompose.clock import Clock
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.requests import Command, Refused, Request, as_data
+from rbxcompose.robot_events import RobotEvent
+from rbxcompose.runtime.channel import Failed, Repeated, States
+from rbxcompose.runtime.faults import RestartPolicy, explain
+from rbxcompose.runtime.process_group.deliveries import Deliveries
+from rbxcompose.runtime.process_group.frames import Frames
+from rbxcompose.runtime.process_group.hosted import Hosted, Lifecycle
+from rbxcompose.runtime.process_group.parameters import Parameters
+from rbxcompose.runtime.process_group.rosout import Rosout
+from rbxcompose.runtime.process_group.statuses import Statuses
+from rbxcompose.runtime.process_group.worker import Post, Worker
+from rbxcompose.runtime.records import Log, Record
+from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.ports import Looks
+from rbxcompose.sdk.registry import component_type
+from rbxcompose.typed_json import UnreadableError
+
+A = TypeVar("A")
+
+SLOW = 0.005  # [s] in one callback, after which diagnostics name it: meanwhile nothing else of the process runs
+
+Notice = States | Failed | Repeated | RobotEvent  # what a host tells the supervisor by itself
+Told = Callable[..., None]  # takes the name of a method of the host, and words
+
+
+def _nobody(verb: str, *words: object) -> None:
+    """Keep no record of orders."""
+
+
+class Host:
+    """Runs the instances of one process group; all its methods are called from the scheduler's thread."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        instances: Sequence[Instance],
+        scheduler: Scheduler,
+        clock: Clock,
+        bus: Bus,
+        log: Log,
+        notify: Callable[[Notice], None],
+        *,
+        is_stopped: bool = False,
+        is_restart: bool = False,
+        told: Told = _nobody,
+        post: Post | None = None,
+    ) -> None:
+        """Have `told` hear of each order that is carried out, by which a recording can be done again.
+
+        By `post` other threads reach the scheduler's; without it, components that may block run in the scheduler's.
+        """
+        self.plan, self.clock, self.bus, self.scheduler = plan, clock, bus, scheduler
+        self.notify = notify
+        self._told = told
+        self.is_stopped = is_stopped
+        self.is_restart = is_restart
+        self.has_started = False
+        self.is_braking = False
+        self.is_held = False  # robot time stands still
+        self._log, self._post = log, post
+        self.owner = f"host_{instances[0].process}" if instances else "host"
+        self._wanted: set[str] = set()  # to be active, as soon as they can
+        self.statuses = Statuses(self.owner, bus, scheduler, clock)
+        self._deliveries = Deliveries(self.owner, bus, scheduler, clock, self.statuses)
+        self.parameters = Parameters(self.owner, bus, clock, plan.bus.namespace)
+        self._rosout = Rosout(self.owner, bus, clock)
+        self.frames = self._frames(instances)
+        self.hosted = {one.name: Hosted(self, one) for one in instances}
+        self._policies = {one.name: RestartPolicy(one.restart) for one in instances}
+        self._retired: dict[str, Component[Any]] = {}  # whose place another one may take
+        self.at_work: str | None = None  # the component that runs in the scheduler's thread
+        self.doing = ""  # what it does
+        scheduler.on_error, scheduler.observe = self.failed, self._observed
+
+    def _frames(self, instances: Sequence[Instance]) -> Frames | None:
+        looking = (port for one in instances for port in component_type(one.type).ports(one.config).values())
+        if not any(isinstance(port, Looks) for port in looking):
+            return None
+        return Frames(self.owner, self.bus, self.clock, is_patient=self._post is not None)
+
+    # Lifecycle of the whole process
+
+    def configure(self) -> None:
+        """Configure all components; one that raises is restarted later, the others go on."""
+        for name in self.hosted:
+            self._guarded(name, self.hosted[name].configure)
+        self.statuses.publish()
+
+    def activate(self, names: Sequence[str]) -> None:
+        """Activate components in this order."""
+        self._told("activate", *names)
+        for name in names:
+            self._wanted.add(name)
+            if self.hosted[name].state is Lifecycle.INACTIVE:
+                self._guarded(name, self.hosted[name].activate)
+
+    def start(self) -> None:
+        """Begin what waits for the whole robot to be active."""
+        self._told("start")
+        self.has_started = True
+        self._deliveries.start()
+        self._each_active("start")
+
+    def shutdown(self) -> None:
+        """Deactivate and clean up in reverse order; a component that raises does not keep the others."""
+        self._told("shutdown")
+        self.is_braking = True
+        for name in reversed(self.hosted):
+            self._guarded(name, self.hosted[name].close)
+
+    # Commands
+
+    def stop(self) -> None:
+        """Hold everything that moves and cancel the goals that claim it."""
+        self._told("stop")
+        self.is_stopped = True
+        for hosted in self.hosted.values():
+            hosted.cancel_claimed()
+        self._each_active("stop")
+
+    def release(self) -> None:
+        """Allow motion again."""
+        self._told("release")
+        self.is_stopped = False
+        self._each_active("release")
+
+    def hold(self) -> None:
+        """Let nothing but rest be commanded while robot time stands still."""
+        self.is_held = True
+        self._each_active("hold")
+
+    def go_on(self) -> None:
+        """Allow commands again, each deadline anew."""
+        self.is_held = False
+        self._each_active("go_on")
+
+    def brake(self) -> None:
+        """Bring everything to rest for good: the robot goes down."""
+        self._told("brake")
+        self.is_braking = True
+        for hosted in self.hosted.values():
+            hosted.cancel_claimed()
+        self._each_active("brake")
+
+    def lost(self, names: Sequence[str], cause: str) -> None:
+        """Tell the components that those of another process have gone."""
+        self._told("lost", cause, *names)
+        self._each_active("lost", tuple(names), cause)
+
+    def request(self, instance: str, data: object) -> Request[Any]:
+        """Return the request that data stand for.
+
+        Raises:
+            Refused: if the component does not take such a request, or the data cannot be read.
+        """
+        if (hosted := self.hosted.get(instance)) is None:
+            raise Refused(f"'{instance}' is not active")
+        try:
+            return component_type(hosted.instance.type).requests().from_data(data)
+        except UnreadableError as error:
+            raise Refused(f"the request cannot be read: {error}") from error
+
+    def ask(self, instance: str, request: Request[A]) -> A:
+        """Return a component's answer to a request.
+
+        Raises:
+            Refused: if it cannot be carried out, with the reason.
+        """
+        if isinstance(request, Command):
+            self._told("command", instance, as_data(request))
+        return self._idle(instance).handle(request)
+
+    def _idle(self, instance: str) -> Component[Any]:
+        """Return a component that can be asked now."""
+        hosted = self.hosted.get(instance)
+        if hosted is None or hosted.component is None or hosted.state is not Lifecycle.ACTIVE:
+            raise Refused(f"'{instance}' is not active")
+        if hosted.is_busy:
+            raise Refused(f"'{instance}' is busy")
+        return hosted.component
+
+    # Another plan
+
+    def retire(self, names: Sequence[str]) -> None:
+        """Bring components to rest, in this order, and forget them."""
+        for name in names:
+            if (hosted := self.hosted.get(name)) is None:
+                continue
+            hosted.cancel_claimed()
+            if hosted.component is not None and hosted.state is Lifecycle.ACTIVE:
+                self._guarded(name, hosted.component.brake)
+            if hosted.component is not None:
+                self._retired[name] = hosted.component
+            self._guarded(name, hosted.close)
+            self._wanted.discard(name)
+            self.statuses.forget(name)
+            del self.hosted[name], self._policies[name]
+
+    def prepare(self, instances: Sequence[Instance]) -> None:
+        """Configure components beside those that run, or in their place."""
+        self.retire([one.name for one in instances])
+        self.frames = self.frames or self._frames(instances)
+        for one in instances:
+            self.hosted[one.name] = Hosted(self, one)
+            self._policies[one.name] = RestartPolicy(one.restart)
+            self._guarded(one.name, self.hosted[one.name].configure)
+            old, made = self._retired.pop(one.name, None), self.hosted[one.name].component
+            if made is not None and type(old) is type(made):
+                self._guarded(one.name, partial(self.hosted[one.name].do, "take_over", partial(made.take_over, old)))
+        self._retired.clear()
+        self.statuses.publish()
+
+    def follow(self, instances: Sequence[Instance], keys: Mapping[str, Sequence[str]]) -> dict[str, str]:
+        """Let components follow the settings of `keys`; return the reasons of those that refuse, by name."""
+        refused: dict[str, str] = {}
+        for one in instances:
+            if (hosted := self.hosted.get(one.name)) is None:
+                continue
+            if one.restart != hosted.instance.restart:
+                self._policies[one.name] = RestartPolicy(one.restart)
+            settings = {key.partition(".")[0] for key in keys[one.name]} & type(one.config).model_fields.keys()
+            config = hosted.config.model_copy(update={name: getattr(one.config, name) for name in settings})
+            try:
+                self.parameters.change(hosted, config)
+            except Refused as refusal:
+                refused[one.name] = f"'{one.name}' refuses: {refusal}"
+                continue
+            except Exception as error:  # as in a step: the failure of the component alone
+                self.failed(one.name, error)
+            hosted.instance, hosted.config = one, config
+        return refused
+
+    def work(self) -> tuple[list[str], dict[str, str]]:
+        """Return what moves the robot, and at what components are that a restart would cut off, both in words."""
+        moves: list[str] = []
+        runs: dict[str, str] = {}
+
+        def look(name: str, hosted: Hosted) -> None:
+            if moving := hosted.moves:
+                moves.append(moving)
+            if hosted.component is not None and hosted.component.occupation:
+                runs[name] = hosted.component.occupation
+
+        for name, hosted in self.hosted.items():
+            if hosted.state is Lifecycle.ACTIVE:
+                self._guarded(name, lambda name=name, hosted=hosted: look(name, hosted))  # type: ignore[misc]
+        return moves, runs
+
+    # What is known of the components
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Tell whether nothing moves that a component of this process moves."""
+        return all(one.component.is_at_rest for one in self.hosted.values() if one.component)
+
+    def summary(self) -> dict[str, dict[str, str]]:
+        """Return what the components tell for the summary: instance -> label -> text."""
+        facts = {name: one.component.summary() for name, one in self.hosted.items() if one.component}
+        return {name: some for name, some in facts.items() if some}
+
+    def states(self) -> dict[str, tuple[str, int]]:
+        """Return state and number of restarts of each instance."""
+        return {name: (one.state.value, self._policies[name].restarts) for name, one in self.hosted.items()}
+
+    def log(self, source: str, level: Level, text: str, detail: str = "") -> None:
+        """Write one record, for people and for who listens on the bus, unless its level is less than is wanted."""
+        hosted = self.hosted.get(source)
+        if hosted is not None and level < hosted.instance.log:
+            return
+        self._rosout.publish(source, level, text)
+        self._log(Record(self.clock.now(), level, source, text, detail))
+
+    def changed(self, name: str) -> None:
+        """Tell the supervisor of a new state."""
+        self.notify(States({name: self.states()[name]}))
+
+    # Who works
+
+    def worker(self, name: str) -> Worker | None:
+        """Return a thread for a component that may block, or None if all have to run in one: on a stepped clock."""
+        return Worker(name, self.clock, self._post, partial(self.failed, name)) if self._post is not None else None
+
+    def ready(self, name: str) -> None:
+        """Activate a component that took its time to be configured, if it was to be active meanwhile."""
+        if name in self._wanted:
+            self._guarded(name, self.hosted[name].activate)
+
+    def look_at_workers(self) -> None:
+        """Tell diagnostics of components that do not return from a call, and take those that never do for failed."""
+        for name, hosted in list(self.hosted.items()):
+            if hosted.worker is not None:
+                self.statuses.busy(name, hosted.worker.look())
+
+    def _observed(self, owner: str, callback: Callable[[], None]) -> None:
+        began = self.clock.now()
+        self._working(owner, callback)
+        if (seconds := self.clock.now() - began) > SLOW and owner in self.hosted:
+            self.statuses.slow(owner, self.doing or "a callback", seconds)
+
+    def _working(self, name: str, action: Callable[[], None]) -> None:
+        before, self.at_work, self.doing = self.at_work, name, ""
+        try:
+            action()
+        finally:
+            self.at_work = before
+
+    # Mistakes
+
+    def failed(self, name: str, error: Exception) -> None:
+        """Take an exception of a component: tell it, restart the component unless it fails too often."""
+        if name not in self.hosted:
+            raise error
+        text, detail = explain(error, self.hosted[name].file)
+        self.log(name, Level.ERROR, text, detail)
+        self.statuses.set(name, Level.ERROR, text, {})
+        self.hosted[name].abandon()
+        self.bus.close_owner(name)
+        self.scheduler.remove(name)
+        delay = None if self.is_braking else self._policies[name].after_failure(self.clock.now())
+        self.changed(name)
+        if delay is not None:
+            hosted = self.hosted[name]
+            self.scheduler.at(self.clock.now() + delay, self.owner, lambda: self._restart(name, hosted))
+        elif not self.is_braking:
+            self._give_up(name, text)
+
+    def _give_up(self, name: str, text: str) -> None:
+        """Leave a component as it is; one that failed too often, unlike one that is never restarted, ends the robot."""
+        self.hosted[name].state = Lifecycle.FAILED
+        if self._policies[name].is_allowed:  # told first: a robot that starts would go on without what has failed
+            self.notify(Failed(name, f"'{name}' failed too often: {text}"))
+        else:
+            self.log(name, Level.WARN, "stays failed: it is never restarted")
+        self.changed(name)
+
+    def _restart(self, name: str, hosted: Hosted) -> None:
+        if self.is_braking or self.hosted.get(name) is not hosted:
+            return  # another one may have taken its place
+        self.log(name, Level.WARN, "restarted")
+        self._guarded(name, hosted.configure)
+        if name in self._wanted and hosted.state is Lifecycle.INACTIVE:
+            self._guarded(name, hosted.activate)
+
+    def _guarded(self, name: str, action: Callable[[], None]) -> None:
+        try:
+            self._working(name, action)
+        except Exception as error:  # whatever a plug-in raises is its own failure, and told as such
+            self.failed(name, error)
+
+    def _each_active(self, method: str, *arguments: object) -> None:
+        for name, hosted in self.hosted.items():
+            component = hosted.component
+            if component is not None and hosted.state is Lifecycle.ACTIVE:
+                self._guarded(name, partial(hosted.do, method, partial(getattr(component, method), *arguments)))

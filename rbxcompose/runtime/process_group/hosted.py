@@ -1,0 +1,268 @@
+"""One component in its host: lifecycle state, ports, timers."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from enum import StrEnum
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from rbxcompose.bus.names import admin_key
+from rbxcompose.clock import Clock
+from rbxcompose.config import Config
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plan.model import Instance
+from rbxcompose.requests import Command, Query, Refused, as_data
+from rbxcompose.robot_events import RobotEvent
+from rbxcompose.runtime.channel import Repeated
+from rbxcompose.runtime.process_group.binding import bind
+from rbxcompose.runtime.process_group.handover import HandedOver, handed_over
+from rbxcompose.runtime.process_group.worker import Worker
+from rbxcompose.sdk.bound import Window
+from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.ports import Port, ServesAction, ServesTopic
+from rbxcompose.sdk.registry import component_type
+from rbxcompose.typed_json import to_data
+
+if TYPE_CHECKING:
+    from rbxcompose.runtime.process_group.host import Host
+
+LONGEST_GOODBYE = 0.3  # [s] to wait for a component's own thread when it is to end
+
+
+class Lifecycle(StrEnum):
+    """Lifecycle states, as `ps` shows them."""
+
+    UNCONFIGURED = "unconfigured"
+    INACTIVE = "inactive"
+    ACTIVE = "active"
+    FAILED = "failed"
+
+
+class Hosted:
+    """An instance and, while it lives, its component. It is the component's context, too."""
+
+    def __init__(self, host: Host, instance: Instance) -> None:
+        self.host, self.instance = host, instance
+        self.clock: Clock = host.clock
+        self.state = Lifecycle.UNCONFIGURED
+        self.config = instance.config  # as it is now: parameters may have changed it
+        self.component: Component[Any] | None = None
+        self.worker: Worker | None = None  # the thread of a component that may block
+        self._ends: dict[str, Any] = {}  # of the ports, on the bus
+        self._claiming: list[Any] = []  # those of them that serve an action which claims a part of the robot
+        self._repeated: Sequence[Command] = ()  # what it is told again after it was restarted in its place
+        self._wakes: set[float] = set()  # robot times [s] at which the component is to be woken
+
+    @property
+    def file(self) -> str | None:
+        """Return the file in which the component's type is written."""
+        return sys.modules[component_type(self.instance.type).__module__].__file__
+
+    # Lifecycle
+
+    def configure(self) -> None:
+        """Make the component, bind its ports, let it get ready."""
+        cls = component_type(self.instance.type)
+        self.worker = self.host.worker(self.instance.name) if cls.blocking else None
+        made = cls(self.instance.name, self.config, self if self.worker is None else HandedOver(self, self.worker))
+        self.component = made
+        bind(made, self.instance, self.host.bus, self.host.frames, self)
+        self._ends = dict(made.bound)
+        ports = cls.ports(self.config)
+        self._claiming = [
+            end for name, end in made.bound.items() if isinstance(port := ports[name], ServesAction) and port.claims
+        ]
+        if self.worker is not None:
+            made.bound = {name: handed_over(end, ports[name], self.worker) for name, end in self._ends.items()}
+        self.host.parameters.serve(self)
+        self.do("configure", made.configure, then=self._configured)
+
+    def _configured(self) -> None:
+        self._enter(Lifecycle.INACTIVE)
+        self.host.statuses.set(self.instance.name, Level.OK, "ready", {})
+        if self.worker is not None:
+            self.host.ready(self.instance.name)
+
+    def reconfigure(self, config: Config) -> None:
+        """Let the component follow another configuration; if it raises, the old one stays."""
+        if self.is_busy:
+            raise Refused(f"'{self.instance.name}' is busy")
+        component, old = self._made(), self.config
+        component.config = config
+        try:
+            component.reconfigure(old)
+        except BaseException:
+            component.config = old
+            raise
+        self.config = config
+
+    def activate(self) -> None:
+        """Let the component work; it joins a robot that has started, is stopped or goes down as the others did."""
+        component = self._made()
+        self.host.statuses.set(self.instance.name, Level.OK, "active", {})
+        self.do("activate", component.activate, then=self._activated)
+
+    def _activated(self) -> None:
+        component = self._made()
+        self._enter(Lifecycle.ACTIVE)
+        if component.rate:
+            step = component.step
+            self.host.scheduler.every(
+                1.0 / component.rate, self.instance.name, lambda dt: self.do("step", lambda: step(dt), depth=1)
+            )
+        if self.host.is_stopped:
+            self.do("stop", component.stop)
+        if self.host.is_held:
+            self.do("hold", component.hold)
+        if self.host.has_started:
+            self.do("start", component.start)
+            for request in self._repeated:
+                self.do("command", partial(self._repeat, component, request))
+        self.host.bus.open(self.instance.name)  # who found it before it was active has waited
+
+    def close(self) -> None:
+        """Deactivate and clean up, as far as it got, and give back its ports."""
+        self.host.scheduler.remove(self.instance.name)
+        component, state = self.component, self.state
+        try:
+            if component and self._taken_back(component) and state is Lifecycle.ACTIVE:
+                component.deactivate()
+            if component and self.worker is None and state in (Lifecycle.ACTIVE, Lifecycle.INACTIVE):
+                component.cleanup()
+        finally:
+            self.abandon()
+            self.host.bus.close_owner(self.instance.name)
+
+    def abandon(self) -> None:
+        """Forget the component as it is."""
+        if self.worker is not None:
+            self.worker.close(0.0)
+        self.component = self.worker = None
+        self._claiming = []
+        self._wakes.clear()
+        self.state = Lifecycle.UNCONFIGURED
+
+    def _taken_back(self, component: Component[Any]) -> bool:
+        """Let the scheduler's thread use the component itself again; tell whether its own thread has let go of it."""
+        if self.worker is None:
+            return True
+        label, _ = self.worker.busy_for()
+        if not self.worker.close(LONGEST_GOODBYE):
+            self.host.log(self.instance.name, Level.WARN, f"does not return from {label}: it is left behind in it")
+            return False
+        self.worker, component.context, component.bound = None, self, self._ends
+        return True
+
+    def do(
+        self, label: str, call: Callable[[], None], *, depth: int | None = None, then: Callable[[], None] | None = None
+    ) -> None:
+        """Have the component do something, now or, if it has a thread, there; `then` follows in the scheduler's thread.
+
+        Of calls that wait with the same label, the newest `depth` are kept.
+        """
+        worker = self.worker
+        if worker is not None:
+            worker.submit(label, call if then is None else partial(_in_turn, call, partial(worker.send, then)), depth)
+            return
+        self.host.doing = label
+        call()
+        if then is not None:
+            then()
+
+    @property
+    def is_busy(self) -> bool:
+        """Tell whether the component is in a call in its own thread, so that no other may use it."""
+        return self.worker is not None and self.worker.is_busy
+
+    @property
+    def moves(self) -> str:
+        """Return in words what of it moves the robot or is about to; empty if nothing."""
+        component = self.component
+        if component is None or self.state is not Lifecycle.ACTIVE:
+            return ""
+        if not component.is_at_rest:
+            return f"'{self.instance.name}' moves"
+        if any(server.current is not None for server in self._claiming):
+            return f"'{self.instance.name}' carries out a goal"
+        return component.occupation if component.claims else ""
+
+    def cancel_claimed(self) -> None:
+        """Ask the goals that claim a part of the robot to end."""
+        for server in self._claiming:
+            server.cancel_all()
+
+    def refusal(self, port: Port[Any]) -> str:
+        """Return why a message, request or goal cannot be taken now; empty if it can."""
+        if self.state is not Lifecycle.ACTIVE:
+            return f"'{self.instance.name}' is not active"
+        is_claiming = isinstance(port, ServesAction | ServesTopic) and bool(port.claims)
+        if is_claiming and self.host.is_braking:
+            return "the robot is going down"
+        if is_claiming and self.host.is_stopped:
+            return "the robot is stopped"
+        if isinstance(port, ServesAction) and self.is_busy:
+            return f"'{self.instance.name}' is busy"
+        return ""
+
+    def _made(self) -> Component[Any]:
+        if self.component is None:
+            raise RuntimeError(f"'{self.instance.name}' is not configured")
+        return self.component
+
+    def _enter(self, state: Lifecycle) -> None:
+        self.state = state
+        self.host.changed(self.instance.name)
+
+    # The component's context
+
+    @property
+    def is_stopped(self) -> bool:
+        """Tell whether the robot is held by a stop."""
+        return self.host.is_stopped
+
+    def log(self, level: Level, text: str) -> None:
+        """Write one event of the robot's story."""
+        self.host.log(self.instance.name, level, text)
+
+    def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
+        """Tell diagnostics how the component is."""
+        self.host.statuses.set(self.instance.name, level, message, values)
+
+    def wake_at(self, time: float) -> None:
+        """Call the component's `wake` at robot time `time` [s]."""
+        time = max(time, self.clock.now())
+        if time not in self._wakes:  # a wake that asks for the next one would otherwise multiply
+            self._wakes.add(time)
+            self.host.scheduler.at(time, self.instance.name, lambda: self._wake(time))
+
+    def _wake(self, time: float) -> None:
+        self._wakes.discard(time)
+        self.do("wake", self._made().wake)
+
+    def notify(self, event: RobotEvent) -> None:
+        """Tell the supervisor of something that concerns the whole robot."""
+        self.host.notify(event)
+
+    def repeat(self, requests: Sequence[Command]) -> None:
+        """Have the component told these again after it, or its process, was restarted."""
+        self._repeated = requests
+        self.host.notify(Repeated(self.instance.name, [as_data(one) for one in requests]))
+
+    def window(self, path: str, question: Query[Any]) -> Window:
+        """Open a window for tools outside at `path` of the robot's own keys."""
+        name = self.instance.name
+        key = admin_key(self.host.plan.robot, path)
+        return self.host.bus.window(name, key, lambda: to_data(self.host.ask(name, question)))
+
+    def _repeat(self, component: Component[Any], request: Command) -> None:
+        try:
+            component.handle(request)
+        except Refused as refusal:
+            self.log(Level.WARN, f"{request.words}: {refusal}")
+
+
+def _in_turn(*calls: Callable[[], None]) -> None:
+    for call in calls:
+        call()

@@ -1,0 +1,156 @@
+"""Proves that the session of a process still carries data, and opens it anew when it does not.
+
+A session can be stuck for hours while Zenoh takes it for sound. So each process asks the nearest of the others over the
+bus, after a miss all of them and the router of the robot, and answers them. Questions are answered in Zenoh's own
+thread, because they are about the session: whether the loop of a process turns is told by its signs of life.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from threading import Thread
+
+import zenoh
+
+from rbxcompose.bus.probe import Heard, Probe, probe_key
+from rbxcompose.bus.renewal import RenewableTransport
+from rbxcompose.bus.transport import Answer, Question, Transport
+from rbxcompose.runtime.process_group.driver import BEAT
+
+BEATS = 3  # of the process between two probes: three that are missed, and the change, take less than 4 s
+LONGEST_CLOSE = 1.0  # [s] for closing a session; Zenoh may hang in it
+FIRST_PAUSE, LONGEST_PAUSE = 2, 120  # beats until the next try, when no session can be opened
+KNOCK = 0.05  # [s] to wait for a connection on the loopback interface
+
+Post = Callable[[str, Callable[[], None]], None]
+
+
+def answer(question: Question) -> None:
+    """Answer a probe."""
+    question.reply(b"", b"")
+
+
+class Lifeline:
+    """Sends a probe every `BEATS` beats of its process, and answers those of others.
+
+    What would block, closing a session and opening one, is done in a thread of its own; all else in the scheduler's.
+    """
+
+    def __init__(
+        self,
+        robot: str,
+        transport: RenewableTransport,
+        reopen: Callable[[], Transport],
+        router: str,
+        *,
+        owns_router: bool,
+        post: Post,
+        log: Callable[[str], None],
+    ) -> None:
+        """Take the endpoint of the router, and whether it is the robot's own, which answers probes.
+
+        `reopen` returns the transport over a new session, `post` has a callback run in the scheduler's thread.
+        """
+        self._key, self._transport, self._reopen, self._router = probe_key(robot), transport, reopen, router
+        self._post, self._log = post, log
+        self._probe = Probe(expects_router=owns_router)
+        self._beats = 0
+        self._sent: _Sent | None = None
+        self._is_changing = False
+        self._pause, self._retry = FIRST_PAUSE, 0  # beats
+        self._has_hung = False  # the old session, in closing
+        transport.serve(self._key, answer)
+
+    def beat(self) -> None:
+        """Count a beat of the process; when it is time, judge the last probe and send the next one."""
+        self._beats += 1
+        if self._is_changing:
+            self._look_whether_to_try()
+            return
+        if self._beats % BEATS:
+            return
+        if self._sent is not None:
+            heard = self._sent.close()
+            is_router_up = heard is Heard.NOBODY and self._router_is_up()
+            if self._probe.judge(heard, is_router_up=is_router_up):
+                self._renew()
+                return
+        self._sent = _Sent(self._transport, self._key, of_all=self._probe.is_in_doubt)
+
+    @property
+    def heard(self) -> Heard:
+        """Return what has come back so far to the probe that is on its way."""
+        return self._sent.heard if self._sent is not None else Heard.NOTHING
+
+    def _router_is_up(self) -> bool:
+        host, _, port = self._router.rpartition("/")[2].rpartition(":")
+        try:
+            socket.create_connection((host, int(port)), KNOCK).close()
+        except OSError:
+            return False
+        return True
+
+    def _renew(self) -> None:
+        self._log("the session on the bus carries nothing any more; it is opened anew")
+        self._is_changing, self._sent = True, None
+        old = self._transport.detach()
+        Thread(target=self._replace, args=(old,), name="renewal", daemon=True).start()
+
+    def _replace(self, old: Transport) -> None:
+        closing = Thread(target=_close, args=(old,), name="closing", daemon=True)
+        closing.start()
+        closing.join(LONGEST_CLOSE)
+        self._has_hung = closing.is_alive()
+        self._open()
+
+    def _open(self) -> None:
+        try:
+            new = self._reopen()
+        except Exception as error:  # whatever it is: without another try the process would stay alone
+            words = f"{type(error).__name__}: {error}"
+            self._post("", lambda: self._put_off(words))
+        else:
+            self._post("", lambda: self._attach(new))
+
+    def _put_off(self, words: str) -> None:
+        self._log(f"no session on the bus can be opened ({words}); it is tried again in {self._pause * BEAT:g} s")
+        self._retry, self._pause = self._pause, min(2 * self._pause, LONGEST_PAUSE)
+
+    def _look_whether_to_try(self) -> None:
+        if self._retry:
+            self._retry -= 1
+            if not self._retry:
+                Thread(target=self._open, name="renewal", daemon=True).start()
+
+    def _attach(self, new: Transport) -> None:
+        self._is_changing, self._pause = False, FIRST_PAUSE
+        self._transport.attach(new)
+        self._log(f"the session on the bus is new{', the old one hangs in closing' if self._has_hung else ''}")
+
+
+def _close(old: Transport) -> None:
+    with suppress(zenoh.ZError):  # it is stuck, and left behind
+        old.close()
+
+
+class _Sent:
+    """A probe on its way."""
+
+    def __init__(self, transport: Transport, key: str, *, of_all: bool) -> None:
+        self.heard = Heard.NOTHING
+        self._asked = transport.ask(key, b"", b"", self._answered, of_all=of_all)
+
+    def close(self) -> Heard:
+        """Wait no longer; return what has come."""
+        heard = self.heard
+        self._asked.close()
+        return heard
+
+    def _answered(self, given: Answer) -> None:
+        # In a thread of the transport, so that a loop which is busy for a while does not miss it.
+        if not given.error:
+            self.heard = Heard.ANSWER
+        elif self.heard is not Heard.ANSWER:  # each query ends with an error, also after its answers
+            self.heard = Heard.NOBODY

@@ -1,0 +1,86 @@
+"""The router of a robot: a small process by which the others find each other; no data of theirs passes through it."""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import signal
+from types import FrameType
+
+from rbxcompose.bus.probe import probe_key
+from rbxcompose.bus.zenoh_session import open_router
+from rbxcompose.bus.zenoh_transport import ZenohTransport
+from rbxcompose.clock import MonotonicClock
+from rbxcompose.plan.model import Plan
+from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.process_group.driver import RealTimeDriver
+from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.lifeline import answer
+from rbxcompose.scheduler import Scheduler
+
+TRIES = 20  # ports from `bus.port` on
+HANG = 2.0  # [s] without a turn of the loop after which the process ends itself
+
+
+class Router:
+    """Listens on the robot's port, or the next free one, until the supervisor says so or has gone; answers probes."""
+
+    def __init__(self, plan: Plan, clock: MonotonicClock, channel: say.Channel) -> None:
+        self.is_over = False
+        self._plan, self._clock, self._channel = plan, clock, channel
+        self._inbox = Inbox()
+        self._transport: ZenohTransport | None = None
+
+    def run(self) -> None:
+        """Run until it is over."""
+        signal.signal(signal.SIGTERM, _end)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGTERM])
+        RealTimeDriver(Scheduler(), self._clock, self._inbox, self._channel, self).run()
+        if self._transport is not None:
+            self._transport.close()
+
+    def handle(self, message: say.Message) -> None:
+        """Open the router, or end."""
+        match message:
+            case say.Configure(endpoint):
+                self._open(endpoint)
+            case say.Shutdown():
+                self.is_over = True
+            case _:
+                raise RuntimeError(f"not a message for a router: {message}")
+
+    def orphaned(self) -> None:
+        """End: the supervisor has gone."""
+        self.is_over = True
+
+    def beat(self) -> None:
+        """Tell the supervisor, and the watchdog, that the loop turns."""
+        faulthandler.dump_traceback_later(HANG, exit=True)
+        self._channel.flush()
+        if not self._channel.is_behind:
+            self._channel.send(say.Alive(self._clock.now()))
+
+    def settle(self) -> None:
+        """Do nothing: a router has nothing to bring to rest."""
+
+    def _open(self, endpoint: str | None) -> None:
+        """Open a session, at `endpoint` if the others have been told of one."""
+        first = self._plan.bus.port
+        ports = range(first, first + TRIES) if endpoint is None else [int(endpoint.rpartition(":")[2])]
+        for port in ports:
+            try:
+                session = open_router(port)
+            except OSError:
+                continue  # taken: perhaps by another robot
+            self._transport = ZenohTransport(session, self._inbox.put)
+            self._transport.serve(probe_key(self._plan.robot), answer)
+            self._channel.send(say.Configured(f"tcp/127.0.0.1:{port}"))
+            return
+        reason = f"no port is free for the router, from {ports[0]} to {ports[-1]}"
+        if endpoint is not None:
+            raise OSError(reason)  # another try may find it free again
+        self._channel.send(say.Failed("", reason))
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    os._exit(0)

@@ -1,0 +1,156 @@
+"""What another plan changes in a running robot, decided before anything is touched. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from rbxcompose.config import HIDDEN, Config, Live, Secret
+from rbxcompose.plan.diff import WHOLE, Change, difference
+from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.runtime.supervision.blocking import is_commanding
+
+WORLD = "world"  # the process group of simulated truth, which cannot come back as it was
+DOWN_AND_UP = "needs 'down' and 'up'"
+
+_TAKEN_OVER = ("starts_after", "restart", "log")  # options that nothing has to be restarted for
+_OPTIONS = ("type", "process", *_TAKEN_OVER)
+
+
+class Fate(StrEnum):
+    """What becomes of a component."""
+
+    KEPT = "kept"
+    LIVE = "changed live"
+    RESTARTED = "restarted"
+    ADDED = "added"
+    REMOVED = "removed"
+
+
+@dataclass(frozen=True, slots=True)
+class Fated:
+    """A component, what becomes of it, and why."""
+
+    instance: Instance  # as it will be; of a removed one as it was
+    fate: Fate
+    reasons: tuple[Change, ...] = ()
+
+    @property
+    def stops(self) -> bool:
+        """Tell whether it is stopped."""
+        return self.fate in (Fate.RESTARTED, Fate.REMOVED)
+
+    @property
+    def starts(self) -> bool:
+        """Tell whether it is started."""
+        return self.fate in (Fate.RESTARTED, Fate.ADDED)
+
+
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """What leads from one plan to another; `fated` in start order, what is removed last."""
+
+    before: Plan
+    after: Plan
+    fated: tuple[Fated, ...]
+    impossible: tuple[str, ...] = ()  # why it cannot be done while the robot is up, in words
+
+    @property
+    def is_empty(self) -> bool:
+        """Tell whether the plans do the same."""
+        return not self.impossible and all(one.fate is Fate.KEPT for one in self.fated)
+
+    def names(self, fate: Fate) -> list[str]:
+        """Return the components of one fate."""
+        return [one.instance.name for one in self.fated if one.fate is fate]
+
+    @property
+    def starting(self) -> frozenset[str]:
+        """Return the components that are started, once more or for the first time."""
+        return frozenset(one.instance.name for one in self.fated if one.starts)
+
+    @property
+    def stopping(self) -> frozenset[str]:
+        """Return the components that are stopped, for good or to be started again."""
+        return frozenset(one.instance.name for one in self.fated if one.stops)
+
+    def unsafe(self, moves: Collection[str], runs: Mapping[str, str]) -> str:
+        """Return why it cannot be done just now, or nothing if it can.
+
+        `moves` are words for what moves the robot or is about to, `runs` what components are at that a restart would
+        cut off. `Live` settings are made to be changed while the robot moves.
+        """
+        cut = next((name for name in runs if name in self.stopping), None)
+        if cut is not None:
+            return f"{runs[cut]}, and '{cut}' would begin anew: 'rbxcompose mission pause' first, or wait for its end"
+        if not moves or not (commanding := self.commanding):
+            return ""
+        return (
+            f"{next(iter(moves))}, and '{commanding[0]}' is on the path of its commands: "
+            "'rbxcompose stop' first, or 'rbxcompose mission pause' and wait until the robot is at rest"
+        )
+
+    @property
+    def commanding(self) -> list[str]:
+        """Return the components on the path of commands that are stopped or started."""
+        old = {one.name: one for one in self.before.instances}
+        touched = (one.instance for one in self.fated if one.stops or one.starts)
+        return [one.name for one in touched if is_commanding(one) or (one.name in old and is_commanding(old[one.name]))]
+
+
+def changes(before: Plan, after: Plan, failed: Collection[str] = ()) -> Changes:
+    """Return what leads from `before`, which runs, to `after`; what has `failed` is tried again."""
+    found = difference(before, after)
+    old = {one.name: one for one in before.instances}
+    fated = [_fated(old.get(one.name), one, found.changed.get(one.name, ()), failed) for one in after.instances]
+    fated += [Fated(one, Fate.REMOVED) for one in found.removed]
+    return Changes(before, after, tuple(fated), tuple(_impossible(old, fated, found.plan)))
+
+
+def _fated(before: Instance | None, after: Instance, reasons: tuple[Change, ...], failed: Collection[str]) -> Fated:
+    if before is None:
+        return Fated(after, Fate.ADDED)
+    hidden = dict(_secrets(before.config, "")), dict(_secrets(after.config, ""))
+    reasons += tuple(Change(key, HIDDEN, HIDDEN) for key in hidden[1] if hidden[0].get(key) != hidden[1][key])
+    if after.name in failed and before.process != WORLD:
+        return Fated(after, Fate.RESTARTED, (*reasons, Change("state", "failed", "active")))
+    if not reasons:
+        return Fated(after, Fate.KEPT)
+    is_live = all(_is_live(after, change.key) for change in reasons)
+    return Fated(after, Fate.LIVE if is_live else Fate.RESTARTED, reasons)
+
+
+def _is_live(one: Instance, key: str) -> bool:
+    head = key.partition(".")[0]
+    if head in _OPTIONS:
+        return head in _TAKEN_OVER
+    field = type(one.config).model_fields.get(head)
+    return field is not None and any(isinstance(mark, Live) for mark in field.metadata)
+
+
+def _secrets(value: object, path: str) -> Iterator[tuple[str, Secret]]:
+    match value:
+        case Secret():
+            yield path, value
+        case Config():
+            for name in type(value).model_fields:
+                yield from _secrets(getattr(value, name), f"{path}.{name}" if path else name)
+        case Mapping():
+            for name, each in value.items():
+                yield from _secrets(each, f"{path}.{name}")
+        case tuple() | list():
+            for index, each in enumerate(value):
+                yield from _secrets(each, f"{path}.{index}")
+
+
+def _impossible(old: Mapping[str, Instance], fated: list[Fated], plan: tuple[Change, ...]) -> Iterator[str]:
+    for change in plan:
+        if change.key.partition(".")[0] in WHOLE:
+            yield f"{change} concerns the whole robot: it {DOWN_AND_UP}"
+    for one in fated:
+        name = one.instance.name
+        processes = {one.instance.process, old[name].process} if name in old else set()
+        if one.stops and WORLD in processes:
+            because = f" ({one.reasons[0]})" if one.reasons else ""
+            yield f"'{name}' holds simulated truth, which would begin anew{because}: it {DOWN_AND_UP}"

@@ -1,0 +1,161 @@
+"""A change of a running robot, carried out step by step. Pure: the conductor leads it and hears how it went.
+
+What stops is retired in reverse start order; processes that hold nothing any more end; then the new plan holds: new
+processes are forked, new components configured and, as at the start of the robot, activated in start order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from itertools import groupby
+
+from rbxcompose.plan.dump import dump
+from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.supervision.changes import Changes, Fate
+from rbxcompose.runtime.supervision.members import Effects, Member
+
+LONGEST = 20.0  # [s] until all that is new must be active
+
+Done = Callable[[str, bool], None]  # a text, and whether it was refused, all of it or in part
+
+
+def text_of(plan: Plan, instances: Iterable[Instance]) -> str:
+    """Return what a process has to know of a plan: these instances, with their secrets."""
+    return dump(replace(plan, instances=tuple(instances)), reveals_secrets=True)
+
+
+class Changing:
+    """Carries out changes; `switch` is called when all that stops has stopped, and lets the new plan hold."""
+
+    def __init__(
+        self,
+        changes: Changes,
+        members: dict[str, Member],
+        effects: Effects,
+        switch: Callable[[Changes], None],
+        fork: Callable[[str], None],
+        done: Done,
+    ) -> None:
+        self.changes = changes
+        self.is_over = False
+        self.failures: dict[str, str] = {}  # by component, why it does not run as it should
+        self.refused: set[str] = set()  # components that did not take their new settings
+        self._members, self._effects, self._switch, self._fork, self._done = members, effects, switch, fork, done
+        old = changes.before.instances
+        stopping = [one for one in reversed(old) if one.name in changes.stopping]
+        self._retiring = [
+            (process, [one.name for one in run]) for process, run in groupby(stopping, key=lambda one: one.process)
+        ]
+        self._ending = [one for one in reversed(changes.before.groups) if one not in changes.after.groups]
+        self._waited_for = ""  # a process whose answer is to come
+        self._has_switched = False
+        self._setting: set[str] = set()  # processes that set what may change live
+
+    def proceed(self) -> None:
+        """Do the next step."""
+        while not self._has_switched and not self._waited_for:
+            if self._retiring:
+                process, names = self._retiring.pop(0)
+                self._send(process, say.Retire(names))
+            elif self._ending:
+                process = self._ending.pop(0)
+                self._members[process].is_closing = True
+                self._send(process, say.Shutdown())
+            else:
+                self._has_switched = True
+                self._switch(self.changes)
+                self._prepare()
+                self._set_live()
+
+    def _send(self, process: str, order: say.Order) -> None:
+        if self._members[process].is_there:
+            self._waited_for = process
+            self._effects.send(process, order)
+
+    def _prepare(self) -> None:
+        """Have all that is new configured, in processes that are there or in new ones."""
+        after, members = self.changes.after, self._members
+        for group in self.changes.before.groups:
+            if group not in after.groups:
+                del members[group]
+        for group in after.groups:
+            mine = [one for one in after.of_group(group) if one.name in self.changes.starting]
+            member = members.pop(group) if group in members else Member(group)
+            members[group] = member  # in start order, as those that were there from the start
+            member.requested -= self.changes.starting
+            if not member.is_there and (member.is_given_up or group not in self.changes.before.groups):
+                member.is_given_up = member.is_given_up and not mine
+                if not member.is_given_up:
+                    self._fork(group)
+            elif mine and member.is_there:
+                member.is_configured = False  # until it has answered
+                self._effects.send(group, say.Prepare(text_of(after, mine)))
+
+    def _set_live(self) -> None:
+        live = [one for one in self.changes.fated if one.fate is Fate.LIVE]
+        for process in dict.fromkeys(one.instance.process for one in live):
+            mine = [one for one in live if one.instance.process == process]
+            keys = {one.instance.name: [change.key for change in one.reasons] for one in mine}
+            text = text_of(self.changes.after, (one.instance for one in mine))
+            if self._members[process].is_there:
+                self._setting.add(process)
+                self._effects.send(process, say.Reconfigure(text, keys))
+
+    # What comes back
+
+    def retired(self, process: str) -> None:
+        """Go on: a process has retired what it was to, or has gone."""
+        if self._waited_for == process:
+            self._waited_for = ""
+            self.proceed()
+
+    def exited(self, process: str) -> None:
+        """Go on without a process."""
+        self._setting.discard(process)
+        self.retired(process)
+
+    def reconfigured(self, process: str, refused: Mapping[str, str]) -> None:
+        """Take what became of settings that change live."""
+        self._setting.discard(process)
+        self.refused |= refused.keys()
+        self.failures.update(refused)
+
+    def failed(self, name: str, message: str) -> bool:
+        """Take the failure of a component for good; tell whether it is one that this change has started."""
+        if name in self.changes.starting:
+            self.failures[name] = message
+        return name in self.changes.starting
+
+    # The end
+
+    def look(self, states: Mapping[str, tuple[str, int]]) -> None:
+        """End it once all is as it is going to be."""
+        if self.is_over or not self._has_switched or self._setting:
+            return
+        if all(states[name][0] in ("active", "failed") for name in self.changes.starting):
+            self._end("; ".join(self.failures.values()))
+
+    def time_is_up(self, states: Mapping[str, tuple[str, int]]) -> None:
+        """End it, as far as it has come."""
+        late = sorted(name for name in self.changes.starting if states.get(name, ("",))[0] != "active")
+        self.cut_off(f"after {LONGEST:g} s not active: {', '.join(late)}")
+
+    def cut_off(self, reason: str) -> None:
+        """End it before its time."""
+        if not self.is_over:
+            self._end(reason)
+
+    def _end(self, trouble: str) -> None:
+        self.is_over = True
+        if trouble:
+            self._done(f"only in part: {trouble}; 'rbxcompose ps' shows what runs", True)
+        else:
+            self._done(summary(self.changes), False)
+
+
+def summary(changes: Changes) -> str:
+    """Return in one line what becomes of which components."""
+    named = ((fate, changes.names(fate)) for fate in Fate if fate is not Fate.KEPT)
+    return ", ".join(f"{' '.join(names)} {fate}" for fate, names in named if names) or "nothing to do"

@@ -1,0 +1,77 @@
+"""Going down: brake, wait for rest, shut the processes down in reverse order. Pure: the conductor leads it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.supervision.members import Effects, Member, Phase
+
+REST_BOUND = 1.0  # [s] to come to rest
+DOWN_BOUND = 1.9  # [s] for all of going down; what is left then is killed
+
+
+class Closing:
+    """Brings processes to rest and ends them one by one; `phase` tells how far it is."""
+
+    def __init__(self, members: Mapping[str, Member], effects: Effects, router: str | None) -> None:
+        self.phase = Phase.BRAKING
+        self._members, self._effects, self._router = members, effects, router
+        self._left: list[str] = []  # processes still to be shut down, the next one last
+
+    def brake(self) -> None:
+        """Bring to rest whatever may move."""
+        for member in self._there():
+            if member.is_configured and member.name != self._router:
+                self._effects.send(member.name, say.Brake())
+            elif member.name != self._router:
+                self._effects.end(member.name)  # it cannot listen yet; what of it moves brakes before it ends
+        self.close_when_at_rest()
+
+    def hurry(self) -> None:
+        """End at once everything that is left."""
+        for member in self._there():
+            self._effects.kill(member.name)
+
+    def exited(self) -> None:
+        """Go on after the end of a process."""
+        self.close_when_at_rest()
+        self._close_next()
+
+    def close_when_at_rest(self) -> None:
+        """Shut down, if nothing moves any more."""
+        moving = [one for one in self._there() if one.name != self._router and not one.is_at_rest]
+        if self.phase is Phase.BRAKING and not moving:
+            self.close()
+
+    def close(self) -> None:
+        """Shut down, whatever moves."""
+        if self.phase is Phase.BRAKING:
+            self.phase = Phase.CLOSING
+            self._left = list(self._members)  # the router first, so that it ends last
+            self._close_next()
+
+    def _there(self) -> list[Member]:
+        return [member for member in self._members.values() if member.is_there]
+
+    def _close_next(self) -> None:
+        """Shut down the next process once the one before has ended."""
+        if self.phase is not Phase.CLOSING:
+            return
+        if self._left and self._members[self._left[-1]].is_there is False:
+            self._left.pop()
+            self._close_next()
+        elif self._left:
+            self._shutdown_once(self._left[-1])
+        else:
+            self.phase = Phase.ENDED
+
+    def _shutdown_once(self, name: str) -> None:
+        member = self._members[name]
+        if member.is_closing:
+            return
+        member.is_closing = True
+        if member.is_configured:
+            self._effects.send(name, say.Shutdown())
+        else:
+            self._effects.end(name)

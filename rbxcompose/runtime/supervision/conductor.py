@@ -1,0 +1,390 @@
+"""What the supervisor decides, pure: which process is started, told or ended when, and how the robot ends.
+
+The shell around it (`supervisor.py`) carries out the `Effects` and tells what happened; time comes from a scheduler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from itertools import takewhile
+from typing import Any
+
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plan.model import Plan
+from rbxcompose.robot_events import MissionOver
+from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.supervision.blocking import blocked_by, blocked_text, is_commanding
+from rbxcompose.runtime.supervision.changes import WORLD, Changes
+from rbxcompose.runtime.supervision.changing import LONGEST, Changing, Done, text_of
+from rbxcompose.runtime.supervision.closing import DOWN_BOUND, REST_BOUND, Closing
+from rbxcompose.runtime.supervision.members import Effects, Member, Phase
+from rbxcompose.runtime.supervision.silence import LOOK, Silence
+from rbxcompose.scheduler import Scheduler
+
+FINE, MISSION_FAILED, ROBOT_FAILED, INTERRUPTED = 0, 3, 4, 130
+
+_OWNER = "supervisor"
+
+
+class Conductor:
+    """Leads the processes of a robot from the first fork to the last exit."""
+
+    def __init__(
+        self, plan: Plan, options: RunOptions, scheduler: Scheduler, effects: Effects, *, router: str | None
+    ) -> None:
+        """Take `router`: the name of the router's process, or None if an existing router serves."""
+        self.is_stopped = False
+        self.exit_code = FINE
+        self.reason = ""  # why it went down
+        self.endpoint = plan.bus.router
+        self.facts: dict[str, dict[str, str]] = {}
+        self.time = 0.0  # [s] of robot time, as far as known
+        self.states: dict[str, tuple[str, int]] = {one.name: ("unconfigured", 0) for one in plan.instances}
+        self.is_real_time = not options.is_stepped and not plan.follows_clock
+        self.blocked: dict[str, str] = {}  # who cannot do its work -> who has failed
+        self.plan = plan
+        self.generation = 0  # of the plan: how often it was changed
+        self._changing: Changing | None = None
+        self._repeated: dict[str, list[dict[str, Any]]] = {}  # what components are told again after a restart
+        self._options, self._router = options, router
+        self._scheduler, self._effects = scheduler, effects
+        names = [*([router] if router else []), *plan.groups]
+        self.members = {name: Member(name) for name in names}
+        self._is_running = False  # all has been active
+        self._silence = Silence(effects, self._tell_lost, scheduler.now)
+        self._closing: Closing | None = None  # from the beginning of the end on
+
+    @property
+    def phase(self) -> Phase:
+        """Return where the robot as a whole stands."""
+        if self._closing:
+            return self._closing.phase
+        return Phase.RUNNING if self._is_running else Phase.STARTING
+
+    # The beginning
+
+    def begin(self) -> None:
+        """Start all processes."""
+        for name in self.members:
+            self._fork(name)
+        if not self._options.is_stepped:
+            self._scheduler.every(LOOK, _OWNER, lambda dt: self._look_for_silence())
+
+    def _fork(self, name: str) -> None:
+        member = self.members[name]
+        is_restart = member.restarts > 0
+        member.forked(self._scheduler.now)
+        member.is_stopped = self.is_stopped
+        self._effects.fork(name, is_restart=is_restart, is_stopped=self.is_stopped)
+        if self.generation and name != self._router:  # the pre-fork parent knows the first plan only
+            self._effects.send(name, say.Adopt(text_of(self.plan, self.plan.of_group(name))))
+        if name == self._router or self.endpoint is not None:
+            self._effects.send(name, say.Configure(self.endpoint, self.time))
+
+    def _proceed(self) -> None:
+        """Do the next step of starting, for the robot as a whole or for processes that came again."""
+        if self.is_going_down or not self._all_configured():
+            return
+        waiting = [one for one in self.plan.instances if self.states[one.name][0] not in ("active", "failed")]
+        fresh = [one for one in waiting if one.name not in self.members[one.process].requested]
+        if self.phase is Phase.STARTING and waiting[:1] != fresh[:1]:
+            return  # the answer of the first is to come, or it is being restarted in place
+        if fresh:
+            group = fresh[0].process
+            self._activate(group, [one.name for one in takewhile(lambda one: one.process == group, fresh)])
+            return
+        if self.phase is Phase.STARTING:
+            self._is_running = True
+            self._effects.is_up()  # before anything that starts can tell of itself
+            if self._options.duration is not None and self.is_real_time:
+                self._scheduler.at(self._options.duration, _OWNER, lambda: self.go_down(FINE, "the time is up"))
+        for group in self.plan.groups:
+            self._start(self.members[group])
+        if self._changing:
+            self._changing.look(self.states)
+
+    def _all_configured(self) -> bool:
+        members = (self.members[group] for group in self.plan.groups)
+        return all(member.is_configured or member.is_given_up for member in members)
+
+    def _activate(self, group: str, names: list[str]) -> None:
+        self.members[group].requested.update(names)
+        self._effects.send(group, say.Activate(names))
+
+    def _start(self, member: Member) -> None:
+        if not member.is_started and not member.is_given_up:
+            member.is_started = True
+            self._effects.send(member.name, say.Start())
+            again = [one.name for one in self.plan.of_group(member.name) if member.restarts]
+            for one, request in ((name, request) for name in again for request in self._repeated.get(name, ())):
+                self._effects.send(member.name, say.Ask(0, one, request))  # nobody waits for the answer
+
+    # What processes say
+
+    def heard(self, name: str, message: say.Word) -> None:
+        """Take a message of a process."""
+        member = self.members[name]
+        member.last_word = self._scheduler.now
+        match message:
+            case say.Configured(endpoint):
+                self._configured(member, endpoint)
+            case say.States(states):
+                self._are(states)
+                self._proceed()
+            case say.Failed(instance, text):
+                self._failed(instance, text)
+            case say.Repeated(instance, requests):
+                self._repeated[instance] = requests
+            case MissionOver():
+                self._mission_over(message)
+            case say.TimeIsUp():
+                self.go_down(FINE, "the time is up")
+            case say.AtRest():
+                member.is_at_rest = True
+                if self._closing:
+                    self._closing.close_when_at_rest()
+            case say.Answered(number, answer):
+                self._effects.answer(number, answer)
+            case say.Refusal(number, reason):
+                self._effects.refuse(number, reason)
+            case say.Summary(time, facts):
+                self.time = max(self.time, time)
+                self.facts.update(facts)
+            case say.Retired() if self._changing:
+                self._changing.retired(name)
+                self._proceed()
+            case say.Reconfigured(refused) if self._changing:
+                self._reconfigured(self._changing, name, refused)
+            case say.Alive(time, moves, runs):
+                self.time = max(self.time, time)
+                member.moves, member.runs = moves, runs
+                self._alive(member)
+                self._look_at_duration()
+
+    def _configured(self, member: Member, endpoint: str | None) -> None:
+        member.is_configured = True
+        if member.is_stopped is not self.is_stopped:  # that changed after it was forked
+            self._tell_stop(member)
+        self._tell_blocked(member)
+        if member.name == self._router and self.endpoint is None:
+            self.endpoint = endpoint
+            for group in self.plan.groups:
+                if self.members[group].is_there:
+                    self._effects.send(group, say.Configure(endpoint))
+        self._proceed()
+
+    def _mission_over(self, over: MissionOver) -> None:
+        if self._options.is_detached or over.mission != self.plan.start:
+            return
+        because = f": {over.message}" if over.message else ""
+        exit_code = FINE if over.outcome == "success" else MISSION_FAILED
+        self.go_down(exit_code, f"mission {over.mission}: {over.outcome}{because}")
+
+    # Faults
+
+    def exited(self, name: str, how: str, detail: str = "") -> None:
+        """Take the end of a process: `how` it ended in words, and what it printed."""
+        member = self.members[name]
+        member.is_there = member.is_configured = False
+        member.moves, member.runs = (), {}
+        if self._closing:
+            self._closing.exited()
+            return
+        if member.is_closing:  # it holds nothing any more
+            self._went_on_without(name)
+            return
+        lost = self.plan.of_group(name)
+        is_for_good = bool(lost) and all(one.restart.when == "never" for one in lost)
+        self._are({one.name: ("failed" if is_for_good else "unconfigured", 0) for one in lost})
+        delay = member.policy.after_failure(self._scheduler.now)
+        if name == WORLD:
+            self.go_down(ROBOT_FAILED, f"process '{name}' {how}, and simulated truth with it", Level.ERROR, detail)
+        elif is_for_good:
+            self._give_up(member, how, detail)
+        elif delay is None:
+            self.go_down(ROBOT_FAILED, f"process '{name}' {how}, too often to go on", Level.ERROR, detail)
+        else:
+            self._effects.log(Level.ERROR, f"process '{name}' {how}; it is started again", detail)
+            self._tell_lost(member, how)
+            member.restarts += 1
+            self._scheduler.at(self._scheduler.now + delay, _OWNER, lambda: self._fork_again(member))
+        self._went_on_without(name)
+
+    def _give_up(self, member: Member, how: str, detail: str) -> None:
+        member.is_given_up = True
+        self._effects.log(Level.ERROR, f"process '{member.name}' {how}; nothing in it is ever restarted", detail)
+        self._tell_lost(member, how)
+        self._proceed()
+
+    def _fork_again(self, member: Member) -> None:
+        is_wanted = self.members.get(member.name) is member and not member.is_there
+        if is_wanted and not self.is_going_down:
+            self._fork(member.name)
+
+    def _went_on_without(self, name: str) -> None:
+        if self._changing:
+            self._changing.exited(name)
+            self._proceed()
+
+    def _failed(self, name: str, message: str) -> None:
+        """Take a component that failed too often: the robot ends, unless it was doing without it a moment ago."""
+        if self._changing and self._changing.failed(name, message):
+            self._effects.log(Level.ERROR, message)
+            self._are({name: ("failed", self.states[name][1])})
+            self._proceed()
+        else:
+            self.go_down(ROBOT_FAILED, message, Level.ERROR)
+
+    def _are(self, states: Mapping[str, tuple[str, int]]) -> None:
+        """Take new states; who waits for what has failed hears of it, and whom it commanded is held."""
+        states = {name: state for name, state in states.items() if name in self.states}
+        new = {name for name, (state, _) in states.items() if state == "failed" and self.states[name][0] != "failed"}
+        self.states.update(states)
+        self._effects.states_changed()
+        if self._options.is_stepped:  # there it could only be heard at another instant in each run
+            return
+        self._look_who_is_blocked()
+        commanding = [one.name for one in self.plan.instances if one.name in new and is_commanding(one)]
+        if commanding and not self.is_stopped and self.phase is Phase.RUNNING:
+            text = f"'{commanding[0]}' failed on the path of commands: all that moves is held until 'release'"
+            self._effects.log(Level.ERROR, text)
+            self.stop()
+
+    def _look_who_is_blocked(self) -> None:
+        before, failed = self.blocked, {name for name, (state, _) in self.states.items() if state == "failed"}
+        self.blocked = blocked_by(self.plan, failed)
+        for name in self.blocked.keys() - before.keys():
+            self._effects.log(Level.WARN, f"'{name}' {blocked_text(self.blocked, name)}")
+        touched = {name for name in {*before, *self.blocked} if before.get(name) != self.blocked.get(name)}
+        for group in dict.fromkeys(one.process for one in self.plan.instances if one.name in touched):
+            if self.members[group].is_configured:
+                self._tell_blocked(self.members[group], is_news=True)
+
+    def _tell_blocked(self, member: Member, *, is_news: bool = False) -> None:
+        names = [one.name for one in self.plan.of_group(member.name) if one.name in self.blocked]
+        if names or is_news:
+            self._effects.send(member.name, say.Blocked({name: blocked_text(self.blocked, name) for name in names}))
+
+    def _tell_lost(self, member: Member, cause: str) -> None:
+        names = [one.name for one in self.plan.of_group(member.name)]
+        if names and not member.is_told_lost:
+            member.is_told_lost = True
+            self._to_configured(say.Lost(names, f"process '{member.name}' {cause}"))
+
+    def _look_for_silence(self) -> None:
+        now = self._scheduler.now
+        is_late = self._silence.was_held_up(now)
+        for member in self.members.values():
+            if is_late:
+                member.last_word = now
+            elif member.is_there and not self.is_going_down:
+                self._silence.look(member, now)
+
+    def _alive(self, member: Member) -> None:
+        if member.is_told_lost and member.is_configured:
+            member.is_told_lost = False
+            self._effects.log(Level.WARN, f"process '{member.name}' answers again")
+
+    def _look_at_duration(self) -> None:
+        """End the run by a time that is told from outside; on a stepped clock the process itself does."""
+        duration = self._options.duration
+        if self.plan.follows_clock and duration is not None and self.time >= duration:
+            self.go_down(FINE, "the time is up")
+
+    # What people want
+
+    def stop(self) -> None:
+        """Hold everything that moves until `release`."""
+        self._set_stopped(True)
+
+    def release(self) -> None:
+        """Allow motion again."""
+        self._set_stopped(False)
+
+    def _set_stopped(self, is_stopped: bool) -> None:
+        self.is_stopped = is_stopped
+        for group in self.plan.groups:
+            if self.members[group].is_configured:
+                self._tell_stop(self.members[group])
+
+    def _tell_stop(self, member: Member) -> None:
+        member.is_stopped = self.is_stopped
+        self._effects.send(member.name, say.Stop() if self.is_stopped else say.Release())
+
+    def _to_configured(self, message: say.Order) -> None:
+        for group in self.plan.groups:
+            if self.members[group].is_configured:
+                self._effects.send(group, message)
+
+    # Another plan
+
+    def why_not(self, changes: Changes) -> str:
+        """Return why changes cannot be made now, or nothing if they can."""
+        if self._options.is_stepped:
+            return "it runs on a stepped clock, where a change would end what makes two runs the same"
+        if self.phase is not Phase.RUNNING:
+            return "it is not up yet" if self.phase is Phase.STARTING else "it is going down"
+        if self._changing:
+            return "it is being changed already"
+        if changes.impossible:
+            return changes.impossible[0]
+        moves = [text for member in self.members.values() for text in member.moves]
+        runs = {name: text for member in self.members.values() for name, text in member.runs.items()}
+        return changes.unsafe(moves, runs)
+
+    def change(self, changes: Changes, done: Done) -> None:
+        """Carry out changes that nothing speaks against; `done` is told how it went."""
+
+        def end(text: str, is_refused: bool) -> None:
+            self._changing = None
+            self._effects.states_changed()
+            done(text, is_refused)
+
+        changing = self._changing = Changing(changes, self.members, self._effects, self._switch, self._fork, end)
+        self._after(LONGEST, lambda: changing.time_is_up(self.states))
+        changing.proceed()
+        self._proceed()
+
+    def _switch(self, changes: Changes) -> None:
+        """Let another plan hold, now that all that stops has stopped."""
+        self.plan, self.generation = changes.after, self.generation + 1
+        fresh = {one.name: ("unconfigured", 0) for one in self.plan.instances if one.name in changes.starting}
+        self.states = {one.name: fresh.get(one.name) or self.states[one.name] for one in self.plan.instances}
+
+    def _reconfigured(self, changing: Changing, process: str, refused: Mapping[str, str]) -> None:
+        changing.reconfigured(process, refused)
+        old = {one.name: one for one in changing.changes.before.instances}
+        kept = tuple(old[one.name] if one.name in refused else one for one in self.plan.instances)
+        self.plan = replace(self.plan, instances=kept)  # what the next change is compared with
+        self._proceed()
+
+    # Going down
+
+    @property
+    def is_going_down(self) -> bool:
+        """Tell whether the end has begun."""
+        return self._closing is not None
+
+    def go_down(self, exit_code: int, reason: str, level: Level = Level.OK, detail: str = "") -> None:
+        """Brake, wait for rest, shut down in reverse order, end what is left; the first reason counts."""
+        if self.is_going_down:
+            return
+        self._closing = closing = Closing(self.members, self._effects, self._router)
+        self.exit_code, self.reason = exit_code, reason
+        if self._changing:
+            self._changing.cut_off(f"the robot goes down: {reason}")
+        if level > Level.OK:
+            self._effects.log(level, f"{reason}; the robot goes down", detail)
+        self._after(REST_BOUND, closing.close)
+        self._after(DOWN_BOUND, closing.hurry)
+        closing.brake()
+
+    def hurry(self) -> None:
+        """End at once everything that is left of a robot that goes down."""
+        if self._closing:
+            self._closing.hurry()
+
+    def _after(self, seconds: float, callback: Callable[[], None]) -> None:
+        self._scheduler.at(self._scheduler.now + seconds, _OWNER, callback)

@@ -1,0 +1,218 @@
+"""Starting a supervisor as a process of its own, and hearing from it how the start and the end went."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from types import FrameType
+from typing import NoReturn, TextIO, get_args
+
+import setproctitle
+
+from rbxcompose.bus import shared_memory
+from rbxcompose.clock import MonotonicClock
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plan.model import Plan
+from rbxcompose.runtime.faults import explain
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder
+from rbxcompose.runtime.log import start_new
+from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.processes import end_with
+from rbxcompose.runtime.records import Record
+from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
+from rbxcompose.runtime.supervision.leftovers import end_leftovers
+from rbxcompose.runtime.supervision.prefork import Launch
+from rbxcompose.runtime.supervision.supervisor import Supervisor
+from rbxcompose.typed_json import Family
+
+FINDINGS = 1  # exit code: nothing was started
+
+_ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@dataclass(frozen=True, slots=True)
+class Begun:
+    """The log of this run has begun."""
+
+
+@dataclass(frozen=True, slots=True)
+class Up:
+    """All components are active; `seconds` of real time after the start."""
+
+    components: int
+    processes: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class AlreadyUp:
+    """Another supervisor runs this robot."""
+
+    pid: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Unsafe:
+    """The robot's folder cannot be trusted, or not be written to."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class RunEnded:
+    """The robot is down."""
+
+    exit_code: int
+    reason: str
+    time: float  # [s] of robot time
+    facts: dict[str, dict[str, str]] = field(default_factory=dict)
+
+
+Report = Begun | Up | AlreadyUp | Unsafe | RunEnded
+_REPORTS: Family[Report] = Family(get_args(Report))
+
+
+class Started:
+    """A supervisor that was started, a child of this process; signals that would end us are passed on to it."""
+
+    def __init__(self, pid: int, reports: int) -> None:
+        self.pid = pid
+        self._reports = reports
+        self._received = b""
+        self._previous = {number: signal.signal(number, self._pass_on) for number in _ENDINGS}
+
+    def wait_for_report(self, seconds: float | None) -> Report | None:
+        """Return its next report, or None if there is none within `seconds` [s].
+
+        Raises:
+            EOFError: if it has ended.
+        """
+        while b"\n" not in self._received:
+            if not select.select([self._reports], [], [], seconds)[0]:
+                return None
+            chunk = os.read(self._reports, 65536)
+            if not chunk:
+                raise EOFError("the supervisor has ended")
+            self._received += chunk
+        line, _, self._received = self._received.partition(b"\n")
+        return _REPORTS.from_line(line)
+
+    def let_go(self) -> None:
+        """Leave it to itself."""
+        os.close(self._reports)
+        for number, handler in self._previous.items():
+            signal.signal(number, handler)
+
+    def wait(self) -> int:
+        """Wait for its end and return its exit code, negative if a signal has ended it."""
+        self.let_go()  # before its pid can be given to someone else
+        return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+
+    def _pass_on(self, number: int, frame: FrameType | None) -> None:
+        os.kill(self.pid, number)  # it is not waited for yet, so the pid is its own
+
+
+def start_supervisor(plan: Plan, options: RunOptions) -> Started:
+    """Fork the supervisor of a robot. Call it from the main thread, before any other thread exists.
+
+    If the run is not detached, the supervisor brings the robot to rest and ends when this process ends.
+    """
+    clock = MonotonicClock()
+    ours, theirs = os.pipe2(os.O_CLOEXEC)
+    caller = os.getpid()
+    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDINGS)  # an interrupt waits until its handler stands
+    pid = os.fork()
+    if pid == 0:
+        os.close(ours)
+        _become_supervisor(plan, options, clock, theirs, caller)
+    os.close(theirs)
+    started = Started(pid, ours)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDINGS)
+    return started
+
+
+def _become_supervisor(plan: Plan, options: RunOptions, clock: MonotonicClock, pipe: int, caller: int) -> NoReturn:
+    exit_code = ROBOT_FAILED
+    try:
+        os.setsid()  # signals of the terminal reach the caller, who passes them on
+        if not options.is_detached:
+            end_with(caller, signal.SIGTERM)
+        setproctitle.setproctitle(f"rbxcompose {plan.robot}: supervisor")
+        _leave_the_terminal()
+        with os.fdopen(pipe, "w", buffering=1) as reports:
+            exit_code = _supervise(plan, options, clock, reports)
+    finally:
+        os._exit(exit_code)
+
+
+def _leave_the_terminal() -> None:
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1, 2):
+        os.dup2(nothing, descriptor)
+    os.close(nothing)
+
+
+def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: TextIO) -> int:
+    folder = RobotFolder.of(plan.robot)
+    try:
+        folder.make()
+        if folder.lock() is None:  # else it is ours until this process ends
+            _report(reports, AlreadyUp(_supervisor_of(folder)))
+            return FINDINGS
+        told = [*_not_brought_down(folder), *end_leftovers(folder)]
+        folder.sweep()
+        log = start_new(folder.path)
+    except OSError as error:  # it is somebody else's, the disk is full
+        _report(reports, Unsafe(str(error)))
+        return FINDINGS
+    _report(reports, Begun())
+    for text in told:
+        log.write(Record(0.0, Level.WARN, "robot", text))
+    ended = _run(Launch(plan, options, log, folder.path, clock), folder, reports)
+    shared_memory.remove_orphans()  # of processes that were killed
+    folder.clear()
+    _report(reports, ended)
+    return ended.exit_code
+
+
+def _not_brought_down(folder: RobotFolder) -> Iterator[str]:
+    """Yield that the run before has left its state, which a supervisor that ends takes away."""
+    with contextlib.suppress(BrokenStateError):  # which is told where the leftovers are ended
+        if folder.read_state() is not None:
+            yield "the run before was not brought down, its supervisor has died: what it had left is cleared away"
+
+
+def _supervisor_of(folder: RobotFolder) -> int | None:
+    try:
+        state = folder.read_state()
+    except BrokenStateError:
+        return None
+    return state.supervisor.pid if state else None
+
+
+def _run(launch: Launch, folder: RobotFolder, reports: TextIO) -> RunEnded:
+    plan, clock = launch.plan, launch.clock
+
+    def tell_up() -> None:
+        _report(reports, Up(len(plan.instances), len(plan.groups), clock.now()))
+
+    supervisor = Supervisor(launch, folder, tell_up)
+    try:
+        supervisor.run()
+    except Exception as error:  # our own bug: nobody reads our stderr, so it goes where people look
+        text, detail = explain(error)
+        launch.log.write(Record(clock.now(), Level.ERROR, "robot", f"the supervisor failed: {text}", detail))
+        end_leftovers(folder)
+        return RunEnded(ROBOT_FAILED, f"the supervisor failed: {text}", clock.now())
+    conductor = supervisor.conductor
+    time = clock.now() if conductor.is_real_time else conductor.time
+    return RunEnded(conductor.exit_code, conductor.reason, time, conductor.facts)
+
+
+def _report(reports: TextIO, report: Report) -> None:
+    with contextlib.suppress(BrokenPipeError):  # a detached robot outlives who started it
+        reports.write(_REPORTS.to_line(report).decode())

@@ -1,0 +1,94 @@
+"""What the conductor knows of a robot's processes, and what it can do to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from typing import Protocol
+
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.faults import RestartPolicy
+
+
+class Effects(Protocol):
+    """What the conductor can do to the world."""
+
+    def fork(self, process: str, *, is_restart: bool, is_stopped: bool) -> None:
+        """Start a process."""
+        ...
+
+    def send(self, process: str, message: say.Order) -> None:
+        """Send a message to a process."""
+        ...
+
+    def end(self, process: str) -> None:
+        """Ask a process that does not listen yet to end, by SIGTERM."""
+        ...
+
+    def kill(self, process: str) -> None:
+        """End a process, by SIGKILL."""
+        ...
+
+    def is_suspended(self, process: str) -> bool:
+        """Tell whether a signal keeps a process from running."""
+        ...
+
+    def log(self, level: Level, text: str, detail: str = "") -> None:
+        """Write a record of the whole robot."""
+        ...
+
+    def is_up(self) -> None:
+        """Tell who waits that all is active."""
+        ...
+
+    def states_changed(self) -> None:
+        """Keep for later what `ps` tells, which has changed."""
+        ...
+
+    def answer(self, number: int, answer: object) -> None:
+        """Answer a request, with data."""
+        ...
+
+    def refuse(self, number: int, reason: str) -> None:
+        """Refuse a request."""
+        ...
+
+
+class Phase(Enum):
+    """Where the robot as a whole stands."""
+
+    STARTING = auto()
+    RUNNING = auto()
+    BRAKING = auto()
+    CLOSING = auto()
+    ENDED = auto()
+
+
+@dataclass
+class Member:
+    """What is known of one process."""
+
+    name: str
+    is_there: bool = False
+    is_configured: bool = False
+    is_started: bool = False
+    is_at_rest: bool = False
+    is_told_lost: bool = False
+    is_closing: bool = False
+    is_stopped: bool = False  # as it was told last
+    is_given_up: bool = False  # it has gone, and nothing in it is ever restarted
+    last_word: float = 0.0  # [s]
+    restarts: int = 0
+    moves: Sequence[str] = ()  # what moves the robot or is about to, in words
+    runs: dict[str, str] = field(default_factory=dict)  # components that a restart would cut off, and at what
+    requested: set[str] = field(default_factory=set)  # components that were told to become active
+    policy: RestartPolicy = field(default_factory=RestartPolicy)
+
+    def forked(self, now: float) -> None:
+        """Begin a new life."""
+        self.is_there, self.last_word = True, now
+        self.is_configured = self.is_started = self.is_at_rest = self.is_told_lost = False
+        self.moves, self.runs = (), {}
+        self.requested.clear()

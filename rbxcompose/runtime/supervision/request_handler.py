@@ -1,0 +1,169 @@
+"""Carries out the requests that come to the control socket, or passes them on to the component that takes them."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plan.dump import PlanTextError, load
+from rbxcompose.plan.model import Instance
+from rbxcompose.requests import Command, Refused, Request, as_data, requests
+from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.folder import RobotState
+from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
+from rbxcompose.runtime.requests import ROBOT, BringDown, ReleaseRobot, RobotStatus, StopRobot
+from rbxcompose.runtime.supervision.changes import Changes, changes
+from rbxcompose.runtime.supervision.conductor import FINE, Conductor
+from rbxcompose.sdk.registry import component_type
+from rbxcompose.typed_json import UnreadableError, name_in, to_data
+
+OWN = requests(RobotStatus, StopRobot, ReleaseRobot, ComparePlan, ApplyPlan, BringDown)
+
+
+class Supervised(Protocol):
+    """What requests can do with a supervisor; answers go by the number of the request."""
+
+    conductor: Conductor
+
+    def state(self) -> RobotState:
+        """Return what is known from outside."""
+        ...
+
+    def send(self, process: str, message: say.Order) -> None:
+        """Send a message to a process."""
+        ...
+
+    def log(self, level: Level, text: str, detail: str = "") -> None:
+        """Write a record of the whole robot."""
+        ...
+
+    def answer(self, number: int, answer: object) -> None:
+        """Answer a request, with data."""
+        ...
+
+    def refuse(self, number: int, reason: str) -> None:
+        """Refuse a request."""
+        ...
+
+
+class RequestHandler:
+    """Carries out the requests of the command line and of whoever else this user lets in."""
+
+    def __init__(self, supervisor: Supervised, *, is_stepped: bool) -> None:
+        """On a stepped clock the process group writes what came from outside, at its own time."""
+        self._supervisor, self._is_stepped = supervisor, is_stepped
+
+    def handle(self, data: object, number: int) -> None:
+        """Carry out a request; its answer comes now or later."""
+        try:
+            if name_in(data) in OWN.types:
+                self._carry_out(OWN.from_data(data), number)
+            else:
+                self._pass_on(data, number)
+        except UnreadableError as error:
+            self._supervisor.refuse(number, f"the request '{name_in(data)}' cannot be read: {error}")
+        except RecursionError:
+            self._supervisor.refuse(number, "the request is nested too deeply")
+        except Refused as refusal:
+            self._supervisor.refuse(number, str(refusal))
+
+    def _carry_out(self, request: Request[Any], number: int) -> None:
+        if not isinstance(request, RobotStatus | BringDown):
+            self._refuse_at_the_end()
+        match request:
+            case ApplyPlan():
+                self._apply(request, number)
+            case _:
+                self._supervisor.answer(number, to_data(self._answer(request)))
+
+    def _answer(self, request: Request[Any]) -> RobotState | PlanComparison | str:
+        match request:
+            case RobotStatus():
+                return self._supervisor.state()
+            case StopRobot():
+                return self._stop()
+            case ReleaseRobot():
+                return self._release()
+            case ComparePlan(plan):
+                return self._compare(plan)
+            case BringDown():
+                return self._bring_down()
+        raise TypeError(f"{request} is not answered here")
+
+    def _refuse_at_the_end(self) -> None:
+        if self._supervisor.conductor.is_going_down:
+            raise Refused("the robot is going down")
+
+    def _stop(self) -> str:
+        self._tell("stop: all that moves is held until 'release'")
+        self._supervisor.conductor.stop()
+        return "stopped; 'release' allows motion again"
+
+    def _release(self) -> str:
+        if not self._supervisor.conductor.is_stopped:
+            raise Refused("the robot is not stopped")
+        self._tell("release: motion is allowed again")
+        self._supervisor.conductor.release()
+        return "released; 'mission resume' goes on"
+
+    def _bring_down(self) -> str:
+        if not self._supervisor.conductor.is_going_down:
+            self._tell("down: the robot goes down")
+        self._supervisor.conductor.go_down(FINE, "asked to go down")
+        return "going down"
+
+    def _pass_on(self, data: object, number: int) -> None:
+        """Pass a request on to the first component that takes it; that one answers."""
+        taker = self._taker(name_in(data))
+        known = component_type(taker.type).requests()
+        request = known.from_data(data)
+        if isinstance(request, Command):
+            self._refuse_at_the_end()
+        if self._supervisor.conductor.states[taker.name][0] != "active":
+            raise Refused(f"'{taker.name}' is not active")
+        self._supervisor.send(taker.process, say.Ask(number, taker.name, as_data(request)))
+
+    def _taker(self, name: str) -> Instance:
+        abouts = {ROBOT}
+        for one in self._supervisor.conductor.plan.instances:
+            known = component_type(one.type).requests().types
+            if name in known:
+                return one
+            abouts.update(each.about for each in known.values())
+        about, dot, _ = name.partition(".")
+        if dot and about not in abouts:
+            raise Refused(f"this robot has no component of type '{about}'")
+        raise Refused(f"there is no request '{name}'" if name else "this is no request of this version of rbxcompose")
+
+    # Another plan
+
+    def _compare(self, plan: str) -> PlanComparison:
+        """Tell what another plan would change, and what speaks against it now; nothing happens."""
+        found, conductor = self._changes(plan), self._supervisor.conductor
+        why_not = "" if found.is_empty else conductor.why_not(found)
+        return PlanComparison.of(found, conductor.generation, why_not)
+
+    def _apply(self, request: ApplyPlan, number: int) -> None:
+        found, conductor = self._changes(request.plan), self._supervisor.conductor
+        if request.generation != conductor.generation:
+            raise Refused("it was changed by someone else meanwhile: look at the difference again")
+        if why_not := conductor.why_not(found):
+            raise Refused(why_not)
+        conductor.change(found, lambda text, is_refused: self._applied(number, text, is_refused=is_refused))
+
+    def _changes(self, plan: str) -> Changes:
+        conductor = self._supervisor.conductor
+        try:
+            after = load(plan)
+        except PlanTextError as error:
+            raise Refused(str(error)) from error
+        failed = [name for name, (state, _) in conductor.states.items() if state == "failed"]
+        return changes(conductor.plan, after, failed)
+
+    def _applied(self, number: int, text: str, *, is_refused: bool) -> None:
+        self._supervisor.log(Level.ERROR if is_refused else Level.OK, f"apply: {text}")
+        (self._supervisor.refuse if is_refused else self._supervisor.answer)(number, text)
+
+    def _tell(self, text: str) -> None:
+        if not self._is_stepped:
+            self._supervisor.log(Level.OK, text)

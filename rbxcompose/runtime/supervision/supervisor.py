@@ -1,0 +1,310 @@
+"""The supervisor of a robot: the shell that carries out what the conductor decides.
+
+One thread waits for channels, the pre-fork parent, the control socket and signals. It never touches the bus or the
+terminal, so that neither can keep it from bringing the robot to rest.
+"""
+
+from __future__ import annotations
+
+import os
+import selectors
+import signal
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import FrameType
+
+from rbxcompose.clock import MonotonicClock
+from rbxcompose.diagnostics.levels import Level
+from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.control import ControlServer
+from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFolder, RobotState
+from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
+from rbxcompose.runtime.records import Record
+from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
+from rbxcompose.runtime.supervision.members import Phase
+from rbxcompose.runtime.supervision.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
+from rbxcompose.runtime.supervision.request_handler import RequestHandler
+from rbxcompose.runtime.supervision.silence import DEAD, LOOK
+from rbxcompose.scheduler import Scheduler
+
+_TAIL = 8000  # [B] of what a process printed that go into the log
+_HANG_MARK = "Timeout (0:00:"  # what the self-watchdog of a process prints before the place where it hung
+_LONGEST_WAIT = 60.0  # [s]
+_ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_OWNER = "supervisor"
+
+
+@dataclass
+class _Child:
+    """A process as its supervisor holds it; its pidfd is known once it has been forked."""
+
+    channel: say.Channel
+    process: Process | None = None
+    descriptor: int | None = None
+    wanted_end: signal.Signals | None = None  # to be sent as soon as it is there
+
+
+class Supervisor:
+    """Runs one robot to its end; `run` returns the exit code."""
+
+    def __init__(self, launch: Launch, folder: RobotFolder, on_up: Callable[[], None]) -> None:
+        self._launch, self._folder, self._on_up = launch, folder, on_up
+        self._clock: MonotonicClock = launch.clock
+        self._scheduler = Scheduler()
+        self._selector = selectors.DefaultSelector()
+        self._children: dict[str, _Child] = {}
+        self._interrupts = 0
+        self._is_state_old = False  # the state file tells what was
+        router = None if launch.plan.bus.router else ROUTER
+        self.conductor = Conductor(launch.plan, launch.options, self._scheduler, self, router=router)
+        self._wake, self._wakened = socket.socketpair()
+        for end in (self._wake, self._wakened):
+            end.setblocking(False)
+
+    def run(self) -> int:
+        """Lead the robot from the first fork to the last exit and return the exit code."""
+        for number in _ENDINGS:
+            signal.signal(number, self._on_signal)
+        signal.set_wakeup_fd(self._wake.fileno(), warn_on_full_buffer=False)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDINGS)
+        adopt_orphans()
+        self._parent: Parent | None = Parent(self._launch)
+        self._parent_process = self._parent.process
+        self._parent_ran = self._clock.now()  # [s]
+        self._scheduler.every(LOOK, _OWNER, lambda dt: self._look_at_parent())
+        self._selector.register(self._parent, selectors.EVENT_READ, self._hear_parent)
+        self._selector.register(self._wakened, selectors.EVENT_READ, self._hear_signals)
+        self._control = ControlServer(self._folder, self._selector)
+        self._control.handle = RequestHandler(self, is_stepped=self._launch.options.is_stepped).handle
+        self._write_state()
+        try:
+            self.conductor.begin()
+            while self.conductor.phase is not Phase.ENDED:
+                self._turn()
+        finally:
+            self._close()
+        return self.conductor.exit_code
+
+    def _turn(self) -> None:
+        due = self._scheduler.next_due()
+        pause = _LONGEST_WAIT if due is None else max(0.0, due - self._clock.now())
+        for key, _ in self._selector.select(pause):
+            if self._selector.get_map().get(key.fd) is key:  # one callback may have closed another's descriptor
+                key.data()
+        self._scheduler.advance(self._clock.now())
+        if self._is_state_old:
+            self._write_state()
+
+    def _close(self) -> None:
+        self._control.close()
+        if self._parent is not None:
+            self._parent.end()
+        signal.set_wakeup_fd(-1)
+
+    # Signals
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self._interrupts += number == signal.SIGINT  # the wake-up descriptor does the rest
+
+    def _hear_signals(self) -> None:
+        self._wakened.recv(4096)
+        self.conductor.go_down(INTERRUPTED, "interrupted")
+        if self._interrupts > 1:
+            self.conductor.hurry()
+
+    # Effects of the conductor
+
+    def fork(self, process: str, *, is_restart: bool, is_stopped: bool) -> None:
+        """Have a process forked and listen to it."""
+        if self._parent is None:
+            return
+        try:
+            channel = self._parent.fork(Fork(process, is_restart, is_stopped))
+        except (BrokenPipeError, ConnectionResetError):
+            return  # its end is about to be heard
+        self._children[process] = _Child(channel)
+        self._selector.register(channel, selectors.EVENT_READ, lambda: self._hear(process, channel))
+
+    def send(self, process: str, message: say.Order) -> None:
+        """Send a message to a process."""
+        if process in self._children:
+            channel = self._children[process].channel
+            channel.send(message)
+            self._watch(channel)
+
+    def _watch(self, channel: say.Channel) -> None:
+        """Wait for what a process says, and for when it takes the rest of what is too long to be sent at once."""
+        if channel.is_open:
+            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if channel.is_behind else 0)
+            key = self._selector.get_key(channel)
+            if key.events != events:
+                self._selector.modify(channel, events, key.data)
+
+    def end(self, process: str) -> None:
+        """Ask a process to end."""
+        self._signal(process, signal.SIGTERM)
+
+    def kill(self, process: str) -> None:
+        """End a process."""
+        self._signal(process, signal.SIGKILL)
+
+    def _signal(self, process: str, number: signal.Signals) -> None:
+        child = self._children.get(process)
+        if child is None:
+            return
+        child.wanted_end = number
+        if child.descriptor is not None:
+            signal_descriptor(child.descriptor, number)
+
+    def is_suspended(self, process: str) -> bool:
+        """Tell whether a signal keeps a process from running."""
+        child = self._children.get(process)
+        return child is not None and child.process is not None and child.process.is_stopped
+
+    def log(self, level: Level, text: str, detail: str = "") -> None:
+        """Write a record of the whole robot."""
+        time = self._clock.now() if self.conductor.is_real_time else self.conductor.time
+        self._launch.log.write(Record(time, level, "robot", text, detail))
+
+    def is_up(self) -> None:
+        """Tell who waits that all is active."""
+        self._write_state()
+        self._on_up()
+
+    def states_changed(self) -> None:
+        """Have the state file written at the end of this turn, once."""
+        self._is_state_old = True
+
+    def answer(self, number: int, answer: object) -> None:
+        """Answer a request, with data."""
+        self._control.answer(number, answer)
+
+    def refuse(self, number: int, reason: str) -> None:
+        """Refuse a request."""
+        self._control.refuse(number, reason)
+
+    # What happens
+
+    def _hear(self, name: str, channel: say.Channel) -> None:
+        messages = channel.receive()
+        channel.flush()
+        if channel.is_open:
+            self._watch(channel)
+        else:
+            self._selector.unregister(channel)
+        for message in messages:
+            self.conductor.heard(name, message)  # type: ignore[arg-type]
+
+    def _hear_parent(self) -> None:
+        try:
+            while self._parent is not None and (event := self._parent.receive()) is not None:
+                if isinstance(event, Forked):
+                    self._forked(event)
+                else:
+                    self._exited(event)
+        except EOFError:
+            self._lose_parent()
+
+    def _forked(self, event: Forked) -> None:
+        child = self._children[event.group]
+        child.process, child.descriptor = event.process, event.descriptor
+        if child.wanted_end is not None:
+            signal_descriptor(event.descriptor, child.wanted_end)
+        self._write_state()
+
+    def _exited(self, event: Exited) -> None:
+        name = next(name for name, one in self._children.items() if one.process and one.process.pid == event.pid)
+        self._bury(name, describe_exit(event.status))
+
+    def _bury(self, name: str, how: str) -> None:
+        child = self._children.pop(name)
+        if child.channel.is_open:
+            self._hear(name, child.channel)  # its last words
+        if child.channel.is_open:
+            self._selector.unregister(child.channel)
+        child.channel.close()
+        if child.descriptor is not None:
+            os.close(child.descriptor)
+        printed = self._printed(name)
+        how = "hung and ended itself" if _HANG_MARK in printed else how
+        if printed and self.conductor.is_going_down:
+            self.log(Level.OK, f"process '{name}' {how}; what it had printed is in the log file", printed)
+        self.conductor.exited(name, how, printed)
+
+    def _printed(self, name: str) -> str:
+        try:
+            return self._launch.output(name).read_text(encoding="utf-8", errors="replace")[-_TAIL:]
+        except OSError:  # it has printed nothing, or the disk is at fault: the robot does not depend on it
+            return ""
+
+    def _look_at_parent(self) -> None:
+        """End a parent that a signal keeps from running: it forks nothing, and tells of no end of a process."""
+        now = self._clock.now()
+        if self._parent is None or not self._parent.process.is_stopped:
+            self._parent_ran = now
+        elif now - self._parent_ran > DEAD:
+            self.log(Level.ERROR, "the pre-fork parent was suspended by a signal and is killed")
+            self._parent.process.send_signal(signal.SIGKILL)
+
+    def _lose_parent(self) -> None:
+        """Go on without the pre-fork parent: its processes are ours now, and have been asked to stop."""
+        if self._parent is None:
+            return
+        self._selector.unregister(self._parent)
+        self._parent.end()
+        self._parent = None
+        for name, child in list(self._children.items()):
+            if child.process is None or child.descriptor is None:
+                self._bury(name, "was never started")
+            else:
+                pid, descriptor = child.process.pid, child.descriptor
+                self._selector.register(descriptor, selectors.EVENT_READ, self._reaper(name, pid, descriptor))
+        self.conductor.go_down(ROBOT_FAILED, "the pre-fork parent has gone", Level.ERROR)
+
+    def _reaper(self, name: str, pid: int, descriptor: int) -> Callable[[], None]:
+        def reap() -> None:
+            self._selector.unregister(descriptor)
+            try:
+                how = describe_exit(os.waitpid(pid, 0)[1])
+            except ChildProcessError:
+                how = "ended"  # the parent had waited for it before it ended itself
+            self._bury(name, how)
+
+        return reap
+
+    # What is known from outside
+
+    def state(self) -> RobotState:
+        """Return what the state file and `ps` tell."""
+        running = {name: child.process for name, child in self._children.items() if child.process is not None}
+        components = tuple(self._component(one.name, one.type, one.process) for one in self.conductor.plan.instances)
+        return RobotState(
+            robot=self._launch.plan.robot,
+            file=os.path.realpath(self.conductor.plan.file),
+            supervisor=Process.of(os.getpid()),
+            processes={"parent": self._parent_process, **running},
+            components=components,
+            router=self.conductor.endpoint,
+            boot=boot_id(),
+            domain=self._launch.plan.bus.domain,
+        )
+
+    def _component(self, name: str, type_name: str, process: str) -> ComponentState:
+        state, restarts = self.conductor.states[name]
+        waits_for = self.conductor.blocked.get(name)
+        child = self._children.get(process)
+        pid = child.process.pid if child and child.process else None
+        restarts += self.conductor.members[process].restarts
+        if self.is_suspended(process):
+            state = SUSPENDED
+        elif child is not None and self.conductor.members[process].is_told_lost:
+            state = SILENT
+        return ComponentState(name, type_name, state, process, pid, restarts, waits_for)
+
+    def _write_state(self) -> None:
+        self._is_state_old = False
+        try:
+            self._folder.write_state(self.state())
+        except OSError as error:  # the robot does not depend on it
+            self.log(Level.WARN, f"the state file cannot be written: {error}")

@@ -1,0 +1,160 @@
+"""Frozen dataclasses as plain data for JSON, and back.
+
+What comes from outside is not trusted: data that do not have the shape of the wanted type raise `UnreadableError`,
+which names the place.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING, asdict, fields, is_dataclass
+from enum import Enum
+from functools import cache
+from types import NoneType, UnionType
+from typing import Any, Generic, TypeVar, Union, get_args, get_origin, get_type_hints
+
+T = TypeVar("T")
+TYPE = "type"  # the key that tells types apart
+
+
+class UnreadableError(ValueError):
+    """Raised for data that do not have the wanted shape; its text says where and why."""
+
+    def __init__(self, problem: str, *path: str) -> None:
+        super().__init__(f"'{'.'.join(path)}' {problem}" if path else problem)
+        self.problem, self.path = problem, path
+
+
+def to_data(value: object) -> Any:
+    """Return plain data: of a dataclass a dict by field, in the order of its fields."""
+    match value:
+        case tuple() | list():
+            return [to_data(one) for one in value]
+        case _ if is_dataclass(value) and not isinstance(value, type):
+            return asdict(value)
+    return value
+
+
+def from_data(wanted: Any, data: Any) -> Any:
+    """Return the value of type `wanted` that plain data stand for.
+
+    `wanted` is a dataclass, a scalar, an enumeration, `Any`, or a union, sequence, tuple or mapping of such.
+
+    Raises:
+        UnreadableError: if the data have another shape.
+    """
+    origin, arguments = get_origin(wanted), get_args(wanted)
+    if wanted is Any:
+        return data
+    if wanted in _SCALARS:
+        return _checked(data, *_SCALARS[wanted])
+    if origin in (Union, UnionType):
+        return _first(arguments, data)
+    if origin is None:
+        return _members(wanted, data) if issubclass(wanted, Enum) else _fields(wanted, data)
+    if issubclass(origin, Mapping):
+        return {key: _at(key, arguments[1], one) for key, one in _checked(data, *_OBJECT).items()}
+    items = _checked(data, (list, tuple), "is no list")
+    if origin is tuple and arguments[-1] is not Ellipsis:
+        if len(items) != len(arguments):
+            raise UnreadableError(f"is no list of {len(arguments)}")
+        return tuple(_at(str(index), *one) for index, one in enumerate(zip(arguments, items, strict=True)))
+    made = list if origin is list else tuple
+    return made(_at(str(index), arguments[0], one) for index, one in enumerate(items))
+
+
+class Family(Generic[T]):
+    """Dataclasses that are told apart by a name beside their fields."""
+
+    def __init__(self, types: Iterable[type[T]], name_of: Callable[[type[T]], str] = lambda one: one.__name__) -> None:
+        self._name_of = name_of
+        self.types: Mapping[str, type[T]] = {name_of(one): one for one in types}
+
+    def to_data(self, value: T) -> dict[str, Any]:
+        """Return the name and the fields of a value."""
+        return {TYPE: self._name_of(type(value)), **to_data(value)}
+
+    def from_data(self, data: object) -> T:
+        """Return the value that data stand for.
+
+        Raises:
+            UnreadableError: if the name is not known, or the fields do not fit.
+        """
+        name = name_in(data)
+        if name not in self.types or not isinstance(data, dict):
+            raise UnreadableError(f"'{name}' is not known here")
+        value: T = from_data(self.types[name], {key: one for key, one in data.items() if key != TYPE})
+        return value
+
+    def to_line(self, value: T) -> bytes:
+        """Return a value as one line of JSON."""
+        return json.dumps(self.to_data(value)).encode() + b"\n"
+
+    def from_line(self, line: bytes) -> T:
+        """Read what `to_line` wrote; raise as `from_data` does."""
+        return self.from_data(json.loads(line))
+
+
+def name_in(data: object) -> str:
+    """Return the name that data have; empty if they have none."""
+    name = data.get(TYPE) if isinstance(data, dict) else None
+    return name if isinstance(name, str) else ""
+
+
+_OBJECT = (dict,), "is no object"
+_SCALARS: Mapping[Any, tuple[tuple[type, ...], str]] = {
+    str: ((str,), "is no text"),
+    bool: ((bool,), "is neither true nor false"),
+    int: ((int,), "is no whole number"),
+    float: ((float, int), "is no number"),
+    NoneType: ((NoneType,), "is not null"),
+}
+
+
+def _checked(data: Any, types: tuple[type, ...], problem: str) -> Any:
+    if type(data) not in types:  # a bool is no int here
+        raise UnreadableError(problem)
+    return data
+
+
+def _at(place: str, wanted: Any, data: Any) -> Any:
+    try:
+        return from_data(wanted, data)
+    except UnreadableError as error:
+        raise UnreadableError(error.problem, place, *error.path) from None
+
+
+def _first(wanted: Iterable[Any], data: Any) -> Any:
+    """Return the value of the first type that fits."""
+    for one in wanted:
+        try:
+            return from_data(one, data)
+        except UnreadableError as error:
+            problem = error
+    raise problem
+
+
+def _members(wanted: type[Enum], data: Any) -> Enum:
+    try:
+        return wanted(data)
+    except ValueError:
+        raise UnreadableError(f"is none of {', '.join(str(one.value) for one in wanted)}") from None
+
+
+def _fields(wanted: Any, data: Any) -> Any:
+    hints, needed = _shape(wanted)
+    given = _checked(data, *_OBJECT)
+    if unknown := next((key for key in given if key not in hints), None):
+        raise UnreadableError("is not known here", unknown)
+    if missing := next((key for key in needed if key not in given), None):
+        raise UnreadableError("is missing", missing)
+    return wanted(**{key: _at(key, hints[key], one) for key, one in given.items()})
+
+
+@cache
+def _shape(wanted: Any) -> tuple[Mapping[str, Any], Sequence[str]]:
+    """Return the types of a dataclass's fields, and those of them that have no default."""
+    hints = get_type_hints(wanted)
+    needed = [one.name for one in fields(wanted) if one.default is MISSING and one.default_factory is MISSING]
+    return {one.name: hints[one.name] for one in fields(wanted)}, needed
