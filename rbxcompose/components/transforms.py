@@ -6,7 +6,7 @@ from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStampe
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.sdk import Component, Config, Out, component
+from rbxcompose.sdk import Capability, Component, Config, Out, Setting, WritesFrame, component
 
 
 class TransformsConfig(Config):
@@ -27,6 +27,11 @@ class Transforms(Component[TransformsConfig]):
     """
 
     tf_static = Out(TFMessage, "/tf_static", qos="latched")
+
+    @classmethod
+    def capabilities(cls, config: TransformsConfig) -> tuple[Capability, ...]:
+        """Return the frame that it fixes."""
+        return (WritesFrame("tf_static", Setting(config.map, "map"), Setting(config.odom, "odom")),)
 
     def activate(self) -> None:
         """Publish once; who subscribes later is given it, too."""

@@ -21,6 +21,18 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.geometry import Pose2
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Ended, Outcome, Refused, Reply, SentGoal, ServedGoal
+from rbxcompose.sdk.capabilities import (
+    Capability,
+    Charges,
+    CommandsMotion,
+    Drains,
+    Drives,
+    Forwards,
+    Navigates,
+    RunsMissions,
+    Setting,
+    WritesFrame,
+)
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component
@@ -34,9 +46,15 @@ __all__ = [
     "AngularSpeed",
     "Calls",
     "CallsAction",
+    "Capability",
+    "Charges",
+    "CommandsMotion",
     "Component",
     "Config",
+    "Drains",
+    "Drives",
     "Ended",
+    "Forwards",
     "Frequency",
     "In",
     "Length",
@@ -44,6 +62,7 @@ __all__ = [
     "Live",
     "Looks",
     "Name",
+    "Navigates",
     "Out",
     "Outcome",
     "Place",
@@ -54,14 +73,17 @@ __all__ = [
     "Ratio",
     "Refused",
     "Reply",
+    "RunsMissions",
     "Secret",
     "SentGoal",
     "ServedGoal",
     "Serves",
     "ServesAction",
     "ServesTopic",
+    "Setting",
     "Speed",
     "Time",
+    "WritesFrame",
     "component",
     "skill",
 ]

@@ -11,6 +11,7 @@ from rbxcompose.clock import Clock
 from rbxcompose.config import Config
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.sdk.bound import Refused, Window
+from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.ports import Port
 
 C = TypeVar("C", bound=Config)
@@ -84,6 +85,11 @@ class Component(Generic[C]):
         """Return all ports by name; override and add those that depend on the configuration."""
         here: Any = cls  # for mypy, classes of a generic are not hashable
         return dict(_declared_ports(here))
+
+    @classmethod
+    def capabilities(cls, config: C) -> tuple[Capability, ...]:
+        """Return what checks and commands should know of a component with this configuration."""
+        return ()
 
     @property
     def now(self) -> float:
