@@ -9,7 +9,7 @@ import os
 import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from rbxcompose.replacing import TEMPORARY, replace_file
@@ -48,6 +48,15 @@ class ComponentState:
 
 
 @dataclass(frozen=True, slots=True)
+class Gauge:
+    """Where a battery tells its charge: the topic, the type of its messages, the unit of the number in them."""
+
+    topic: str
+    message: str
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class State:
     """What is known of a robot from outside, also when its supervisor is dead."""
 
@@ -59,6 +68,8 @@ class State:
     router: str | None = None
     boot: str = ""
     domain: int = 0
+    batteries: Mapping[str, Gauge] = field(default_factory=dict)  # by component
+    executive: str | None = None  # the component that runs missions
 
     def to_text(self) -> str:
         """Return the text of the state file: a checksum, then JSON."""
@@ -81,6 +92,7 @@ class State:
         fields["supervisor"] = Process(**fields["supervisor"])
         fields["processes"] = {name: Process(**one) for name, one in fields["processes"].items()}
         fields["components"] = tuple(ComponentState(**one) for one in fields["components"])
+        fields["batteries"] = {name: Gauge(**one) for name, one in fields["batteries"].items()}
         return cls(**fields)
 
     def alive(self) -> dict[str, Process]:

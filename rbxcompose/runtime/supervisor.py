@@ -20,6 +20,7 @@ from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
 from rbxcompose.runtime.control import ControlServer
 from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFolder, State
+from rbxcompose.runtime.gauges import gauges_of
 from rbxcompose.runtime.members import Phase
 from rbxcompose.runtime.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
@@ -27,6 +28,8 @@ from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.requests import Requests
 from rbxcompose.runtime.silence import DEAD, LOOK
 from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk.capabilities import RunsMissions
+from rbxcompose.sdk.registry import declared
 
 _TAIL = 8000  # [B] of what a process printed that go into the log
 _HANG_MARK = "Timeout (0:00:"  # what the self-watchdog of a process prints before the place where it hung
@@ -277,16 +280,19 @@ class Supervisor:
     def state(self) -> State:
         """Return what the state file and `ps` tell."""
         running = {name: child.process for name, child in self._children.items() if child.process is not None}
-        components = tuple(self._component(one.name, one.type, one.process) for one in self.conductor.plan.instances)
+        plan = self.conductor.plan
+        components = tuple(self._component(one.name, one.type, one.process) for one in plan.instances)
         return State(
             robot=self._launch.plan.robot,
-            file=os.path.realpath(self.conductor.plan.file),
+            file=os.path.realpath(plan.file),
             supervisor=Process.of(os.getpid()),
             processes={"parent": self._parent_process, **running},
             components=components,
             router=self.conductor.endpoint,
             boot=boot_id(),
             domain=self._launch.plan.bus.domain,
+            batteries=gauges_of(plan),
+            executive=next((one.name for one in plan.instances if declared(one.type, one.config, RunsMissions)), None),
         )
 
     def _component(self, name: str, type_name: str, process: str) -> ComponentState:

@@ -20,7 +20,7 @@ from rbxcompose.scaffold.answers import ANSWER, AnswerError, read_place
 from rbxcompose.scaffold.texts import render
 from rbxcompose.sdk.capabilities import Drives
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.registry import component_names, component_type
+from rbxcompose.sdk.registry import component_names, component_type, declared
 
 ABOUT = "Goes to its places, and home to charge when the battery is low."
 BASE = "diff_drive_sim"
@@ -127,8 +127,8 @@ def _drives(base: type[Component[Config]]) -> Drives | None:
     """
     config = base.config_type().model_validate({})
     ports = base.ports(config)
-    for one in base.capabilities(config):
-        if isinstance(one, Drives) and ports[one.commands].topic == COMMANDS and ports[one.commands].interface is Twist:
+    for one in declared(base.type_name, config, Drives):
+        if ports[one.commands].topic == COMMANDS and ports[one.commands].interface is Twist:
             return one
     return None
 
