@@ -23,7 +23,7 @@ class Transforms(Component[TransformsConfig]):
     """Tells the frames that never move. While nothing localises the robot, `odom` stands where `map` does.
 
     Example:
-        frames: {type: transforms, map: map, odom: odom}
+        frames: {type: transforms, map: building, odom: map}
     """
 
     tf_static = Out(TFMessage, "/tf_static", qos="latched")

@@ -81,8 +81,12 @@ def setting_span(robot: Robot, *settings: tuple[Part, str]) -> Span:
     A setting is the name of a field of the configuration; without one the value is that of the part's type.
     """
     for part, name in settings:
-        path = (*part.path, *name.split("."))
-        if name and at(robot.manifest.root, path) is not None:
-            return robot.value(*path)
+        if is_written(robot, part, name):
+            return robot.value(*part.path, *name.split("."))
     part, name = settings[0]
     return robot.part_span(part.name) if name else robot.value(*part.path, "type")
+
+
+def is_written(robot: Robot, part: Part, name: str) -> bool:
+    """Tell whether a field of the configuration is written down in the manifest."""
+    return bool(name) and at(robot.manifest.root, (*part.path, *name.split("."))) is not None
