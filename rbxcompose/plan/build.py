@@ -11,7 +11,8 @@ from rbxcompose.sdk.capabilities import RunsMissions
 def build_plan(robot: Robot) -> Plan:
     """Return what `up` has to do; the robot must be without errors."""
     manifest = robot.manifest
-    last = [part.name for part, _ in robot.declared(RunsMissions)]  # when everything else is active
+    missions = (part.name for part, _ in robot.declared(RunsMissions))
+    last = [name for name in missions if name not in robot.written]  # starts when everything else is active
     order = start_order({name: part.starts_after for name, part in robot.parts.items() if name not in last})
     bus = manifest.bus
     return Plan(

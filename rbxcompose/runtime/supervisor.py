@@ -16,6 +16,7 @@ from types import FrameType
 
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plan.model import Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
 from rbxcompose.runtime.control import ControlServer
@@ -292,7 +293,7 @@ class Supervisor:
             boot=boot_id(),
             domain=self._launch.plan.bus.domain,
             batteries=gauges_of(plan),
-            executive=next((one.name for one in plan.instances if declared(one.type, one.config, RunsMissions)), None),
+            executive=_executive(plan),
         )
 
     def _component(self, name: str, type_name: str, process: str) -> ComponentState:
@@ -313,3 +314,8 @@ class Supervisor:
             self._folder.write_state(self.state())
         except OSError as error:  # the robot does not depend on it
             self.log(Level.WARN, f"the state file cannot be written: {error}")
+
+
+def _executive(plan: Plan) -> str | None:
+    found = [one.name for one in plan.instances if declared(one.type, one.config, RunsMissions)]
+    return found[-1] if found else None  # the robot's own starts last

@@ -27,10 +27,9 @@ class Setting(Generic[T_co]):
     field: str = ""
 
 
+@dataclass(frozen=True, slots=True)
 class Capability:
     """Something that a component can do, or does to the robot; the set is closed."""
-
-    __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +120,7 @@ class WritesFrame(Capability):
 
 @dataclass(frozen=True, slots=True)
 class RunsMissions(Capability):
-    """It runs the robot's missions: it starts last, and its skills and values are those that are there."""
+    """It runs the robot's missions: its skills are those that are there, and values may come from outside."""
 
 
 def settings_of(capability: Capability) -> Iterator[Setting[Any]]:
@@ -154,8 +153,8 @@ def _ports(capability: Capability) -> Iterator[str]:
         if isinstance(value, str):
             yield value
         elif isinstance(value, tuple):
-            yield from value
+            yield from value  # of several ports
 
 
-def _values(capability: Any) -> list[Any]:
+def _values(capability: Capability) -> list[object]:
     return [getattr(capability, one.name) for one in fields(capability)]
