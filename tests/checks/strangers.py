@@ -41,9 +41,13 @@ class CellConfig(Config):
     """A battery."""
 
     lasts: Time
+    """From full to empty."""
     yellow: Ratio = 0.5
+    """Below this it warns."""
     red: Ratio = 0.2
+    """Below this it is in error."""
     initial: Ratio = 1.0
+    """At the start."""
 
 
 @component("toy_cell")
@@ -68,9 +72,13 @@ class WheelsConfig(Config):
     """A base."""
 
     fastest: Speed = 0.5
+    """Straight on."""
     spin: AngularSpeed = 1.6
+    """On the spot."""
     patience: Time = 0.5
+    """It waits so long for a command."""
     body: str = "base_footprint"
+    """The frame that it moves."""
 
 
 class Wheels(Component[WheelsConfig]):
@@ -113,8 +121,11 @@ class PilotConfig(Config):
     """A driver."""
 
     pace: Speed = 0.3
+    """Straight on."""
     turn: AngularSpeed = 1.0
+    """On the spot."""
     off_by: Length = 0.05
+    """How near it comes."""
 
 
 @component("toy_pilot")
@@ -150,7 +161,9 @@ class FillerConfig(Config):
     """A charger."""
 
     station: PlaceName
+    """Where it charges."""
     arm: Length = Field(0.2, gt=0)
+    """How far it reaches."""
 
 
 @component("toy_filler")
