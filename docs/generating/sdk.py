@@ -8,7 +8,7 @@ from typing import Any
 
 from docs.generating.markdown import code, page, table
 from rbxcompose import sdk
-from rbxcompose.sdk import Component, Port
+from rbxcompose.sdk import Capability, Component, Port
 
 HEAD = """Everything that the author of a component imports, from `rbxcompose.sdk`. For how to use it, see
 [a component of your own](../sdk.md).
@@ -19,14 +19,17 @@ def whole_page() -> str:
     """Return the page `sdk.md`."""
     things: dict[str, Any] = {name: getattr(sdk, name) for name in sdk.__all__}
     ports = {name: one for name, one in things.items() if isinstance(one, type) and issubclass(one, Port)}
+    capabilities = {name: one for name, one in things.items() if isinstance(one, type) and issubclass(one, Capability)}
     methods = {name: one for name, one in vars(Component).items() if _is_method(name, one)}
-    others = {name: one for name, one in things.items() if name not in ports and _has_docstring(one)}
-    fields = ", ".join(code(name) for name in things if name not in ports and name not in others)
+    shown = {*ports, *capabilities}
+    others = {name: one for name, one in things.items() if name not in shown and _has_docstring(one)}
+    fields = ", ".join(code(name) for name, one in things.items() if not _has_docstring(one))
     return page(
         "The SDK",
         HEAD,
         _section("Ports", ports),
         _section("Methods of a component", methods),
+        _section("Capabilities", capabilities),
         _section("The rest", others),
         f"## Types of fields\n{fields}; and all types that pydantic knows.\n",
     )

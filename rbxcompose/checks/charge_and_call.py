@@ -11,8 +11,6 @@ from rbxcompose.model.charging import calls
 from rbxcompose.model.robot import Robot
 from rbxcompose.units import RATIO, format_quantity
 
-CHARGED = 0.99  # a charge ends at or above this level
-
 
 @check("RBX4121")
 def charge_and_call(robot: Robot) -> Iterator[Finding]:
@@ -42,12 +40,13 @@ def charge_and_call(robot: Robot) -> Iterator[Finding]:
     """
     for mission in robot.missions.values():
         for call in calls(robot, mission):
-            if CHARGED < call.level <= 1.0:
+            until = call.charges.until
+            if until and until.value < call.level <= 1.0:
                 span, related = blamed(robot, mission, call.interrupt.when)
                 yield charge_and_call.at(
                     span,
                     f"the interrupt '{call.interrupt.name}' charges below {format_quantity(call.level, RATIO)}, "
-                    f"but a charge may end at {format_quantity(CHARGED, RATIO)}",
+                    f"but a charge may end at {format_quantity(until.value, RATIO)}",
                     help="charge at a lower level",
                     related=related,
                 )

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.checking import check
-from rbxcompose.config import Place
 from rbxcompose.findings import Finding, Related
 from rbxcompose.missions.ways import distance, too_short
-from rbxcompose.model.charging import CHARGER, constants, server, ways_of
-from rbxcompose.model.flow import setting
+from rbxcompose.model.charging import charger_of, constants, ways_of
+from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
 
 
@@ -39,16 +38,16 @@ def charge_elsewhere(robot: Robot) -> Iterator[Finding]:
         list(too_short(ways, constants(mission)))  # goes through all of the mission
         for number, here in ways.starts_at.items():
             node = mission.program.nodes[number]
-            charger = server(robot, node.skill, CHARGER)
-            dock = getattr(charger.config, "dock", None) if charger else None
+            charger, charges = charger_of(robot, node.skill) or (None, None)
             may_fail = node.modifiers.keys() & {"optional", "only_if"}
-            if charger is None or not isinstance(dock, Place) or may_fail:
+            if charger is None or charges is None or charges.place is None or may_fail:
                 continue
-            reach = (setting(charger, "reach") or 0.0) + ways.driving.tolerance
-            if distance(here, dock) > reach:
+            dock = charges.place.value
+            reach = charges.reach.value if charges.reach else 0.0
+            if distance(here, dock) > reach + ways.driving.tolerance:
                 yield charge_elsewhere.at(
                     node.span,
                     f"'{node.skill}' works at '{dock.name}' only, but here the robot is at '{here.name}'",
                     help=f"drive to the dock first: '{ways.driving.skill}: {dock.name}'",
-                    related=[Related(robot.value(*charger.path, "dock"), "the dock of the charger")],
+                    related=[Related(setting_span(robot, (charger, charges.place.field)), "the dock of the charger")],
                 )

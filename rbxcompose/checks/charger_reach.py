@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.model.flow import setting, setting_span
+from rbxcompose.model.flow import OTHER_TYPE, setting_span
 from rbxcompose.model.robot import Robot
+from rbxcompose.sdk.capabilities import Charges, Navigates
 from rbxcompose.units import LENGTH, format_quantity
 
 
@@ -35,18 +36,19 @@ def charger_reach(robot: Robot) -> Iterator[Finding]:
         reach: 20 cm
     ```
     """
-    drivers = {name: found for name, part in robot.parts.items() if (found := setting(part, "tolerance"))}
-    for part in robot.parts.values():
-        reach = setting(part, "reach")
-        if reach is None or not hasattr(part.config, "dock") or not drivers:
-            continue
-        name = min(drivers, key=lambda one: drivers[one])
-        driver, tolerance = robot.parts[name], drivers[name]
-        if reach < tolerance:
+    drivers = [(part, one.tolerance) for part, one in robot.declared(Navigates) if one.tolerance]
+    if not drivers:
+        return
+    driver, tolerance = min(drivers, key=lambda one: one[1].value)
+    for part, charges in robot.declared(Charges):
+        reach = charges.reach
+        if reach and charges.place and reach.value < tolerance.value:
+            here, there = (part, reach.field), (driver, tolerance.field)
+            changes = [f"'{name}' {how}" for name, how in ((here[1], "larger"), (there[1], "smaller")) if name]
             yield charger_reach.at(
-                setting_span(robot, (part, "reach"), (driver, "tolerance")),
-                f"'{part.name}' charges within {format_quantity(reach, LENGTH)} of the dock, "
-                f"but '{driver.name}' may end {format_quantity(tolerance, LENGTH)} away from it",
-                help="make 'reach' larger, or 'tolerance' smaller",
-                related=[Related(setting_span(robot, (driver, "tolerance")), "its 'tolerance'")],
+                setting_span(robot, here, there),
+                f"'{part.name}' charges within {format_quantity(reach.value, LENGTH)} of the dock, "
+                f"but '{driver.name}' may end {format_quantity(tolerance.value, LENGTH)} away from it",
+                help=f"make {', or '.join(changes)}" if changes else OTHER_TYPE,
+                related=[Related(setting_span(robot, there), f"its '{there[1]}'" if there[1] else "drives there")],
             )

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Kind, Related, Severity
-from rbxcompose.model.flow import Flow, setting, setting_span
-from rbxcompose.model.robot import Part, Robot
+from rbxcompose.model.flow import OTHER_TYPE, Drive, Flow, setting_span
+from rbxcompose.model.robot import Robot
+from rbxcompose.sdk.capabilities import Setting
 from rbxcompose.units import ANGULAR_SPEED, SPEED, Dimension, format_quantity
-
-LIMITS = (("speed", "max_speed", SPEED), ("turn_rate", "max_turn_rate", ANGULAR_SPEED))
-ABSURD = 2.0  # a base takes a command above this many times its limit for a fault, and drops it
 
 
 @check("RBX3503", Severity.WARNING)
@@ -46,39 +44,54 @@ def clamped_speed(robot: Robot) -> Iterator[Finding]:
 class Excess:
     """A setting of a driver that is above the limit of its base."""
 
-    driver: Part
-    base: Part
-    setting: str
-    limiting: str
-    wanted: float
-    limit: float
+    drive: Drive
+    wanted: Setting[float]
+    limit: Setting[float]
     dimension: Dimension
 
     @property
     def is_absurd(self) -> bool:
         """Tell whether the base drops such commands instead of cutting them."""
-        return self.wanted > ABSURD * self.limit
+        factor = self.drive.drives.drops_above
+        return factor is not None and self.wanted.value > factor.value * self.limit.value
 
-    def shown(self, value: float) -> str:
-        """Write a value of this setting for people."""
-        return format_quantity(value, self.dimension)
+    def shown(self, setting: Setting[float]) -> str:
+        """Write the value of one of the settings for people."""
+        return format_quantity(setting.value, self.dimension)
+
+    @property
+    def times(self) -> str:
+        """Return in words how many times its limit the base follows."""
+        factor = self.drive.drives.drops_above
+        return "twice" if factor is None or factor.value == 2.0 else f"{factor.value:g} times"
+
+    @property
+    def remedy(self) -> str:
+        """Return what to do about it."""
+        if self.wanted.field:
+            return f"make '{self.wanted.field}' of '{self.drive.driver.name}' at most {self.shown(self.limit)}"
+        if self.limit.field:
+            return f"make '{self.limit.field}' of '{self.drive.base.name}' at least {self.shown(self.wanted)}"
+        return OTHER_TYPE
 
     def finding(self, robot: Robot, kind: Kind, what: str) -> Finding:
         """Return the finding; `what` the base does about it."""
-        here, there = (self.driver, self.setting), (self.base, self.limiting)
-        span, limit = setting_span(robot, here, there), setting_span(robot, there)
+        driver, base, name = self.drive.driver, self.drive.base, self.limit.field
+        there = (base, name)
+        span, limit = setting_span(robot, (driver, self.wanted.field), there), setting_span(robot, there)
         return kind.at(
             span,
-            f"'{self.driver.name}' drives with {self.shown(self.wanted)}, but its base '{self.base.name}' {what}",
-            help=f"make '{self.setting}' of '{self.driver.name}' at most {self.shown(self.limit)}",
-            related=[Related(limit, f"'{self.limiting}' of the base")] if limit != span else [],
+            f"'{driver.name}' drives with {self.shown(self.wanted)}, but its base '{base.name}' {what}",
+            help=self.remedy,
+            related=[Related(limit, f"'{name}' of the base" if name else "the base")] if limit != span else [],
         )
 
 
 def excesses(robot: Robot) -> Iterator[Excess]:
     """Yield the speeds and turn rates above the limits of the base that they are for."""
-    for driver, base in Flow(robot).drives():
-        for name, limiting, dimension in LIMITS:
-            wanted, limit = setting(driver, name), setting(base, limiting)
-            if wanted is not None and limit is not None and wanted > limit:
-                yield Excess(driver, base, name, limiting, wanted, limit, dimension)
+    for one in Flow(robot).drives():
+        wants, has = one.commands, one.drives
+        speeds = (wants.max_speed, has.max_speed, SPEED), (wants.max_turn_rate, has.max_turn_rate, ANGULAR_SPEED)
+        for wanted, limit, dimension in speeds:
+            if wanted and limit and wanted.value > limit.value:
+                yield Excess(one, wanted, limit, dimension)

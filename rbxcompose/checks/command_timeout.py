@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related
-from rbxcompose.model.flow import Flow, period_of, setting, setting_span
+from rbxcompose.model.flow import OTHER_TYPE, Flow, period_of, setting_span
 from rbxcompose.model.robot import Robot
+from rbxcompose.sdk.capabilities import Drives
 from rbxcompose.units import TIME, format_quantity
 
 
@@ -34,17 +35,17 @@ def command_timeout(robot: Robot) -> Iterator[Finding]:
     ```
     """
     flow = Flow(robot)
-    for base in robot.parts.values():
-        allowed = setting(base, "command_timeout")
-        if allowed is None:
-            continue
-        for end, source in flow.fed_by(base):
-            period = period_of(source)
-            if end.name == "cmd_vel" and period is not None and allowed <= period:
+    for base, drives in robot.declared(Drives):
+        allowed = drives.stops_after
+        for source in flow.fed_by(base, drives.commands) if allowed else ():
+            period = period_of(robot.parts[source.instance])
+            if allowed and period is not None and allowed.value <= period:
                 yield command_timeout.at(
-                    setting_span(robot, (base, "command_timeout")),
-                    f"'{base.name}' brakes before '{source.name}' sends its next command",
+                    setting_span(robot, (base, allowed.field)),
+                    f"'{base.name}' brakes before '{source.instance}' sends its next command",
                     label=f"it sends every {format_quantity(period, TIME)}",
-                    help=f"make it several times as long: '{format_quantity(10 * period, TIME)}'",
-                    related=[Related(robot.part_span(source.name), "sends the commands")],
+                    help=f"make it several times as long: '{format_quantity(10 * period, TIME)}'"
+                    if allowed.field
+                    else OTHER_TYPE,
+                    related=[Related(robot.part_span(source.instance), "sends the commands")],
                 )

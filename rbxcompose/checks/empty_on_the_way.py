@@ -11,7 +11,7 @@ from rbxcompose.missions.facts import goal_place
 from rbxcompose.missions.ways import distance, too_short
 from rbxcompose.model.blame import blamed
 from rbxcompose.model.charging import calls, constants, ways_of
-from rbxcompose.model.flow import setting, setting_span
+from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
 from rbxcompose.units import RATIO, TIME, format_quantity
 
@@ -57,11 +57,11 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
                 if node.skill == ways.driving.skill
             )
             dock = next((place for place in goals if place), None)
-            lasts = call.level * (setting(call.battery, "runtime") or 0.0)
-            if dock is None or not ways.visited:
+            runtime = call.drains.runtime
+            if dock is None or runtime is None or not ways.visited:
                 continue
             far = max(ways.visited.values(), key=partial(distance, dock))
-            needs = ways.between(far, dock)
+            lasts, needs = call.level * runtime.value, ways.between(far, dock)
             if 0 <= lasts < needs:
                 span, related = blamed(robot, mission, call.interrupt.when)
                 yield empty_on_the_way.at(
@@ -71,6 +71,6 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
                     help="break off earlier",
                     related=[
                         *related,
-                        Related(setting_span(robot, (call.battery, "runtime")), "how long a full battery lasts"),
+                        Related(setting_span(robot, (call.battery, runtime.field)), "how long a full battery lasts"),
                     ],
                 )

@@ -9,10 +9,10 @@ from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.robot import Part, Robot
 from rbxcompose.model.wiring import End
 from rbxcompose.qos import Qos
+from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Serves, ServesAction
 
 SERVED_BY = {Calls: Serves, CallsAction: ServesAction, In: Out}
-MISSION = "mission"  # its values may come from outside, and its skills are those that are there
 
 
 @check("RBX3010", Severity.WARNING)
@@ -44,8 +44,8 @@ def needed_port(robot: Robot) -> Iterator[Finding]:
     given = {(type(end.port), end.topic) for end in robot.ends}
     lost = {end.type_name for ends in robot.writers.values() for end in ends if is_unheard(robot, end)}
     for part in robot.parts.values():
-        if part.name == MISSION:
-            continue
+        if part.declared(RunsMissions):
+            continue  # its values may come from outside, and its skills are those that are there
         needed = [end for end in part.ends if type(end.port) in SERVED_BY and not getattr(end.port, "is_open", False)]
         missing = [end for end in needed if (SERVED_BY[type(end.port)], end.topic) not in given]
         # A command that goes nowhere is told where it leaves.

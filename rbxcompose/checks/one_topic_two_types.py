@@ -7,7 +7,6 @@ from itertools import groupby
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related
-from rbxcompose.model.flow import MUX
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wiring import resolve
 from rbxcompose.sdk.ports import Looks
@@ -48,7 +47,7 @@ def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
         for other in others:
             if other.type_name == first.type_name:
                 continue
-            if other.instance == first.instance and robot.parts[first.instance].type_name == MUX:
+            if other.instance == first.instance and first.instance in robot.manifest.muxes:
                 yield _name_used_twice(robot, first.instance, topic.rpartition("/")[-1])
             else:
                 yield one_topic_two_types.at(

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related
-from rbxcompose.model.flow import MUX
 from rbxcompose.model.robot import Robot
+from rbxcompose.model.wiring import End
 from rbxcompose.qos import Qos
+from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import In
 
 
@@ -34,13 +35,21 @@ def past_the_mux(robot: Robot) -> Iterator[Finding]:
     ```
     """
     for topic, ends in robot.readers.items():
-        muxed = [end for end in ends if robot.parts[end.instance].type_name == MUX]
+        inputs = [end for end in ends if _output(robot, end)]
+        muxes = {end.instance for end in inputs}
         for end in ends:
-            if muxed and end not in muxed and isinstance(end.port, In) and end.port.qos is Qos.COMMAND:
-                mux = muxed[0].instance
+            if muxes and end.instance not in muxes and isinstance(end.port, In) and end.port.qos is Qos.COMMAND:
+                mux, own = robot.parts[inputs[0].instance], inputs[0]
                 yield past_the_mux.at(
                     robot.end_span(end),
-                    f"'{end.instance}' listens to '{topic}', past the mux '{mux}'",
-                    help=f"listen to the mux's output: '{end.name}: {mux}'",
-                    related=[Related(robot.key("muxes", mux, "inputs", muxed[0].name), "this is an input of the mux")],
+                    f"'{end.instance}' listens to '{topic}', past the mux '{mux.name}'",
+                    help=f"listen to the mux's output: '{end.name}: {_output(robot, own)}'",
+                    related=[Related(robot.key(*mux.path, "inputs", own.name), "this is an input of the mux")],
                 )
+
+
+def _output(robot: Robot, end: End) -> str:
+    """Return the topic to which a mux forwards what comes in at this end; nothing if it is no input of a mux."""
+    mux = robot.parts[end.instance]
+    muxed = (mux.end(one.output) for one in mux.declared(Forwards) if end.name in one.inputs)
+    return next((output.port.topic for output in muxed if output), "")

@@ -6,11 +6,10 @@ from collections.abc import Iterator
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Related
-from rbxcompose.model.flow import setting, setting_span
+from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
+from rbxcompose.sdk.capabilities import Drains
 from rbxcompose.units import RATIO, format_quantity
-
-BATTERY = "battery_sim"
 
 
 @check("RBX3502")
@@ -39,15 +38,14 @@ def threshold_order(robot: Robot) -> Iterator[Finding]:
         error: 20 %
     ```
     """
-    for part in robot.parts.values():
-        if part.type_name != BATTERY:
-            continue
-        warn, error = setting(part, "warn"), setting(part, "error")
-        if warn is not None and error is not None and warn < error:
+    for part, drains in robot.declared(Drains):
+        warn, error = drains.warn, drains.error
+        if warn and error and warn.value < error.value:
+            here, there = (part, warn.field), (part, error.field)
             yield threshold_order.at(
-                setting_span(robot, (part, "warn"), (part, "error")),
-                f"'{part.name}' can never warn: it is in error below {format_quantity(error, RATIO)} already, "
-                f"and warns below {format_quantity(warn, RATIO)}",
-                help="'warn' must be above 'error'",
-                related=[Related(setting_span(robot, (part, "error"), (part, "warn")), "in error below this")],
+                setting_span(robot, here, there),
+                f"'{part.name}' can never warn: it is in error below {format_quantity(error.value, RATIO)} already, "
+                f"and warns below {format_quantity(warn.value, RATIO)}",
+                help=f"'{warn.field or 'warn'}' must be above '{error.field or 'error'}'",
+                related=[Related(setting_span(robot, there, here), "in error below this")],
             )

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.checking import check
-from rbxcompose.findings import Finding, Related, Span
-from rbxcompose.model.robot import Part, Robot
-from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.qos import Qos
-from rbxcompose.sdk.ports import In, Out
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.robot import Robot
+from rbxcompose.model.wiring import End
+from rbxcompose.sdk.capabilities import Drives
 
 
 @check("RBX3013")
@@ -37,23 +36,17 @@ def two_bases(robot: Robot) -> Iterator[Finding]:
     ```
     """
     for topic, ends in robot.readers.items():
-        takers = [end.instance for end in ends if isinstance(end.port, In) and end.port.qos is Qos.COMMAND]
-        bases = [name for name in takers if _tells_odometry(robot.parts[name])]
+        bases = [end.instance for end in ends if _moves(robot, end)]
         for other in bases[1:]:
             yield two_bases.at(
-                _entry(robot, other),
+                robot.entry_span(other),
                 f"'{other}' and '{bases[0]}' are both bases that follow '{topic}'",
                 label="this one",
                 help="a robot has one base: leave one of them out",
-                related=[Related(_entry(robot, bases[0]), "and this one")],
+                related=[Related(robot.entry_span(bases[0]), "and this one")],
             )
 
 
-def _entry(robot: Robot, name: str) -> Span:
-    """Return the place of the robot's own entry that brings a component: that of the component, or of its part."""
-    brought = (one.span for one in robot.manifest.parts.values() if name in one.components)
-    return next(brought, None) or robot.part_span(name)
-
-
-def _tells_odometry(part: Part) -> bool:
-    return any(isinstance(end.port, Out) and end.port.interface is Odometry for end in part.ends)
+def _moves(robot: Robot, end: End) -> bool:
+    """Tell whether the robot moves by what comes in at this end."""
+    return any(end.name == one.commands for one in robot.parts[end.instance].declared(Drives))

@@ -8,10 +8,10 @@ from itertools import groupby
 from rbxcompose.checking import check
 from rbxcompose.checks.mux_source import missing
 from rbxcompose.findings import Finding, Related
-from rbxcompose.model.flow import MUX
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wiring import End
 from rbxcompose.qos import Qos
+from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import Out
 
 
@@ -78,7 +78,7 @@ def two_writers(robot: Robot) -> Iterator[Finding]:
 
 def _remedy(robot: Robot, topic: str, writers: Iterable[End], both: tuple[str, str]) -> str:
     """Return how two of the writers get along: in the mux that is a writer too, or else in a new one."""
-    mux = next((one.instance for one in writers if robot.parts[one.instance].type_name == MUX), None)
+    mux = next((one.instance for one in writers if robot.parts[one.instance].declared(Forwards)), None)
     if mux is None:
         return f"put both into a mux: 'muxes: {{{topic.strip('/')}: ...}}' with an input 'from:' each"
     missing = " and ".join(f"'from: {name}'" for name in both if name != mux)

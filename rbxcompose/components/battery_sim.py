@@ -9,7 +9,20 @@ from pydantic import Field
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.msgs.rbxcompose_msgs import SetBatteryLevel
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.sdk import Component, Config, Live, Out, Ratio, Refused, Serves, Time, component
+from rbxcompose.sdk import (
+    Capability,
+    Component,
+    Config,
+    Drains,
+    Live,
+    Out,
+    Ratio,
+    Refused,
+    Serves,
+    Setting,
+    Time,
+    component,
+)
 from rbxcompose.sim.battery import BatteryCore, BatterySettings
 
 PERCENT = 100.0  # a `battery_level` message counts from 0 to 100
@@ -42,6 +55,13 @@ class BatterySim(Component[BatterySimConfig]):
     simulated = True
     battery_level = Out(Float32, "battery_level", unit="%")
     set_battery_level = Serves(SetBatteryLevel, "set_battery_level")
+
+    @classmethod
+    def capabilities(cls, config: BatterySimConfig) -> tuple[Capability, ...]:
+        """Return that it is a battery."""
+        runtime = Setting(config.runtime, "runtime")
+        warn, error = Setting(config.warn, "warn"), Setting(config.error, "error")
+        return (Drains("battery_level", runtime, warn, error),)
 
     def configure(self) -> None:
         """Fill the battery."""

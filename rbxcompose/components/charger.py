@@ -6,7 +6,22 @@ from pydantic import Field
 
 from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.sdk import Calls, Component, Config, In, Length, Looks, PlaceName, Pose2, Reply, ServesAction, component
+from rbxcompose.sdk import (
+    Calls,
+    Capability,
+    Charges,
+    Component,
+    Config,
+    In,
+    Length,
+    Looks,
+    PlaceName,
+    Pose2,
+    Reply,
+    ServesAction,
+    Setting,
+    component,
+)
 
 FULL = 100.0  # [%]
 NEARLY_FULL = 99.0  # [%] from here on a level counts as full: the battery drains while it is told
@@ -34,6 +49,12 @@ class Charger(Component[ChargerConfig]):
     battery_level = In(Float32, "battery_level", unit="%")
     set_battery_level = Calls(SetBatteryLevel, "set_battery_level")
     recharge = ServesAction(Recharge, "recharge", claims="base")
+
+    @classmethod
+    def capabilities(cls, config: ChargerConfig) -> tuple[Capability, ...]:
+        """Return that it charges at the dock until the battery is nearly full."""
+        dock, reach = Setting(config.dock, "dock"), Setting(config.reach, "reach")
+        return (Charges("recharge", dock, reach, until=Setting(NEARLY_FULL / FULL)),)
 
     def configure(self) -> None:
         """Nothing is being charged."""

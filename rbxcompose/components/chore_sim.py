@@ -10,7 +10,21 @@ from rbxcompose.geometry import AT_REST, Velocity2
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav2_msgs import Wait
 from rbxcompose.msgs.stamps import to_duration, to_seconds
-from rbxcompose.sdk import AngularSpeed, Component, Config, Live, Out, ServedGoal, ServesAction, Speed, Time, component
+from rbxcompose.sdk import (
+    AngularSpeed,
+    Capability,
+    CommandsMotion,
+    Component,
+    Config,
+    Live,
+    Out,
+    ServedGoal,
+    ServesAction,
+    Setting,
+    Speed,
+    Time,
+    component,
+)
 from rbxcompose.sim.chore import ChoreCore, ChoreSettings
 
 LONGEST = 24 * 3600.0  # [s]
@@ -41,6 +55,11 @@ class ChoreSim(Component[ChoreSimConfig]):
     simulated = True
     cmd_vel = Out(Twist, "cmd_vel", qos="command")
     chore = ServesAction(Wait, "chore", claims="base", pausable=True)
+
+    @classmethod
+    def capabilities(cls, config: ChoreSimConfig) -> tuple[Capability, ...]:
+        """Return how fast it moves the base."""
+        return (CommandsMotion("cmd_vel", Setting(config.speed, "speed"), Setting(config.turn_rate, "turn_rate")),)
 
     def configure(self) -> None:
         """Nothing is to be done."""

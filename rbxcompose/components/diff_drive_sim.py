@@ -18,16 +18,20 @@ from rbxcompose.sdk import (
     Acceleration,
     AngularAcceleration,
     AngularSpeed,
+    Capability,
     Component,
     Config,
+    Drives,
     In,
     Live,
     Out,
+    Setting,
     Speed,
     Time,
+    WritesFrame,
     component,
 )
-from rbxcompose.sim.diff_drive import DiffDriveCore, DiffDriveSettings
+from rbxcompose.sim.diff_drive import ABSURD, DiffDriveCore, DiffDriveSettings
 
 ODOM = "odom"
 BASE = "base_footprint"
@@ -62,6 +66,21 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
     cmd_vel = In(geometry.Twist, "cmd_vel", qos="command")
     odom = Out(Odometry, "odom")
     tf = Out(TFMessage, "/tf")
+
+    @classmethod
+    def capabilities(cls, config: DiffDriveSimConfig) -> tuple[Capability, ...]:
+        """Return its limits, and the frame that it moves."""
+        base = Drives(
+            "cmd_vel",
+            "odom",
+            max_speed=Setting(config.max_speed, "max_speed"),
+            max_turn_rate=Setting(config.max_turn_rate, "max_turn_rate"),
+            drops_above=Setting(ABSURD),
+            stops_after=Setting(config.command_timeout, "command_timeout"),
+            acceleration=Setting(config.acceleration, "acceleration"),
+            turn_acceleration=Setting(config.turn_acceleration, "turn_acceleration"),
+        )
+        return base, WritesFrame("tf", Setting(ODOM), Setting(BASE))
 
     def configure(self) -> None:
         """Put the base to the origin of `odom`."""

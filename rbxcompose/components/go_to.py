@@ -14,14 +14,18 @@ from rbxcompose.navigation.go_to import GoToCore, GoToSettings
 from rbxcompose.sdk import (
     Angle,
     AngularSpeed,
+    Capability,
+    CommandsMotion,
     Component,
     Config,
     Length,
     Live,
     Looks,
+    Navigates,
     Out,
     ServedGoal,
     ServesAction,
+    Setting,
     Speed,
     component,
 )
@@ -54,6 +58,13 @@ class GoTo(Component[GoToConfig]):
     cmd_vel = Out(Twist, "cmd_vel", qos="command")
     pose = Looks(source="base_footprint", target=MAP)
     go_to = ServesAction(NavigateToPose, "go_to", claims="base")
+
+    @classmethod
+    def capabilities(cls, config: GoToConfig) -> tuple[Capability, ...]:
+        """Return how fast it drives and how near it comes."""
+        speed, turn_rate = Setting(config.speed, "speed"), Setting(config.turn_rate, "turn_rate")
+        tolerance = Setting(config.tolerance, "tolerance")
+        return CommandsMotion("cmd_vel", speed, turn_rate), Navigates("go_to", tolerance)
 
     def configure(self) -> None:
         """Build the core."""

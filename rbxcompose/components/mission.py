@@ -44,12 +44,14 @@ from rbxcompose.missions.world import World
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.robot_events import MissionOver, MissionWaits
 from rbxcompose.sdk import (
+    Capability,
     Component,
     Config,
     Level,
     Place,
     Port,
     Refused,
+    RunsMissions,
     answers,
     component,
 )
@@ -123,6 +125,11 @@ class Mission(Component[MissionConfig]):
     def ports(cls, config: MissionConfig) -> dict[str, Port[Any]]:
         """Return an end for each value, skill, topic and service that is used, and for the pose if it is read."""
         return ports_for(config)
+
+    @classmethod
+    def capabilities(cls, config: MissionConfig) -> tuple[Capability, ...]:
+        """Return that it is the executive."""
+        return (RunsMissions(),)
 
     @property
     def equipment(self) -> MissionConfig:

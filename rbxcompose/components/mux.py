@@ -10,7 +10,7 @@ from rbxcompose.msgs import registry
 from rbxcompose.msgs.std_msgs import Empty
 from rbxcompose.msgs.types import Message
 from rbxcompose.mux.core import MuxCore, Source
-from rbxcompose.sdk import Component, Config, Frequency, In, Level, Out, Port, Time, component
+from rbxcompose.sdk import Capability, Component, Config, Forwards, Frequency, In, Level, Out, Port, Time, component
 
 LOCK = "lock_"  # begins the port of a lock, which no input may be named like
 
@@ -65,6 +65,11 @@ class Mux(Component[MuxConfig]):
         for name in config.locks:
             ports[LOCK + name] = In(Empty, f"{config.output}/{name}", qos="command", is_open=True).named(LOCK + name)
         return ports
+
+    @classmethod
+    def capabilities(cls, config: MuxConfig) -> tuple[Capability, ...]:
+        """Return what it lets through."""
+        return (Forwards(tuple(config.inputs), "output"),)
 
     def configure(self) -> None:
         """Build the core; a mux that comes back while the robot is stopped comes back closed."""

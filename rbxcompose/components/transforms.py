@@ -6,7 +6,7 @@ from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStampe
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.sdk import Component, Config, Out, component
+from rbxcompose.sdk import Capability, Component, Config, Out, Setting, WritesFrame, component
 
 
 class TransformsConfig(Config):
@@ -23,10 +23,15 @@ class Transforms(Component[TransformsConfig]):
     """Tells the frames that never move. While nothing localises the robot, `odom` stands where `map` does.
 
     Example:
-        frames: {type: transforms, map: map, odom: odom}
+        frames: {type: transforms, map: building, odom: map}
     """
 
     tf_static = Out(TFMessage, "/tf_static", qos="latched")
+
+    @classmethod
+    def capabilities(cls, config: TransformsConfig) -> tuple[Capability, ...]:
+        """Return the frame that it fixes."""
+        return (WritesFrame("tf_static", Setting(config.map, "map"), Setting(config.odom, "odom")),)
 
     def activate(self) -> None:
         """Publish once; who subscribes later is given it, too."""

@@ -18,6 +18,7 @@ from rbxcompose.model.robot import Part, Robot
 from rbxcompose.model.skills import names_of_skills, services_of, skills_of, topics_of
 from rbxcompose.model.values import value_of
 from rbxcompose.model.wiring import End, ends_of, readers, resolve
+from rbxcompose.sdk.capabilities import require_declared
 from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type
 
@@ -111,7 +112,9 @@ def _part(
     ends = ends_of(name, cls, config, manifest.bus.namespace or "", connect)
     process = options.process or cls.process
     log = LOG_LEVELS[options.log]
-    return Part(name, type_name, cls, config, process, options.starts_after, ends, path, options.restart, log)
+    capabilities = require_declared(type_name, cls.capabilities(config), (end.name for end in ends), type(config))
+    after, restart = options.starts_after, options.restart
+    return Part(name, type_name, cls, config, process, after, ends, path, restart, log, capabilities)
 
 
 def _mux_sources(manifest: RobotManifest) -> dict[str, dict[str, str]]:

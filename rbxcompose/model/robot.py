@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 from rbxcompose.config import Config
 from rbxcompose.diagnostics.levels import Level
@@ -18,8 +18,11 @@ from rbxcompose.missions.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource
 from rbxcompose.model.wiring import End
 from rbxcompose.restarts import DEFAULT, Restart
+from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import In, Out
+
+K = TypeVar("K", bound=Capability)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +39,15 @@ class Part:
     path: Path = ()
     restart: Restart = DEFAULT
     log: Level = Level.OK  # the least of what goes to the log
+    capabilities: tuple[Capability, ...] = ()
 
     def end(self, port: str) -> End | None:
         """Return the end of a port, or None."""
         return next((end for end in self.ends if end.name == port), None)
+
+    def declared(self, kind: type[K]) -> list[K]:
+        """Return the capabilities of a kind."""
+        return [one for one in self.capabilities if isinstance(one, kind)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +109,10 @@ class Robot:
         for part in self.parts.values():
             yield from part.ends
 
+    def declared(self, kind: type[K]) -> list[tuple[Part, K]]:
+        """Return the capabilities of a kind, each with the part that declares it."""
+        return [(part, one) for part in self.parts.values() for one in part.declared(kind)]
+
     def key(self, *path: str | int) -> Span:
         """Return the place of a key of the composed manifest, or of the nearest one above it."""
         return key_span(self.manifest.root, path)
@@ -117,6 +129,11 @@ class Robot:
     def part_span(self, name: str) -> Span:
         """Return the place of the name of a part."""
         return key_span(self.manifest.root, self.parts[name].path)
+
+    def entry_span(self, name: str) -> Span:
+        """Return the place of the robot's own entry that brings a part: that of the part, or what includes it."""
+        brought = (one.span for one in self.manifest.parts.values() if name in one.components)
+        return next(brought, None) or self.part_span(name)
 
 
 def _by_topic(ends: Iterable[End]) -> AnyMapping[str, list[End]]:

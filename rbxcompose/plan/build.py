@@ -5,21 +5,20 @@ from __future__ import annotations
 from rbxcompose.model.order import start_order
 from rbxcompose.model.robot import Part, Robot
 from rbxcompose.plan.model import BusPlan, Instance, Plan, Wire
-
-LAST = "mission"  # starts when everything else is active
+from rbxcompose.sdk.capabilities import RunsMissions
 
 
 def build_plan(robot: Robot) -> Plan:
     """Return what `up` has to do; the robot must be without errors."""
     manifest = robot.manifest
-    order = start_order({name: part.starts_after for name, part in robot.parts.items() if name != LAST})
-    if LAST in robot.parts:
-        order.append(LAST)
+    missions = (part.name for part, _ in robot.declared(RunsMissions))
+    last = [name for name in missions if name not in robot.written]  # starts when everything else is active
+    order = start_order({name: part.starts_after for name, part in robot.parts.items() if name not in last})
     bus = manifest.bus
     return Plan(
         robot=manifest.name,
         file=str(manifest.path),
-        instances=tuple(_instance(robot.parts[name]) for name in order),
+        instances=tuple(_instance(robot.parts[name]) for name in (*order, *last)),
         bus=BusPlan(bus.domain, bus.namespace or "", bus.port, bus.wire, bus.router, bus.clock),
         start=manifest.start,
         is_simulated=manifest.is_simulated,

@@ -9,7 +9,7 @@ import os
 import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rbxcompose.replacing import TEMPORARY, replace_file
@@ -49,6 +49,15 @@ class ComponentState:
 
 
 @dataclass(frozen=True, slots=True)
+class Gauge:
+    """Where a battery tells its charge: the topic, the type of its messages, the unit of the number in them."""
+
+    topic: str
+    message: str
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class RobotState:
     """What is known of a robot from outside, also when its supervisor is dead."""
 
@@ -60,6 +69,8 @@ class RobotState:
     router: str | None = None
     boot: str = ""
     domain: int = 0
+    batteries: Mapping[str, Gauge] = field(default_factory=dict)  # by component
+    executive: str | None = None  # the component that runs missions
 
     def to_text(self) -> str:
         """Return the text of the state file: a checksum, then JSON."""

@@ -18,12 +18,13 @@ from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.plugins import BrokenPluginError
 from rbxcompose.scaffold.answers import ANSWER, AnswerError, read_place
 from rbxcompose.scaffold.texts import render
+from rbxcompose.sdk.capabilities import Drives
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import In
-from rbxcompose.sdk.registry import component_names, component_type
+from rbxcompose.sdk.registry import component_names, component_type, declared
 
 ABOUT = "Goes to its places, and home to charge when the battery is low."
 BASE = "diff_drive_sim"
+COMMANDS = "cmd_vel"  # the mux of the template
 DOCK = Place("dock", 0.0, 0.0, 0.0)
 PLACES = (Place("table", 2.0, 0.0, 0.0), Place("window", 2.0, 1.5, math.pi / 2))
 MOST_PLACES = 20
@@ -31,7 +32,6 @@ MOST_PLACES = 20
 _SPEED = 0.3  # [m/s] of the template
 _USED = ("battery", "place", "pose", "low", "go_to", "recharge")  # by the robot and its mission
 _WORDS = ("and", "or", "not", "in", "is", "lambda", "do", "else", "then")
-_BASE_SETTINGS = {"max_speed": "0.5 m/s", "max_turn_rate": "90 deg/s", "command_timeout": "0.5 s"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ def read_next_place(text: str, before: Sequence[Place]) -> Place:
 
 
 def read_base(name: str) -> str:
-    """Return a component type that can be the base: it follows `cmd_vel` and needs no settings.
+    """Return a component type that can be the base: it drives by `cmd_vel` and needs no settings.
 
     Raises:
         AnswerError: if there is no such type, or it is none.
@@ -110,21 +110,33 @@ def read_base(name: str) -> str:
     except BrokenPluginError as error:
         raise AnswerError(ANSWER.at(None, str(error), help=f"take '{BASE}'")) from error
     try:
-        config = base.config_type().model_validate({})
+        drives = _drives(base)
     except ValidationError:
         help_text = f"take '{BASE}', and write the other one into the file"
         raise AnswerError(ANSWER.at(None, f"'{name}' needs settings of its own", help=help_text)) from None
-    if not _follows_commands(base, config):
+    if drives is None:
         raise AnswerError(ANSWER.at(None, f"'{name}' is no base: it does not follow 'cmd_vel'", help=f"take '{BASE}'"))
     return name
 
 
-def _follows_commands(base: type[Component[Config]], config: Config) -> bool:
-    ports = base.ports(config).values()
-    return any(isinstance(port, In) and port.topic == "cmd_vel" and port.interface is Twist for port in ports)
+def _drives(base: type[Component[Config]]) -> Drives | None:
+    """Return how a component drives by `cmd_vel` with the settings that it has by itself; None if it does not.
+
+    Raises:
+        ValidationError: if it needs settings.
+    """
+    config = base.config_type().model_validate({})
+    ports = base.ports(config)
+    for one in declared(base.type_name, config, Drives):
+        if ports[one.commands].topic == COMMANDS and ports[one.commands].interface is Twist:
+            return one
+    return None
 
 
 def _base_settings(base: str) -> dict[str, str]:
     """Return the usual settings of a base, as far as it has them."""
-    known = component_type(base).config_type().model_fields
-    return {key: value for key, value in _BASE_SETTINGS.items() if key in known}
+    drives = _drives(component_type(base))
+    if drives is None:
+        return {}
+    usual = ((drives.max_speed, "0.5 m/s"), (drives.max_turn_rate, "90 deg/s"), (drives.stops_after, "0.5 s"))
+    return {setting.field: text for setting, text in usual if setting and setting.field}

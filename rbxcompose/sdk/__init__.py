@@ -23,6 +23,18 @@ from rbxcompose.qos import Qos
 from rbxcompose.requests import Command, Query, Refused, answers
 from rbxcompose.robot_events import MissionOver, MissionWaits
 from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal, ServedGoal
+from rbxcompose.sdk.capabilities import (
+    Capability,
+    Charges,
+    CommandsMotion,
+    Drains,
+    Drives,
+    Forwards,
+    Navigates,
+    RunsMissions,
+    Setting,
+    WritesFrame,
+)
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component
@@ -36,10 +48,16 @@ __all__ = [
     "AngularSpeed",
     "Calls",
     "CallsAction",
+    "Capability",
+    "Charges",
     "Command",
+    "CommandsMotion",
     "Component",
     "Config",
+    "Drains",
+    "Drives",
     "Ended",
+    "Forwards",
     "Frequency",
     "In",
     "Length",
@@ -49,6 +67,7 @@ __all__ = [
     "MissionOver",
     "MissionWaits",
     "Name",
+    "Navigates",
     "Out",
     "Outcome",
     "Place",
@@ -60,14 +79,17 @@ __all__ = [
     "Ratio",
     "Refused",
     "Reply",
+    "RunsMissions",
     "Secret",
     "SentGoal",
     "ServedGoal",
     "Serves",
     "ServesAction",
     "ServesTopic",
+    "Setting",
     "Speed",
     "Time",
+    "WritesFrame",
     "answers",
     "component",
     "skill",

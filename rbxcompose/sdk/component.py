@@ -13,6 +13,7 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.requests import Command, Query, Refused, Request, Requests, answering, requests
 from rbxcompose.robot_events import RobotEvent
 from rbxcompose.sdk.bound import Window
+from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.ports import Port
 
 A = TypeVar("A")
@@ -91,6 +92,11 @@ class Component(Generic[C]):
         """Return all ports by name; override and add those that depend on the configuration."""
         here: Any = cls  # for mypy, classes of a generic are not hashable
         return dict(_declared_ports(here))
+
+    @classmethod
+    def capabilities(cls, config: C) -> tuple[Capability, ...]:
+        """Return what checks and commands should know of a component with this configuration."""
+        return ()
 
     @property
     def now(self) -> float:

@@ -6,11 +6,14 @@ import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from rbxcompose.config import Config
 from rbxcompose.plugins import BrokenPluginError, Plugins
+from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Port, ServesTopic
 
 T = TypeVar("T", bound=type[Component[Any]])
+K = TypeVar("K", bound=Capability)
 
 PLUGINS = Plugins("component", "rbxcompose.components")
 _TYPES: dict[str, type[Component[Any]]] = {}
@@ -64,6 +67,11 @@ def component_type(name: str) -> type[Component[Any]]:
     if name not in _TYPES:
         _load(name)
     return _TYPES[name]
+
+
+def declared(name: str, config: Config, kind: type[K]) -> list[K]:
+    """Return the capabilities of a kind that a component of type `name` has with this configuration."""
+    return [one for one in component_type(name).capabilities(config) if isinstance(one, kind)]
 
 
 def usable_names() -> list[str]:

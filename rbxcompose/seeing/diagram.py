@@ -12,10 +12,11 @@ from rbxcompose.missions.sources import Way
 from rbxcompose.missions.watching import POSE
 from rbxcompose.model.robot import Part, Robot, RobotMission
 from rbxcompose.model.wiring import End
+from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction
 from rbxcompose.seeing.wire_keys import qos_of
 
-MUX, MISSION = "mux", "mission"  # types with a shape of their own
+MISSION = "mission"  # the part that runs missions
 TRANSFORMS = ("/tf", "/tf_static")  # what a look-up reads
 STATUSES = "/diagnostics"  # where every component reports, though none declares it
 
@@ -144,7 +145,7 @@ def _programs(robot: Robot) -> list[str]:
 
 def _boxes(robot: Robot) -> Iterator[Box]:
     for part in robot.parts.values():
-        shape = Shape.MUX if part.type_name == MUX else Shape.COMPONENT
+        shape = Shape.MUX if part.declared(Forwards) else Shape.COMPONENT
         about = (part.cls.__doc__ or "").strip().partition("\n")[0]
         yield Box(part.name, part.name, part.type_name, part.process, shape, about)
     for name in _programs(robot):

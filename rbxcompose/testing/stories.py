@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from rbxcompose.bus.goals import GoalState
 from rbxcompose.bus.names import ActionNames
 from rbxcompose.clock import NANOSECONDS
-from rbxcompose.components.diff_drive_sim import DiffDriveSim, DiffDriveSimConfig
 from rbxcompose.components.mux import MuxConfig
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.action_msgs import GoalStatusArray
@@ -16,8 +15,9 @@ from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.recording.message import Recorded
+from rbxcompose.sdk.capabilities import Drives
 from rbxcompose.sdk.ports import ServesAction
-from rbxcompose.sdk.registry import component_type
+from rbxcompose.sdk.registry import component_type, declared
 from rbxcompose.testing.invariants import Base, Claim, Event, Laws, Ordered, Sent, Source, Switch, Told
 
 
@@ -25,7 +25,7 @@ def laws_of(plan: Plan, *, slack: float = 0.0, is_lossless: bool = False, longes
     """Return what a robot has to keep to: its bases, its muxes of velocities, what its actions claim."""
     switches = (_switch(one) for one in plan.instances if isinstance(one.config, MuxConfig) and _is_twist(one.config))
     return Laws(
-        bases=[_base(one, one.config) for one in plan.instances if isinstance(one.config, DiffDriveSimConfig)],
+        bases=list(_bases(plan)),
         switches=list(switches),
         claims=dict(_claims(plan)),
         longest_goal=longest_goal,
@@ -58,15 +58,15 @@ def _velocity(twist: Twist) -> tuple[float, float]:
     return twist.linear.x, twist.angular.z
 
 
-def _base(instance: Instance, config: DiffDriveSimConfig) -> Base:
-    return Base(
-        command=instance.topic("cmd_vel"),
-        motion=instance.topic("odom"),
-        process=instance.process,
-        timeout=config.command_timeout,
-        cycle=1.0 / DiffDriveSim.rate,
-        deceleration=(config.acceleration, config.turn_acceleration),
-    )
+def _bases(plan: Plan) -> Iterator[Base]:
+    """Yield the bases that say how they brake."""
+    for one in plan.instances:
+        for drives in declared(one.type, one.config, Drives):
+            timeout, straight, turning = drives.stops_after, drives.acceleration, drives.turn_acceleration
+            if timeout and straight and turning and drives.odometry:
+                command, motion = one.topic(drives.commands), one.topic(drives.odometry)
+                cycle = 1.0 / component_type(one.type).rate
+                yield Base(command, motion, one.process, timeout.value, cycle, (straight.value, turning.value))
 
 
 def _is_twist(config: MuxConfig) -> bool:

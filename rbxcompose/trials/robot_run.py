@@ -15,6 +15,8 @@ from rbxcompose.missions.world import World
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Refused
+from rbxcompose.sdk.capabilities import RunsMissions
+from rbxcompose.sdk.registry import declared
 from rbxcompose.testing.bench import Bench
 from rbxcompose.trials.mocked import Mocked, SetValues
 from rbxcompose.trials.model import Deed, Event, Trial
@@ -25,7 +27,6 @@ from rbxcompose.trials.stage import LONGEST
 OWNER = "test"
 Ended = Callable[[int, Result], None]
 BEGINS_WITHIN = 60.0  # [s] after the last event of the test, else something never comes
-EXECUTIVE = "mission"  # the type of the component that runs missions
 _COMMANDS = {"pause": PauseMission, "resume": ResumeMission, "cancel": CancelMission}
 
 
@@ -43,7 +44,7 @@ class RobotRun:
         self.events = list(trial.events)  # that are still to come
         plan = _with_mission(trial.plan, trial)
         self.bench = Bench(plan=plan, start=False)
-        name = next(one.name for one in plan.instances if one.type == EXECUTIVE)
+        name = next(one.name for one in plan.instances if declared(one.type, one.config, RunsMissions))
         executive = self.bench.component(name)
         if not isinstance(executive, Mission):
             raise TypeError(f"'{name}' runs no missions")

@@ -27,8 +27,10 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plain import FORBIDDEN, columns
 from rbxcompose.runtime.records import Record
 from rbxcompose.testing.golden import Golden
+from tests.third_party.places import put
 
 ROOT = Path(__file__).parents[2]
+STRANGERS = Path(__file__).parents[1] / "checks" / "strangers.py"
 PATIENCE = 20.0  # [s]
 PARTS = (
     Part("battery", "battery_sim", "active", "world", 0, 1.0, Level.WARN, "Medium battery"),
@@ -96,14 +98,18 @@ def test_colours_change_nothing_but_the_colour() -> None:
 
 
 class Robot:
-    """Only a battery and what every robot has."""
+    """A base, two batteries, one of them from somebody else's package, and what every robot has."""
 
     def __init__(self, base: Path) -> None:
-        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(base), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
+        site = base / "site"
+        put(site, "strange-robots", {"component.toy_cell": "strangers"}, {"strangers.py": STRANGERS.read_text("utf-8")})
+        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(base), "NO_COLOR": "1"}
+        self.environment["PYTHONPATH"] = os.pathsep.join([str(ROOT), str(site)])
         self.file = base / "robot.yaml"
         self.file.write_text(
             "rbx: 1\nkind: Robot\nname: topped\nbus: {port: 7990}\n"
-            "components: {battery: {type: battery_sim, runtime: 1 h}, base: {type: diff_drive_sim}}\n",
+            "components:\n  battery: {type: battery_sim, runtime: 1 h}\n  base: {type: diff_drive_sim}\n"
+            "  cell: {type: toy_cell, lasts: 1 h}\n",
             encoding="utf-8",
         )
 
@@ -136,13 +142,14 @@ def robot() -> Iterator[Robot]:
 def test_without_a_terminal_one_picture_is_shown(robot: Robot) -> None:
     shown = robot.seen()
     deadline = time.monotonic() + PATIENCE
-    while not shown["batteries"] and time.monotonic() < deadline:  # right after the start it has not reported yet
+    while len(shown["batteries"]) < 2 and time.monotonic() < deadline:  # right after the start they tell nothing yet
         shown = robot.seen()
     parts = {one["name"]: one for one in shown["components"]}
     assert 20.0 < parts["base"]["rate"] < 200.0  # twice 50 Hz: odom and tf
     assert {one["process"] for one in shown["processes"]} >= {"supervisor", "parent", "router", "world", "robot"}
     assert all(one["memory"] > 1e6 and one["cpu"] is not None for one in shown["processes"])
-    assert {"battery"} == set(shown["batteries"])
+    assert shown["batteries"].keys() == {"battery", "cell"}
+    assert shown["batteries"]["cell"] == "62.5 %"
     assert "topped: router tcp/127.0.0.1:" in robot.do("top", str(robot.file)).stdout
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import subprocess
 import sys
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 from rbxcompose.compiler import compile_robot
 from rbxcompose.plan.model import Instance
 from rbxcompose.rendering.text import render_text
+from rbxcompose.sdk.capabilities import require_declared, settings_of
 from rbxcompose.sdk.ports import In, Serves
 from rbxcompose.sdk.registry import component_names, component_type
 from rbxcompose.testing import Bench, clock_uses
@@ -75,6 +77,14 @@ def test_it_has_a_handler_for_each_input_and_service(name: str, tmp_path: Path) 
 
 def overrides_received(cls: type[Any]) -> bool:
     return "received" in vars(cls)
+
+
+@all_types
+def test_its_capabilities_name_ports_and_fields_that_it_has_with_their_values(name: str, tmp_path: Path) -> None:
+    cls, config = component_type(name), instance_of(name, tmp_path).config
+    declared = require_declared(name, cls.capabilities(config), cls.ports(config), type(config))
+    settings = [setting for one in declared for setting in settings_of(one) if setting.field]
+    assert [setting.value for setting in settings] == [attrgetter(setting.field)(config) for setting in settings]
 
 
 @all_types

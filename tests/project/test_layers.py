@@ -40,8 +40,8 @@ ABOVE = {
     "bus": "sdk.bound",
     "checking": "missions.checking model.robot",
     "checks": "checking diagnostics.core manifest missions model sdk",
-    "cli": "body.transforms bus compiler diagnostics.levels doctor executive.requests lsp.server manifest missions model "
-    "pages params plan recording rendering rerun runtime scaffold schema.documents sdk seeing trials",
+    "cli": "body.transforms bus compiler diagnostics.levels doctor executive.requests lsp.server manifest missions "
+    "model pages params plan recording rendering rerun runtime scaffold schema.documents sdk seeing trials",
     "compiler": "checking manifest model plan",
     "components": "diagnostics executive missions mux.core navigation.go_to sdk sim",
     "diagnostics": "",
@@ -68,8 +68,8 @@ ABOVE = {
     "skills": "sdk",
     "testing": "bus compiler components diagnostics.levels model.wiring plan.model recording.message rendering.text "
     "runtime.process_group runtime.records sdk",
-    "trials": "compiler components.mission diagnostics.levels executive.requests executive.world manifest missions model plan.model sdk "
-    "testing.bench",
+    "trials": "compiler components.mission diagnostics.levels executive.requests executive.world manifest missions model "
+    "plan.model sdk testing.bench",
 }
 CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}  # pure: no bus, thread or clock
 TABLE = {

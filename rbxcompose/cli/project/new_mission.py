@@ -9,8 +9,7 @@ from pathlib import Path, PurePosixPath
 from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
-from rbxcompose.model.charging import GO_TO, server
-from rbxcompose.model.flow import Flow, setting
+from rbxcompose.model.charging import navigator_of, top_speed
 from rbxcompose.model.robot import Robot
 from rbxcompose.replacing import replace_file
 from rbxcompose.scaffold.answers import ANSWER, AnswerError
@@ -38,10 +37,8 @@ class Home:
         file = PurePosixPath(self.file.relative_to(self.project))
         places = tuple(self.robot.manifest.places.values())
         for skill in sorted(self.robot.skills) if places else ():
-            if driver := server(self.robot, skill, GO_TO):
-                parts = [driver, *(base for one, base in Flow(self.robot).drives() if one is driver)]
-                limits = [setting(part, key) for part in parts for key in ("speed", "max_speed")]
-                return MissionAnswers(name, file, places, skill, min(limit for limit in limits if limit))
+            if driver := navigator_of(self.robot, skill):
+                return MissionAnswers(name, file, places, skill, top_speed(self.robot, *driver))
         return MissionAnswers(name, file)
 
     def add(self, answers: MissionAnswers) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from rbxcompose.bus.graph import End, Graph, Name
@@ -14,20 +15,20 @@ from rbxcompose.cli.robots.picture import MOST_WARNINGS, Load, Part, Picture, Tr
 from rbxcompose.diagnostics.levels import Level, level_of
 from rbxcompose.missions.mirror import ACTIVE, status_list
 from rbxcompose.missions.picture import picture_from_data
+from rbxcompose.msgs import registry
 from rbxcompose.msgs.cdr import CdrError, decode
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
-from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
+from rbxcompose.runtime.folder import ComponentState, Gauge, RobotFolder, RobotState
 from rbxcompose.runtime.follow import Follower
 from rbxcompose.runtime.log import NAME
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.records import Record
 from rbxcompose.seeing.mission_text import running_lines
+from rbxcompose.units import UNITS
 
 _HEALTH = "/diagnostics_agg"
 _SUPERVISOR = "supervisor"
-_CHARGE = "level"  # the key under which a battery tells its charge
 _WIDEST = 200  # columns of a line of a mission
-_BATTERY, _MISSION = "battery", "mission"  # how the types of such components begin
 
 
 class Sampler:
@@ -42,6 +43,8 @@ class Sampler:
         self._follower = Follower(folder.path / NAME)
         self._warnings: deque[Record] = deque(maxlen=MOST_WARNINGS)
         self._statuses: Mapping[str, DiagnosticStatus] = {}
+        self._gauges: Mapping[str, Gauge] = {}  # by topic
+        self._charges: dict[str, float] = {}  # ratios, by topic
         self._listened: set[str] = set()
         self._counts: Counter[bytes] = Counter()
         self._times: dict[Process, float] = {}
@@ -54,9 +57,10 @@ class Sampler:
 
     @property
     def is_complete(self) -> bool:
-        """Tell whether the diagnostics have been heard and the missions seen, if there are any."""
+        """Tell whether diagnostics and batteries have been heard and the missions seen, if there are any."""
         is_healthy = _HEALTH not in self._listened or bool(self._statuses)
-        return is_healthy and (self._missions is None or self._missions.is_complete)
+        is_charged = self._charges.keys() >= self._gauges.keys() & self._listened
+        return is_healthy and is_charged and (self._missions is None or self._missions.is_complete)
 
     def sample(self) -> Picture | None:
         """Return how things are now, or None if the robot is down."""
@@ -66,20 +70,22 @@ class Sampler:
         elapsed = None if self._then is None else now - self._then
         self._then = now
         graph = self._guest.graph()
+        self._gauges = {one.topic: one for one in state.batteries.values()}
         self._listen(graph)
         self._warnings.extend(one for one in self._follower.read() if one.level is not Level.OK)
         return self._picture(state, self._rates(graph, elapsed), self._loads(state, elapsed))
 
     def _listen(self, graph: Graph) -> None:
         for topic in graph.topics:
-            if topic.name not in self._listened and topic.givers and (topic.name == _HEALTH or _is_light(topic)):
+            is_wanted = topic.name == _HEALTH or topic.name in self._gauges or _is_light(topic)
+            if topic.name not in self._listened and topic.givers and is_wanted:
                 self._listened.add(topic.name)
-                self._guest.listen(topic, self._healthy if topic.name == _HEALTH else self._count)
+                self._guest.listen(topic, partial(self._heard, topic.name))
 
     def _trees(self, state: RobotState) -> list[Tree]:
         """Follow the missions of a robot that has some, and return those that run, if their process lives."""
         alive = state.alive()
-        if not any(one.type == _MISSION and one.process in alive for one in state.components):
+        if not any(one.name == state.executive and one.process in alive for one in state.components):
             return []
         if self._missions is None:
             self._missions = MissionsSeen(self._guest, state.robot)
@@ -87,11 +93,15 @@ class Sampler:
         active = {name: seen for name, seen in self._missions.by_name.items() if seen["state"] in ACTIVE}
         return [_tree(name, seen) for name, seen in sorted(active.items())]
 
-    def _count(self, heard: Heard) -> None:
+    def _heard(self, topic: str, heard: Heard) -> None:
         self._counts[heard.sender] += 1
+        if topic == _HEALTH:
+            self._healthy(heard)
+        elif gauge := self._gauges.get(topic):
+            charge = _charge(gauge, heard)
+            self._charges |= {} if charge is None else {topic: charge}
 
     def _healthy(self, heard: Heard) -> None:
-        self._count(heard)
         if heard.kind.type != DiagnosticArray.TYPE:
             return
         try:
@@ -127,11 +137,11 @@ class Sampler:
         leaves = {name.rpartition("/")[2]: one for name, one in self._statuses.items() if name.count("/") > 1}
         alive = state.alive()
         parts = [_part(one, one.process in alive, rates, leaves.get(one.name)) for one in state.components]
-        missions = [one.message for one in parts if one.type == _MISSION and one.message]
+        missions = [one.message for one in parts if one.name == state.executive and one.message]
         batteries = [
-            (one.name, _charge(leaves[one.name]))
-            for one in parts
-            if one.type.startswith(_BATTERY) and one.name in leaves
+            (name, f"{100 * self._charges[one.topic]:.1f} %")
+            for name, one in state.batteries.items()
+            if one.topic in self._charges
         ]
         groups = [one for one in self._statuses.values() if one.name.count("/") == 1]
         return Picture(
@@ -156,6 +166,19 @@ def _component(end: End) -> str:
     return end.node.rpartition("/")[2]
 
 
+def _charge(gauge: Gauge, heard: Heard) -> float | None:
+    """Return the charge that a message tells (a ratio); None if it tells none."""
+    try:
+        message = decode(registry.message(heard.kind.type), heard.arrival.payload)
+    except (CdrError, KeyError):  # broken, or of a package that is not here
+        return None
+    values = [getattr(message, name) for name in message.FIELDS]
+    if heard.kind.type != gauge.message or len(values) != 1 or not isinstance(values[0], int | float):
+        return None
+    unit = UNITS.get(gauge.unit)
+    return unit.to_si(values[0]) if unit else float(values[0])
+
+
 def _tree(name: str, seen: Mapping[str, Any]) -> Tree:
     picture = picture_from_data(seen["picture"])
     return Tree(name, seen["state"], running_lines(picture, status_list(seen, picture.count), _WIDEST))
@@ -172,7 +195,3 @@ def _part(one: ComponentState, is_alive: bool, rates: Mapping[str, float], told:
         None if told is None else level_of(told.level),
         "" if told is None else told.message,
     )
-
-
-def _charge(status: DiagnosticStatus) -> str:
-    return next((pair.value for pair in status.values if pair.key == _CHARGE), status.message)

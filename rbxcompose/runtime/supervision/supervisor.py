@@ -16,17 +16,21 @@ from types import FrameType
 
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.diagnostics.levels import Level
+from rbxcompose.plan.model import Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.control import ControlServer
 from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
 from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
+from rbxcompose.runtime.supervision.gauges import gauges_of
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.runtime.supervision.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
 from rbxcompose.runtime.supervision.silence import DEAD, LOOK
 from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk.capabilities import RunsMissions
+from rbxcompose.sdk.registry import declared
 
 _TAIL = 8000  # [B] of what a process printed that go into the log
 _HANG_MARK = "Timeout (0:00:"  # what the self-watchdog of a process prints before the place where it hung
@@ -278,16 +282,19 @@ class Supervisor:
     def state(self) -> RobotState:
         """Return what the state file and `ps` tell."""
         running = {name: child.process for name, child in self._children.items() if child.process is not None}
-        components = tuple(self._component(one.name, one.type, one.process) for one in self.conductor.plan.instances)
+        plan = self.conductor.plan
+        components = tuple(self._component(one.name, one.type, one.process) for one in plan.instances)
         return RobotState(
             robot=self._launch.plan.robot,
-            file=os.path.realpath(self.conductor.plan.file),
+            file=os.path.realpath(plan.file),
             supervisor=Process.of(os.getpid()),
             processes={"parent": self._parent_process, **running},
             components=components,
             router=self.conductor.endpoint,
             boot=boot_id(),
             domain=self._launch.plan.bus.domain,
+            batteries=gauges_of(plan),
+            executive=_executive(plan),
         )
 
     def _component(self, name: str, type_name: str, process: str) -> ComponentState:
@@ -308,3 +315,8 @@ class Supervisor:
             self._folder.write_state(self.state())
         except OSError as error:  # the robot does not depend on it
             self.log(Level.WARN, f"the state file cannot be written: {error}")
+
+
+def _executive(plan: Plan) -> str | None:
+    found = [one.name for one in plan.instances if declared(one.type, one.config, RunsMissions)]
+    return found[-1] if found else None  # the robot's own starts last

@@ -1,0 +1,87 @@
+"""One frame whose pose two components write."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rbxcompose.checking import check
+from rbxcompose.findings import Finding, Related, Severity, Span
+from rbxcompose.model.flow import is_written, setting_span
+from rbxcompose.model.robot import Part, Robot
+from rbxcompose.model.wiring import End
+from rbxcompose.sdk.capabilities import WritesFrame
+
+STATIC = "_static"  # ends the topic of transforms that never change; both topics tell one tree
+
+
+@check("RBX3014", Severity.WARNING)
+def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
+    """Two components write the pose of the same frame
+
+    A frame has one pose in one other frame. If two components write it, whoever looks it up gets now one pose, now the
+    other, and drives by the wrong one. Two bases do this even if each of them follows commands of its own.
+
+    Bad:
+    ```yaml
+    components:
+      trailer:
+        type: diff_drive_sim
+        connect:
+          cmd_vel: trailer_vel
+          odom: trailer/odom
+    muxes:
+      trailer_vel:
+        inputs:
+          teleop:
+            priority: 100
+            timeout: 0.5 s
+    ```
+    Good:
+    ```yaml
+    components:
+      trailer:
+        type: diff_drive_sim
+        connect:
+          cmd_vel: trailer_vel
+          odom: trailer/odom
+          tf: trailer/tf
+    muxes:
+      trailer_vel:
+        inputs:
+          teleop:
+            priority: 100
+            timeout: 0.5 s
+    ```
+    """
+    first: dict[tuple[str, str], Writer] = {}
+    for one in sorted(_writers(robot), key=lambda one: one.part.name in robot.written):
+        other = first.setdefault((one.end.topic.removesuffix(STATIC), one.frame.child.value), one)
+        if other.part is not one.part:
+            name = one.part.name
+            yield one_frame_two_writers.at(
+                one.span(robot),
+                f"'{name}' and '{other.part.name}' both write the pose of the frame '{one.frame.child.value}'",
+                help=f"leave one of them out, or take another topic: 'connect: {{{one.end.name}: {name}/tf}}'",
+                related=[Related(other.span(robot), "the other one")] if other.part.name in robot.written else [],
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Writer:
+    """A part that writes a frame, and the end where it does."""
+
+    part: Part
+    frame: WritesFrame
+    end: End
+
+    def span(self, robot: Robot) -> Span:
+        """Return the place of the frame's name if it is written down, else that of what brings the part."""
+        part, field = self.part, self.frame.child.field
+        return setting_span(robot, (part, field)) if is_written(robot, part, field) else robot.entry_span(part.name)
+
+
+def _writers(robot: Robot) -> Iterator[Writer]:
+    for part, frame in robot.declared(WritesFrame):
+        if end := part.end(frame.transforms):
+            yield Writer(part, frame, end)

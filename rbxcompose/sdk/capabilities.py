@@ -1,0 +1,160 @@
+"""Capabilities: what the compiler and the tools need to know of a component, as the component itself declares it.
+
+Nobody knows a component by its type's name: somebody else's battery, base or driver counts as much as ours. A text in a
+capability is the name of a port of the component; everything else is a `Setting`. Quantities are in SI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from typing import Any, Generic, TypeVar
+
+from rbxcompose.config import Config, Place
+
+T_co = TypeVar("T_co", covariant=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Setting(Generic[T_co]):
+    """A value and the field of the configuration that it is from: `Setting(config.max_speed, "max_speed")`.
+
+    Findings point at that field in the manifest. A field of a field is written with a dot; a value that cannot be
+    configured has no field.
+    """
+
+    value: T_co
+    field: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Capability:
+    """Something that a component can do, or does to the robot; the set is closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drives(Capability):
+    """A base: it moves the robot as the velocities at its input `commands` say."""
+
+    commands: str
+    odometry: str = ""
+    """The output that tells how it moves."""
+    max_speed: Setting[float] | None = None
+    """It cuts faster commands to this [m/s]."""
+    max_turn_rate: Setting[float] | None = None
+    """It cuts faster turns to this [rad/s]."""
+    drops_above: Setting[float] | None = None
+    """It drops commands above this many times its limits instead of cutting them."""
+    stops_after: Setting[float] | None = None
+    """It brakes when no command came for so long [s]."""
+    acceleration: Setting[float] | None = None
+    """Also that of braking [m/s^2]."""
+    turn_acceleration: Setting[float] | None = None
+    """Also that of braking [rad/s^2]."""
+
+
+@dataclass(frozen=True, slots=True)
+class CommandsMotion(Capability):
+    """It sends velocities for a base at its output `commands`, at most these."""
+
+    commands: str
+    max_speed: Setting[float] | None = None
+    """[m/s]."""
+    max_turn_rate: Setting[float] | None = None
+    """[rad/s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Navigates(Capability):
+    """It takes the robot to the pose that the main argument of the skill at its port `goals` tells."""
+
+    goals: str
+    tolerance: Setting[float] | None = None
+    """How far from the goal it may end [m]."""
+    max_speed: Setting[float] | None = None
+    """[m/s], unless it tells that as what it commands."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drains(Capability):
+    """A battery: its output `level` tells its charge, by the only field of the message and in the unit of the port."""
+
+    level: str
+    runtime: Setting[float] | None = None
+    """Time from full to empty [s]."""
+    warn: Setting[float] | None = None
+    """Below this charge its status is WARN (a ratio)."""
+    error: Setting[float] | None = None
+    """Below this charge its status is ERROR (a ratio)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Charges(Capability):
+    """It charges the robot's battery, as the skill at its port `goals`."""
+
+    goals: str
+    place: Setting[Place] | None = None
+    """The only place where it does."""
+    reach: Setting[float] | None = None
+    """How far from there the robot may be [m]."""
+    until: Setting[float] | None = None
+    """It is done at or above this charge (a ratio)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Forwards(Capability):
+    """A mux: what leaves at `output` is what came in at one of `inputs`."""
+
+    inputs: tuple[str, ...]
+    output: str
+
+
+@dataclass(frozen=True, slots=True)
+class WritesFrame(Capability):
+    """Its output `transforms` tells the pose of frame `child` in frame `parent`."""
+
+    transforms: str
+    parent: Setting[str]
+    child: Setting[str]
+
+
+@dataclass(frozen=True, slots=True)
+class RunsMissions(Capability):
+    """It runs the robot's missions: its skills are those that are there, and values may come from outside."""
+
+
+def settings_of(capability: Capability) -> Iterator[Setting[Any]]:
+    """Yield the settings of a capability."""
+    yield from (value for value in _values(capability) if isinstance(value, Setting))
+
+
+def require_declared(
+    who: str, capabilities: Iterable[Capability], ports: Iterable[str], config: type[Config]
+) -> tuple[Capability, ...]:
+    """Return the capabilities of the type `who` if their ports and fields exist.
+
+    Raises:
+        ValueError: if one does not.
+    """
+    known, declared = {"", *ports}, tuple(capabilities)
+    for one in declared:
+        what = f"the capability {type(one).__name__} of the type '{who}'"
+        for port in _ports(one):
+            if port not in known:
+                raise ValueError(f"{what} names the port '{port}', which it does not have")
+        for setting in settings_of(one):
+            if setting.field and setting.field.partition(".")[0] not in config.model_fields:
+                raise ValueError(f"{what} names the field '{setting.field}', which its configuration does not have")
+    return declared
+
+
+def _ports(capability: Capability) -> Iterator[str]:
+    for value in _values(capability):
+        if isinstance(value, str):
+            yield value
+        elif isinstance(value, tuple):
+            yield from value  # of several ports
+
+
+def _values(capability: Capability) -> list[object]:
+    return [getattr(capability, one.name) for one in fields(capability)]

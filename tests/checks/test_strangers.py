@@ -1,0 +1,148 @@
+"""Somebody else's components count as much as ours: with theirs, the corpus gives the same findings."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.findings import Finding
+from rbxcompose.runtime.folder import Gauge
+from rbxcompose.runtime.supervision.gauges import gauges_of
+from rbxcompose.scaffold.answers import AnswerError
+from rbxcompose.scaffold.robot import RobotAnswers, read_base, robot_files
+from rbxcompose.sdk import Drains, Setting
+from rbxcompose.testing import check_text
+from tests.checks import strangers
+from tests.misconfig.corpus import Case, cases, run
+
+# The codes of all rules that need to know what a component can do.
+CODES = {
+    *("RBX3001", "RBX3013", "RBX3014", "RBX3102", "RBX3501", "RBX3502", "RBX3503", "RBX3504", "RBX3505"),
+    *("RBX4120", "RBX4121", "RBX4122", "RBX4123", "RBX4124", "RBX4130"),
+}
+TYPES = {"battery_sim": "cell", "diff_drive_sim": "wheels", "go_to": "pilot", "charger": "filler"}
+KEYS = {
+    **{"runtime": "lasts", "warn": "yellow", "error": "red"},
+    **{"max_speed": "fastest", "max_turn_rate": "spin", "command_timeout": "patience"},
+    **{"speed": "pace", "turn_rate": "turn", "tolerance": "off_by", "dock": "station", "reach": "arm"},
+    **{"cmd_vel": "velocity", "odom": "where", "tf": "frames", "go_to": "goals", "recharge": "fill_up"},
+    "battery_level": "charge",
+}
+# Right robots with our fields, ports or process groups outside of a component's own lines.
+ELSEWHERE = {"anchors", "own_process_groups", "two_batteries"}
+ELSEWHERE |= {"profile_chosen", "profile_not_chosen", "set_from_outside"}
+_KEY = re.compile(rf"^( +)({'|'.join(KEYS)}): (?=[^\s{{#])", re.MULTILINE)
+_COMPONENTS = re.compile(r"^components:\n(?: .*\n|\n)*", re.MULTILINE)
+_OURS = re.compile(rf"^  \w+:.*\n    type: (?:{'|'.join(TYPES)})\n(?:    .*\n)*", re.MULTILINE)
+
+
+def strange(text: str) -> str:
+    """Return a text with their components in the place of ours, line by line."""
+    text = _COMPONENTS.sub(lambda section: _OURS.sub(lambda one: _strange_component(one[0]), section[0]), text)
+    text = text.replace("battery.battery_level", "battery.charge").replace("go_to.cmd_vel", "go_to.velocity")
+    text = re.sub(r"\bgo_to: (?=[^\s#])", "take_to: ", text)
+    return re.sub(r"\brecharge\b", "fill_up", text)
+
+
+def _strange_component(text: str) -> str:
+    for ours, theirs in TYPES.items():
+        text = re.sub(rf"type: {ours}$", f"type: toy_{theirs}", text, flags=re.MULTILINE)
+    return _KEY.sub(lambda found: f"{found[1]}{KEYS[found[2]]}: ", text)
+
+
+def concerned() -> list[Case]:
+    wrong = [case for case in cases() if CODES & {code for _, _, code in case.expected}]
+    return wrong + [case for case in cases() if not case.kind and case.name not in ELSEWHERE]
+
+
+@pytest.mark.parametrize("case", concerned(), ids=lambda case: case.name)
+def test_a_strangers_robot_gets_the_findings_of_ours(case: Case, tmp_path: Path) -> None:
+    theirs = replace(case, files={name: strange(text) for name, text in case.files.items()})
+    assert run(theirs, tmp_path / "theirs").found == run(case, tmp_path / "ours").found
+
+
+def test_each_rule_is_tried_on_a_strangers_robot() -> None:
+    changed = [case for case in concerned() if any("toy_" in strange(text) for text in case.files.values())]
+    assert {code for case in changed for _, _, code in case.expected} >= CODES
+
+
+HEAD = "rbx: 1\nkind: Robot\nname: strange\n"
+
+
+def found(components: str, folder: Path) -> list[Finding]:
+    return list(check_text(f"{HEAD}components:\n{components}", folder).compilation.report)
+
+
+def test_findings_name_the_strangers_own_settings(tmp_path: Path) -> None:
+    [finding] = found("  base: {type: toy_wheels}\n  pilot:\n    type: toy_pilot\n    pace: 0.9 m/s\n", tmp_path)
+    assert finding.help == "make 'pace' of 'pilot' at most 0.5 m/s"
+    assert [one.message for one in finding.related] == ["'fastest' of the base"]
+
+
+def test_what_is_fixed_is_told_at_the_type(tmp_path: Path) -> None:
+    text = "  base:\n    type: toy_fixed_wheels\n  pilot:\n    type: toy_fixed_pilot\n"
+    [braking] = found(text, tmp_path)  # an error, with which no warning is told
+    assert (braking.code, braking.span and braking.span.line, braking.help) == (
+        "RBX3501",
+        6,
+        "take another type for one of them",
+    )
+    text = "  base: {type: toy_wheels}\n  pilot:\n    type: toy_fixed_pilot\n"
+    [fast] = found(text, tmp_path)
+    assert (fast.code, fast.span and fast.span.line) == ("RBX3503", 7)
+    assert fast.help == "make 'fastest' of 'base' at least 1 m/s"
+
+
+def test_how_far_above_its_limits_a_base_drops_commands_is_its_own_affair(tmp_path: Path) -> None:
+    text = "  base: {{type: toy_fixed_wheels}}\n  pilot: {{type: toy_pilot, pace: {}}}\n"
+    assert {one.code for one in found(text.format("1.4 m/s"), tmp_path)} == {"RBX3501"}
+    told = [one.message for one in found(text.format("1.6 m/s"), tmp_path) if one.code == "RBX3504"]
+    assert told == ["'pilot' drives with 1.6 m/s, but its base 'base' drops what is above 3 times its limit of 0.5 m/s"]
+
+
+def test_commands_are_followed_through_a_strangers_mux(tmp_path: Path) -> None:
+    text = (
+        "  base: {type: toy_wheels}\n  selector: {type: toy_selector}\n"
+        "  pilot: {type: toy_pilot, pace: 0.9 m/s, connect: {velocity: selected}}\n"
+    )
+    assert [one.code for one in found(text, tmp_path)] == ["RBX3503"]
+    [past] = found(text + "  spare: {type: toy_wheels, connect: {velocity: selected, frames: spare/tf}}\n", tmp_path)
+    assert (past.code, past.help) == ("RBX3102", "listen to the mux's output: 'velocity: cmd_vel'")
+
+
+def test_a_frame_that_can_be_set_is_told_where_it_is_set(tmp_path: Path) -> None:
+    base = "  base: {type: toy_wheels}\n  trailer:\n    type: toy_wheels\n    connect: {velocity: hitch}\n"
+    selector = "  selector: {type: toy_selector, connect: {give: hitch}}\n  pilot: {type: toy_pilot}\n"
+    [finding] = found(f"{selector}{base}    body: base_footprint\n", tmp_path)
+    assert (finding.code, finding.span and finding.span.line) == ("RBX3014", 11)
+    assert found(f"{selector}{base}    body: trailer\n", tmp_path) == []
+
+
+def test_the_battery_of_a_stranger_has_a_gauge(tmp_path: Path) -> None:
+    plan = check_text(f"{HEAD}components:\n  cell: {{type: toy_cell, lasts: 1 h}}\n", tmp_path).plan
+    assert gauges_of(plan) == {"cell": Gauge("/soc", "std_msgs/msg/Float32", "%")}
+
+
+def test_a_new_robot_may_have_a_strangers_base() -> None:
+    text = robot_files(RobotAnswers("cart", base=read_base("toy_wheels")))["robots/cart/robot.yaml"]
+    assert "    type: toy_wheels\n    fastest: 0.5 m/s\n    spin: 90 deg/s\n    patience: 0.5 s\n" in text
+    with pytest.raises(AnswerError, match="does not follow 'cmd_vel'"):
+        read_base("toy_pilot")
+
+
+@pytest.mark.parametrize(
+    ("capability", "told"),
+    [
+        (Drains("level"), "the capability Drains of the type 'toy_wrong' names the port 'level', which it does not"),
+        (Drains("port", Setting(1.0, "life")), "names the field 'life', which its configuration does not have"),
+    ],
+)
+def test_a_capability_of_what_is_not_there_is_an_error_of_its_author(
+    capability: Drains, told: str, tmp_path: Path
+) -> None:
+    thing = strangers.declaring("toy_wrong", capability)
+    with pytest.raises(ValueError, match=told):
+        found(f"  one: {{type: {thing.type_name}}}\n", tmp_path)
