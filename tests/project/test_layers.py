@@ -68,8 +68,8 @@ ABOVE = {
     "skills": "sdk",
     "testing": "bus compiler components diagnostics.levels model.wiring plan.model recording.message rendering.text "
     "runtime.process_group runtime.records sdk",
-    "trials": "compiler components.mission diagnostics.levels executive.requests executive.world manifest missions model "
-    "plan.model sdk testing.bench",
+    "trials": "compiler components.mission diagnostics.levels executive.requests executive.world manifest missions "
+    "model plan.model sdk testing.bench",
 }
 CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}  # pure: no bus, thread or clock
 TABLE = {
