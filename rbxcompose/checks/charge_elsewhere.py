@@ -41,7 +41,7 @@ def charge_elsewhere(robot: Robot) -> Iterator[Finding]:
             node = mission.program.nodes[number]
             charger = server(robot, node.skill, CHARGER)
             dock = getattr(charger.config, "dock", None) if charger else None
-            may_fail = node.modifiers.keys() & {"optional", "only_if"}
+            may_fail = node.may_be_left_out or node.is_forgiven
             if charger is None or not isinstance(dock, Place) or may_fail:
                 continue
             reach = (setting(charger, "reach") or 0.0) + ways.driving.tolerance
