@@ -32,6 +32,14 @@ class Flow(Enum):
     OPEN = auto()  # what of them is done, and when, is not written down
 
 
+class Skipped(Enum):
+    """When a node does nothing, and is skipped itself."""
+
+    NEVER = auto()
+    WITH_ALL_INSIDE = auto()  # if all that it does is skipped
+    PERHAPS = auto()
+
+
 class Serves(Enum):
     """For which nodes a modifier is there."""
 

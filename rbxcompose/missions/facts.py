@@ -20,6 +20,7 @@ from rbxcompose.expressions.tree import Node as Tree
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.answers import Skipped
 from rbxcompose.missions.deeds import written
 from rbxcompose.missions.program import Node, Program
 from rbxcompose.missions.spans import expression_of
@@ -88,7 +89,9 @@ def never_skipped(program: Program, node: Node) -> bool:
     """Tell whether a node is always done, so that its result is success or failure."""
     if node.may_be_left_out:
         return False
-    return node.step.is_done_always(node, lambda child: never_skipped(program, program.nodes[child]))
+    if node.step.skipped is Skipped.WITH_ALL_INSIDE:
+        return any(never_skipped(program, program.nodes[child]) for child in node.children)
+    return node.step.skipped is Skipped.NEVER
 
 
 def is_simple(node: Node) -> bool:

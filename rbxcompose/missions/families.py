@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 from rbxcompose.expressions.check import StaticScope
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import Type
-from rbxcompose.missions.answers import Advice, Flow
+from rbxcompose.missions.answers import Flow, Skipped
 from rbxcompose.missions.look import PLAIN, Form, Look
 from rbxcompose.missions.moments import NO_EFFECTS, Effects
 from rbxcompose.missions.outcomes import Outcomes
@@ -17,13 +17,16 @@ from rbxcompose.missions.program import Node, RobotNames, Step
 
 
 class LeafStep(Step):
-    """A node with none inside."""
+    """A node with none inside: it does one thing once."""
 
     __slots__ = ()
+    skipped = Skipped.NEVER
+    comes_again = False
+    flow = Flow.IN_TURN
+    look = PLAIN
 
-    def is_done_always(self, node: Node, always: Callable[[int], bool]) -> bool:
-        """Tell that it is: only what is inside a node can be left out of it."""
-        return True
+    def endless(self, ends: Outcomes) -> None:
+        """Say nothing: it is done once."""
 
     def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
         """Yield nothing: whether it was started at all, the nodes around it tell."""
@@ -32,25 +35,6 @@ class LeafStep(Step):
     def shows(self, node: Node, scope: StaticScope) -> Mapping[str, Type]:
         """Return nothing: there is none inside."""
         return {}
-
-    def endless(self, ends: Outcomes) -> Advice | None:
-        """Say nothing: it does one thing once."""
-        return None
-
-    @property
-    def comes_again(self) -> bool:
-        """Tell that there is none inside."""
-        return False
-
-    @property
-    def flow(self) -> Flow:
-        """Return that of no nodes."""
-        return Flow.IN_TURN
-
-    @property
-    def look(self) -> Look:
-        """Return that of a plain box."""
-        return PLAIN
 
     @property
     @abstractmethod
@@ -63,20 +47,18 @@ class Deed(LeafStep):
 
     __slots__ = ()
     waits = False
+    only_asks = False
     has_result = False
     lasts = None
 
-    def only_asks(self, node: Node, asks: Callable[[int], bool]) -> bool:
-        """Tell that it does something."""
-        return False
-
 
 class Group(Step):
-    """A node that does nothing by itself: what is done is done by those inside."""
+    """A node that does nothing by itself: what is done is done by those inside, which see what it sees."""
 
     __slots__ = ()
 
-    def only_asks(self, node: Node, asks: Callable[[int], bool]) -> bool:
+    @property
+    def only_asks(self) -> bool:
         """Tell that it decides more than an answer."""
         return False
 
@@ -100,11 +82,41 @@ class Group(Step):
         return False
 
 
-class Choosing(Group):
+class Straight(Group):
+    """A group that goes once through what is inside; tests need not see more of it than that."""
+
+    __slots__ = ()
+
+    @property
+    def comes_again(self) -> bool:
+        """Tell that it does not."""
+        return False
+
+    def endless(self, ends: Outcomes) -> None:
+        """Say nothing: it is done once."""
+
+    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+        """Yield nothing: there is one way through it."""
+        yield from ()
+
+
+class Loop(Group):
+    """A group that comes back to what is inside, or does nothing at all."""
+
+    __slots__ = ()
+    comes_again = True
+    skipped = Skipped.PERHAPS
+
+    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+        """Yield nothing: how often it comes back is a matter of data."""
+        yield from ()
+
+
+class Choosing(Straight):
     """A group that does one of its nodes, or none."""
 
     __slots__ = ()
-    comes_again = False
+    skipped = Skipped.PERHAPS
     flow = Flow.ONE_OF
     look = Look(form=Form.BESIDE, has_roles=True)
 
@@ -112,14 +124,6 @@ class Choosing(Group):
     @abstractmethod
     def ways(self) -> tuple[str, ...]:
         """Return its ways in words, in the order of its nodes; the last of them may be that nothing is done."""
-
-    def is_done_always(self, node: Node, always: Callable[[int], bool]) -> bool:
-        """Tell that nothing may fit."""
-        return False
-
-    def endless(self, ends: Outcomes) -> Advice | None:
-        """Say nothing: it does one thing once."""
-        return None
 
     def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
         """Yield each node, and that nothing fits."""

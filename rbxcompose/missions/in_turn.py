@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
-from rbxcompose.missions.answers import Advice
-from rbxcompose.missions.families import Group
+from rbxcompose.missions.answers import Skipped
+from rbxcompose.missions.families import Straight
 from rbxcompose.missions.history import HISTORY, WithHistory, read_history
 from rbxcompose.missions.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, FAILS, NEVER, Outcomes
 from rbxcompose.missions.program import Endings, Node
@@ -25,13 +25,15 @@ OPTIONS: Mapping[str, str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class InTurn(Group):
+class InTurn(Straight):
     """A list of nodes: the first that ends as `decides` ends the list alike."""
 
     reactive: bool
     history: str = field()
     order: str = field()
 
+    only_asks = True
+    skipped = Skipped.WITH_ALL_INSIDE
     decides: ClassVar[str]
 
     @classmethod
@@ -49,18 +51,6 @@ class InTurn(Group):
             if child.plain in (NEVER, goes_on_never):
                 return found
         return found.both(endings.of(node.children[-1])) if node.children else found
-
-    def is_done_always(self, node: Node, always: Callable[[int], bool]) -> bool:
-        """Tell that it is skipped if all in it is."""
-        return any(map(always, node.children))
-
-    def only_asks(self, node: Node, asks: Callable[[int], bool]) -> bool:
-        """Tell that a list of conditions does."""
-        return all(map(asks, node.children))
-
-    def endless(self, ends: Outcomes) -> Advice | None:
-        """Say nothing: it goes through its list once."""
-        return None
 
     @property
     def comes_again(self) -> bool:
@@ -181,7 +171,7 @@ def _conditions(site: Site) -> dict[int, tuple[Watched, ...]]:
 
 
 def _only_asks(nodes: tuple[Node, ...], node: Node) -> bool:
-    return node.step.only_asks(node, lambda child: _only_asks(nodes, nodes[child]))
+    return node.step.only_asks and all(_only_asks(nodes, nodes[child]) for child in node.children)
 
 
 def _asked(nodes: tuple[Node, ...]) -> list[Watched]:

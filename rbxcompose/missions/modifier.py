@@ -43,13 +43,13 @@ class Modifier(ABC):
 
     @property
     @abstractmethod
-    def said(self) -> str:
-        """Return what is written behind its key where it is drawn."""
+    def value(self) -> Expression | None:
+        """Return the expression behind its key."""
 
     @property
-    def value(self) -> Expression | None:
-        """Return what stands behind its key."""
-        return None
+    def said(self) -> str:
+        """Return what is written behind its key where it is drawn."""
+        return self.value.text if self.value else ""
 
     @property
     def repeats(self) -> bool:

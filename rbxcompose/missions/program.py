@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol, Self
 
@@ -16,7 +16,7 @@ from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Mapping as LocatedMapping
 from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions.answers import Advice, Counted, Flow
+from rbxcompose.missions.answers import Advice, Counted, Flow, Skipped
 from rbxcompose.missions.asked import Argument, Asked
 from rbxcompose.missions.branches import Branches, Choice
 from rbxcompose.missions.look import Look
@@ -130,14 +130,6 @@ class Step(ABC):
         """Return how it may end, its modifiers left aside."""
 
     @abstractmethod
-    def is_done_always(self, node: Node, always: Callable[[int], bool]) -> bool:
-        """Tell whether it is never skipped; `always` tells it of a child."""
-
-    @abstractmethod
-    def only_asks(self, node: Node, asks: Callable[[int], bool]) -> bool:
-        """Tell whether it does nothing but ask conditions; `asks` tells it of a child."""
-
-    @abstractmethod
     def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
         """Yield what may come of it, as far as a test should see each of it."""
 
@@ -148,6 +140,16 @@ class Step(ABC):
     @abstractmethod
     def endless(self, ends: Outcomes) -> Advice | None:
         """Return what to say if it goes on for ever without a pause; `ends` is how it may end."""
+
+    @property
+    @abstractmethod
+    def skipped(self) -> Skipped:
+        """Return when it does nothing."""
+
+    @property
+    @abstractmethod
+    def only_asks(self) -> bool:
+        """Tell whether all that it does by itself is to ask conditions, which may be done again at any time."""
 
     @property
     @abstractmethod

@@ -45,6 +45,9 @@ class Task(ABC):
 
     __slots__ = ("current", "end", "engine", "number", "run", "scope", "statuses")
     saved: ClassVar[tuple[str, ...]] = ()
+    times: ClassVar[tuple[str, ...]] = ()  # those of them that are times [s]
+    fresh: ClassVar[tuple[str, ...]] = ()  # those that mean nothing before the next start, which computes them
+    told: ClassVar[tuple[str, ...]] = ()  # those that change nothing but what is told
 
     def __init__(self, site: Site) -> None:
         self.engine = site.engine

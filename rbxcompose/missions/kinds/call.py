@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
@@ -64,6 +63,7 @@ class Call(LeafStep):
     waits = True
     has_result = True
     lasts = None
+    only_asks = False
 
     @classmethod
     def read(cls, reader: Reader) -> Self:
@@ -73,10 +73,6 @@ class Call(LeafStep):
     def may_end(self, node: Node, endings: Endings) -> Outcomes:
         """Return that the service may refuse."""
         return ANY
-
-    def only_asks(self, node: Node, asks: Callable[[int], bool]) -> bool:
-        """Tell that a service may do something."""
-        return False
 
     def text(self, node: Node) -> str:
         """Return the service."""

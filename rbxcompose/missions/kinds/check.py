@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
@@ -48,6 +47,7 @@ class Check(LeafStep):
     waits = False
     has_result = False
     lasts = None
+    only_asks = True
     effects = NO_EFFECTS
 
     @classmethod
@@ -58,7 +58,3 @@ class Check(LeafStep):
     def may_end(self, node: Node, endings: Endings) -> Outcomes:
         """Return that either may come out."""
         return ANY
-
-    def only_asks(self, node: Node, asks: Callable[[int], bool]) -> bool:
-        """Tell that it does."""
-        return True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -12,16 +12,15 @@ from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression, Field, Index, Variable
 from rbxcompose.expressions.types import TEXT, UNKNOWN, Type, TypeKind
 from rbxcompose.expressions.values import NOT_ARRIVED, Located, NotArrivedError, Value
-from rbxcompose.missions.answers import Advice, Flow
+from rbxcompose.missions.answers import Flow
 from rbxcompose.missions.editing import without
 from rbxcompose.missions.facts import constants_of
-from rbxcompose.missions.families import Group
+from rbxcompose.missions.families import Loop
 from rbxcompose.missions.look import Look
 from rbxcompose.missions.moments import NO_EFFECTS, Effects
 from rbxcompose.missions.outcomes import ANY as ANYHOW
 from rbxcompose.missions.outcomes import Outcomes
-from rbxcompose.missions.possible import Possibility
-from rbxcompose.missions.program import NOTHING, Endings, Node, Program, RobotNames, Target
+from rbxcompose.missions.program import NOTHING, Endings, Node, Program, Target
 from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.results import NodeFailed
@@ -159,7 +158,7 @@ class ForTask(Task):
     },
 )
 @dataclass(frozen=True, slots=True)
-class For(Group):
+class For(Loop):
     """Do the body for each item, which the body sees as `$item`.
 
     Example:
@@ -177,7 +176,6 @@ class For(Group):
     ends_at_success: bool
     removes_done: bool
 
-    comes_again = True
     has_result = True
     flow = Flow.PER_ITEM
     look = Look("↻")
@@ -219,17 +217,8 @@ class For(Group):
         written = self.items.tree.name if isinstance(self.items.tree, Variable) else ""
         return isinstance(constants_of(program, {}).get(written), list | tuple | Mapping)
 
-    def is_done_always(self, node: Node, always: Callable[[int], bool]) -> bool:
-        """Tell that the list may be empty."""
-        return False
-
-    def endless(self, ends: Outcomes) -> Advice | None:
+    def endless(self, ends: Outcomes) -> None:
         """Say nothing: every list has an end."""
-        return None
-
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
-        """Yield nothing: what is in the list is data."""
-        yield from ()
 
     def text(self, node: Node) -> str:
         """Return the item and what it goes through."""

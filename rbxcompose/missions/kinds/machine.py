@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Self
 
 from rbxcompose.expressions.values import Value
-from rbxcompose.missions.answers import Advice, Flow
+from rbxcompose.missions.answers import Advice, Flow, Skipped
 from rbxcompose.missions.events import Transition
-from rbxcompose.missions.families import Group
+from rbxcompose.missions.families import Loop, Straight
 from rbxcompose.missions.history import WithHistory
 from rbxcompose.missions.look import Form, Look
 from rbxcompose.missions.machines import ENDS, FAILED, FINISHED, STATE, Next, States
@@ -85,7 +85,7 @@ class MachineTask(WithHistory):
 
 @kind("machine", MachineTask)
 @dataclass(frozen=True, slots=True)
-class Machine(Group):
+class Machine(Loop):
     """Be in one state after the other; how a state's body ends decides which is next.
 
     Below it stand `start`, `states`, and perhaps `ends` and `history`. A state has `do` or `machine`, modifiers,
@@ -112,7 +112,6 @@ class Machine(Group):
     states: States = field()
     history: str = field()
 
-    comes_again = True
     flow = Flow.OPEN
     look = Look("◉", Form.MACHINE)
 
@@ -127,10 +126,6 @@ class Machine(Group):
         reached = {to for one in leads if one for to in one.to.values()}
         named = {end: counts for end, counts in self.states.ends.items() if end in reached and end not in ENDS}
         return Outcomes(FINISHED in reached, FAILED in reached, named)
-
-    def is_done_always(self, node: Node, always: Callable[[int], bool]) -> bool:
-        """Tell that its states may be skipped."""
-        return False
 
     def endless(self, ends: Outcomes) -> Advice | None:
         """Say what a machine without an end needs."""
@@ -171,12 +166,12 @@ class StateTask(Task):
 
 @kind(STATE, StateTask, is_inner=True)
 @dataclass(frozen=True, slots=True)
-class State(Group):
+class State(Straight):
     """A state of a machine: its body, and where it leads to (None: its body never ends)."""
 
     leads_to: Next | None = field()
 
-    comes_again = False
+    skipped = Skipped.WITH_ALL_INSIDE
     flow = Flow.IN_TURN
     look = Look(form=Form.STATE)
 
@@ -188,15 +183,3 @@ class State(Group):
     def may_end(self, node: Node, endings: Endings) -> Outcomes:
         """Return how the body may end."""
         return endings.of(node.children[0]) if node.children else ANY
-
-    def is_done_always(self, node: Node, always: Callable[[int], bool]) -> bool:
-        """Tell that it is if its body is."""
-        return all(map(always, node.children))
-
-    def endless(self, ends: Outcomes) -> Advice | None:
-        """Say nothing: the machine comes back, not the state."""
-        return None
-
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
-        """Yield nothing: the machine tells its transitions."""
-        yield from ()

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.missions.answers import Advice, Flow
+from rbxcompose.missions.answers import Flow, Skipped
 from rbxcompose.missions.branches import ALL, ANY, Branches, BranchScope, Ended, read_outcomes
-from rbxcompose.missions.families import Group
+from rbxcompose.missions.families import Straight
 from rbxcompose.missions.look import Form, Look
 from rbxcompose.missions.outcomes import FAILS, SUCCEEDS, Outcomes, either
-from rbxcompose.missions.possible import Possibility
-from rbxcompose.missions.program import Endings, Node, RobotNames, Target
+from rbxcompose.missions.program import Endings, Node, Target
 from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.results import NodeFailed
@@ -152,7 +150,7 @@ class ParallelTask(Task):
     },
 )
 @dataclass(frozen=True, slots=True)
-class Parallel(Group):
+class Parallel(Straight):
     """Do several nodes at the same time; at each tick all that have not ended are ticked, then it is judged.
 
     Example:
@@ -167,7 +165,7 @@ class Parallel(Group):
     branches: Branches = field()
     waits_for_all: bool
 
-    comes_again = False
+    skipped = Skipped.WITH_ALL_INSIDE
     flow = Flow.OPEN
     look = Look("⇉", Form.BESIDE, has_roles=True)
 
@@ -195,15 +193,3 @@ class Parallel(Group):
             return Outcomes(False, False, {one.name: PLAIN.get(one.name, "") for one in branches.outcomes})
         deciding = either(map(endings.of, branches.deciding(node.children)))
         return deciding if branches.ends_with in branches.names else deciding.plain
-
-    def is_done_always(self, node: Node, always: Callable[[int], bool]) -> bool:
-        """Tell that it is skipped if all in it is."""
-        return any(map(always, node.children))
-
-    def endless(self, ends: Outcomes) -> Advice | None:
-        """Say nothing: each branch is done once."""
-        return None
-
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
-        """Yield nothing: all branches are started."""
-        yield from ()

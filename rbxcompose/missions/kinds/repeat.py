@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Self
 
@@ -11,11 +10,10 @@ from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression, Number
 from rbxcompose.missions.answers import Advice, Counted, Flow
 from rbxcompose.missions.facts import is_simple, takes_time
-from rbxcompose.missions.families import Group
+from rbxcompose.missions.families import Loop
 from rbxcompose.missions.look import Look
 from rbxcompose.missions.outcomes import ANY, Outcomes
-from rbxcompose.missions.possible import Possibility
-from rbxcompose.missions.program import Endings, Node, RobotNames
+from rbxcompose.missions.program import Endings, Node
 from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
@@ -27,6 +25,8 @@ class RepeatTask(Task):
 
     __slots__ = ("body", "did", "due", "is_between", "left", "period", "step")
     saved = ("did", "due", "is_between", "left", "period")
+    times = ("due",)
+    fresh = ("due", "period")
 
     def __init__(self, site: Site, step: Repeat) -> None:
         super().__init__(site)
@@ -89,7 +89,7 @@ class RepeatTask(Task):
     },
 )
 @dataclass(frozen=True, slots=True)
-class Repeat(Group):
+class Repeat(Loop):
     """Do the body again and again; a round that fails fails it, a number that is used up succeeds.
 
     Example:
@@ -105,7 +105,6 @@ class Repeat(Group):
     until: Expression | None
     every: Expression | None  # from start to start
 
-    comes_again = True
     flow = Flow.IN_TURN
     look = Look("↻")
 
@@ -130,18 +129,10 @@ class Repeat(Group):
             return True
         return is_simple(node) and all(one is None or isinstance(one.tree, Number) for one in (self.rounds, self.every))
 
-    def is_done_always(self, node: Node, always: Callable[[int], bool]) -> bool:
-        """Tell that the body may be skipped, or the number of rounds be zero."""
-        return False
-
     def endless(self, ends: Outcomes) -> Advice | None:
         """Say what a loop for ever needs."""
         advice = Advice("this loop never waits", "give it 'every: 1 s', or a 'wait' in its body")
         return advice if self.rounds is None else None
-
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
-        """Yield nothing: there is one way through it."""
-        yield from ()
 
     @property
     def waits(self) -> bool:

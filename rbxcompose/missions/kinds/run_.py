@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Self
 
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN
-from rbxcompose.missions.answers import Advice, Flow
-from rbxcompose.missions.families import Group
+from rbxcompose.missions.answers import Flow, Skipped
+from rbxcompose.missions.families import Straight
 from rbxcompose.missions.held import HeldNode
 from rbxcompose.missions.look import PLAIN
 from rbxcompose.missions.outcomes import ALWAYS_FAILS, ANY, Outcomes, either
-from rbxcompose.missions.possible import Possibility
-from rbxcompose.missions.program import Endings, Node, RobotNames
+from rbxcompose.missions.program import Endings, Node
 from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.results import NodeFailed
@@ -52,7 +50,7 @@ class RunTask(Task):
 
 @kind("run", RunTask)
 @dataclass(frozen=True, slots=True)
-class Run(Group):
+class Run(Straight):
     """Do a node that stands in the data: a chore of a list, a step that was chosen before.
 
     Example:
@@ -69,7 +67,7 @@ class Run(Group):
 
     expression: Expression
 
-    comes_again = False
+    skipped = Skipped.PERHAPS
     flow = Flow.OPEN
     look = PLAIN
 
@@ -83,15 +81,3 @@ class Run(Group):
     def may_end(self, node: Node, endings: Endings) -> Outcomes:
         """Return what any of the nodes in the data may do; it fails where there is none."""
         return either([ALWAYS_FAILS, *map(endings.of, node.children)]) if node.children else ANY
-
-    def is_done_always(self, node: Node, always: Callable[[int], bool]) -> bool:
-        """Tell that the node may be skipped."""
-        return False
-
-    def endless(self, ends: Outcomes) -> Advice | None:
-        """Say nothing: it does one thing once."""
-        return None
-
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
-        """Yield nothing: what is chosen from the data is data."""
-        yield from ()

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from rbxcompose.missions.answers import Flow
 from rbxcompose.missions.in_turn import OPTIONS, RANDOM, InTurn, InTurnTask
 from rbxcompose.missions.look import Look
 from rbxcompose.missions.outcomes import FAILS, SUCCEEDS
-from rbxcompose.missions.possible import Possibility
-from rbxcompose.missions.program import Node, RobotNames
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE
 
@@ -42,7 +38,3 @@ class Sequence(InTurn):
     def goes_on_after(self) -> str:
         """Return success."""
         return "" if self.order == RANDOM else SUCCEEDS
-
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
-        """Yield nothing: there is one way through it."""
-        yield from ()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -31,6 +31,8 @@ class SkillTask(Leaf):
 
     __slots__ = ("arguments", "getters", "skill", "started")
     saved = (*Leaf.saved, "arguments", "started")
+    fresh = ("arguments",)
+    told = ("started",)
 
     def __init__(self, site: Site, step: AskedSkill) -> None:
         super().__init__(site)
@@ -110,6 +112,7 @@ class AskedSkill(LeafStep):
     waits = True
     has_result = True
     lasts = None
+    only_asks = False
     effects = NO_EFFECTS
 
     @classmethod
@@ -126,10 +129,6 @@ class AskedSkill(LeafStep):
         """Return what the robot declares."""
         skill = endings.robot.skills.get(self.skill)
         return Outcomes(named=skill.outcomes) if skill else ANY
-
-    def only_asks(self, node: Node, asks: Callable[[int], bool]) -> bool:
-        """Tell that the robot does something."""
-        return False
 
     def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
         """Yield its outcomes."""

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Self
 
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.values import NotArrivedError, Value
 from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions.answers import Advice, Flow
+from rbxcompose.missions.answers import Flow, Skipped
 from rbxcompose.missions.asked import Argument
-from rbxcompose.missions.families import Group
+from rbxcompose.missions.families import Straight
 from rbxcompose.missions.history import HISTORY, WithHistory, read_history
 from rbxcompose.missions.look import Look
 from rbxcompose.missions.outcomes import Outcomes
 from rbxcompose.missions.places import LAST
-from rbxcompose.missions.possible import Possibility
-from rbxcompose.missions.program import Endings, Node, RobotNames, Target
+from rbxcompose.missions.program import Endings, Node, Target
 from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE, RUNNING
@@ -108,7 +106,7 @@ class UseTask(WithHistory):
 
 @kind("use", UseTask, {"with": "Values for the inputs of the mission.", "history": HISTORY})
 @dataclass(frozen=True, slots=True)
-class Use(Group):
+class Use(Straight):
     """Run another mission of the robot; its outputs can be kept with `save`.
 
     It sees the robot's values and places, and of this mission only what `with` gives it.
@@ -125,7 +123,7 @@ class Use(Group):
     arguments: tuple[Argument, ...] = field()
     history: str = field()
 
-    comes_again = False
+    skipped = Skipped.PERHAPS
     has_result = True
     flow = Flow.OPEN
     look = Look("↗")
@@ -142,18 +140,6 @@ class Use(Group):
     def may_end(self, node: Node, endings: Endings) -> Outcomes:
         """Return how the mission may end."""
         return endings.of_mission(self.uses.text)
-
-    def is_done_always(self, node: Node, always: Callable[[int], bool]) -> bool:
-        """Tell that all of the mission may be skipped."""
-        return False
-
-    def endless(self, ends: Outcomes) -> Advice | None:
-        """Say nothing: it runs the mission once."""
-        return None
-
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
-        """Yield nothing: the nodes of the mission tell theirs."""
-        yield from ()
 
     def text(self, node: Node) -> str:
         """Return the mission."""

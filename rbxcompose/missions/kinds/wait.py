@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -22,7 +21,7 @@ class WaitTask(Task):
     """Has a deadline."""
 
     __slots__ = ("deadline", "duration")
-    saved = ("deadline",)
+    saved = times = fresh = ("deadline",)
 
     def __init__(self, site: Site, step: Wait) -> None:
         super().__init__(site)
@@ -54,6 +53,7 @@ class Wait(LeafStep):
 
     waits = True
     has_result = False
+    only_asks = False
     effects = NO_EFFECTS
 
     @classmethod
@@ -64,10 +64,6 @@ class Wait(LeafStep):
     def may_end(self, node: Node, endings: Endings) -> Outcomes:
         """Return that a time that is written out can be waited for."""
         return ALWAYS_SUCCEEDS if isinstance(self.lasts.tree, Number) else ANY
-
-    def only_asks(self, node: Node, asks: Callable[[int], bool]) -> bool:
-        """Tell that it waits."""
-        return False
 
     @property
     def numbers(self) -> tuple[Counted, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
@@ -63,6 +62,7 @@ class WaitFor(LeafStep):
     waits = True
     has_result = False
     lasts = None
+    only_asks = True
     effects = NO_EFFECTS
 
     @classmethod
@@ -73,7 +73,3 @@ class WaitFor(LeafStep):
     def may_end(self, node: Node, endings: Endings) -> Outcomes:
         """Return that only a condition which cannot be asked is a failure."""
         return ALWAYS_SUCCEEDS if is_simple(node) else ANY
-
-    def only_asks(self, node: Node, asks: Callable[[int], bool]) -> bool:
-        """Tell that it does."""
-        return True

@@ -78,7 +78,7 @@ class Entering(Plain):
 
     moments: Moments = field()
 
-    said = ""
+    value = None
 
     @classmethod
     def read(cls, reader: Reader, key: str) -> Self:

@@ -81,7 +81,7 @@ class Hooks(Plain):
 
     moments: Moments = field()
 
-    said = ""
+    value = None
 
     @classmethod
     def read(cls, reader: Reader, key: str) -> Self:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
@@ -42,7 +42,7 @@ class AsLongAsTask(Decorator):
 
     def __init__(self, site: Site, options: AsLongAs, inner: Task) -> None:
         super().__init__(site, inner)
-        self.watched = Watched.of(options.condition)
+        self.watched = Watched.of(options.value)
 
     def begin(self) -> int:
         """Ask for the first time."""
@@ -70,28 +70,24 @@ class AsLongAs(Cutting):
           as_long_as: $battery > 20 %
     """
 
-    condition: Expression
+    value: Expression = field()
 
     @classmethod
     def read(cls, reader: Reader, key: str) -> Self:
         """Read a condition."""
         return cls(reader.condition(key))
 
-    @property
-    def said(self) -> str:
-        """Return the condition."""
-        return self.condition.text
-
 
 class TimeoutTask(Decorator):
     """Has a deadline."""
 
     __slots__ = ("allowed", "deadline", "duration")
-    saved = ("allowed", "deadline")
+    saved = fresh = ("allowed", "deadline")
+    times = ("deadline",)
 
     def __init__(self, site: Site, options: Timeout, inner: Task) -> None:
         super().__init__(site, inner)
-        self.duration = options.duration
+        self.duration = options.value
         self.allowed = 0.0  # [s]
         self.deadline = 0.0
 
@@ -121,7 +117,7 @@ class Timeout(Cutting):
           timeout: 30 s
     """
 
-    duration: Expression
+    value: Expression = field()
 
     @classmethod
     def read(cls, reader: Reader, key: str) -> Self:
@@ -131,17 +127,12 @@ class Timeout(Cutting):
     @property
     def limit(self) -> Expression | None:
         """Return the duration."""
-        return self.duration
-
-    @property
-    def said(self) -> str:
-        """Return the duration."""
-        return self.duration.text
+        return self.value
 
     @property
     def numbers(self) -> tuple[Counted, ...]:
         """Return the duration."""
-        return (Counted("a timeout", self.duration, SHORTEST),)
+        return (Counted("a timeout", self.value, SHORTEST),)
 
 
 class AttemptsTask(Decorator):
@@ -149,6 +140,7 @@ class AttemptsTask(Decorator):
 
     __slots__ = ("deadline", "is_between", "left", "tries")
     saved = ("deadline", "is_between", "left")
+    times = fresh = ("deadline",)
 
     def __init__(self, site: Site, options: Attempts, inner: Task) -> None:
         super().__init__(site, inner)
@@ -159,7 +151,7 @@ class AttemptsTask(Decorator):
 
     def begin(self) -> int:
         """Try for the first time."""
-        self.left = math.inf if self.tries.most is None else self.count_of(self.tries.most, "'attempts'")
+        self.left = math.inf if self.tries.value is None else self.count_of(self.tries.value, "'attempts'")
         self._begin_attempt()
         return self.proceed()
 
@@ -212,7 +204,7 @@ class Attempts(Modifier):
           attempt_pause: 2 s
     """
 
-    most: Expression | None  # None: for ever
+    value: Expression | None = field()  # how often at most; None: for ever
     timeout: Expression | None = None  # of each
     pause: Expression | None = None  # between two
 
@@ -233,7 +225,7 @@ class Attempts(Modifier):
 
     def changed(self, inner: Outcomes) -> Outcomes:
         """Return that what is tried for ever ends in success, unless an attempt is cut short."""
-        return inner.of(SUCCEEDS) if self.most is None and not self.timeout else inner
+        return inner.of(SUCCEEDS) if self.value is None and not self.timeout else inner
 
     @property
     def serves(self) -> Serves:
@@ -243,20 +235,15 @@ class Attempts(Modifier):
     @property
     def said(self) -> str:
         """Return its numbers."""
-        return ", ".join(one.text for one in (self.most, self.timeout, self.pause) if one)
-
-    @property
-    def value(self) -> Expression | None:
-        """Return the number of attempts."""
-        return self.most
+        return ", ".join(one.text for one in (self.value, self.timeout, self.pause) if one)
 
     @property
     def endless(self) -> Advice | None:
         """Say what attempts for ever need."""
         advice = Advice("what is tried for ever never waits", "give it a number of attempts, or an 'attempt_pause'")
-        return advice if self.most is None and not takes_time(self.pause) else None
+        return advice if self.value is None and not takes_time(self.pause) else None
 
     @property
     def numbers(self) -> tuple[Counted, ...]:
         """Return the number of attempts."""
-        return (Counted("'attempts'", self.most, 1),)
+        return (Counted("'attempts'", self.value, 1),)

@@ -43,7 +43,7 @@ class Turning(Modifier):
     is_on: bool
 
     may_skip = False
-    said = ""
+    value = None
     turns: ClassVar[dict[int, int]]  # what becomes of which result
 
     @classmethod

@@ -55,6 +55,8 @@ class Save(Plain):
 
     kept_as: Scalar
 
+    value = None
+
     @classmethod
     def read(cls, reader: Reader, key: str) -> Self:
         """Read the name."""

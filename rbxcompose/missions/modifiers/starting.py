@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
 from rbxcompose.expressions.evaluate import holds
@@ -23,7 +23,7 @@ class ConditionalTask(Decorator):
 
     def __init__(self, site: Site, options: Conditional, inner: Task) -> None:
         super().__init__(site, inner)
-        self.condition = options.condition
+        self.condition = options.value
 
     def begin(self) -> int:
         """Ask the condition once."""
@@ -48,7 +48,7 @@ class SkipIfTask(ConditionalTask):
 class Conditional(Skipping):
     """Has a condition."""
 
-    condition: Expression
+    value: Expression = field()
 
     serves = Serves.ALL
 
@@ -56,11 +56,6 @@ class Conditional(Skipping):
     def read(cls, reader: Reader, key: str) -> Self:
         """Read a condition."""
         return cls(reader.condition(key))
-
-    @property
-    def said(self) -> str:
-        """Return the condition."""
-        return self.condition.text
 
 
 @modifier("only_if", OnlyIfTask)
@@ -94,6 +89,7 @@ class CountingTask(Decorator):
 
     __slots__ = ("ended_at", "ended_in")
     saved = ("ended_at", "ended_in")
+    times = ("ended_at",)
 
     def __init__(self, site: Site, inner: Task) -> None:
         super().__init__(site, inner)
@@ -143,7 +139,7 @@ class Once(Skipping):
 
     is_on: bool
 
-    said = ""
+    value = None
 
     @classmethod
     def read(cls, reader: Reader, key: str) -> Self:
@@ -163,7 +159,7 @@ class CooldownTask(CountingTask):
 
     def __init__(self, site: Site, options: Cooldown, inner: Task) -> None:
         super().__init__(site, inner)
-        self.duration = options.duration
+        self.duration = options.value
 
     def begin(self) -> int:
         """Start if that time has gone by, or if it has not ended yet."""
@@ -188,7 +184,7 @@ class Cooldown(Skipping):
             - go_to: corner_1
     """
 
-    duration: Expression
+    value: Expression = field()
 
     serves = Serves.REPEATED
 
@@ -196,8 +192,3 @@ class Cooldown(Skipping):
     def read(cls, reader: Reader, key: str) -> Self:
         """Read a duration."""
         return cls(reader.duration(key))
-
-    @property
-    def said(self) -> str:
-        """Return the duration."""
-        return self.duration.text
