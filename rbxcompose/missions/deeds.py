@@ -19,8 +19,9 @@ def assignments(node: Node) -> Iterator[Assignment]:
 
 def published(node: Node) -> Iterator[Message]:
     """Yield the messages that a node publishes."""
-    messages = (node.step.effects.published, *(deeds.message for deeds in _deeds(node)))
-    yield from (message for message in messages if message)
+    if message := node.step.effects.published:
+        yield message
+    yield from (deeds.message for deeds in _deeds(node) if deeds.message)
 
 
 def called(node: Node) -> Iterator[Message]:

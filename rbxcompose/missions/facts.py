@@ -103,8 +103,9 @@ def is_simple(node: Node) -> bool:
 
 def is_sure(node: Node, program: Program) -> bool:
     """Tell whether a node reads only what is there from the start, in ways that cannot go wrong."""
-    own = {*program.inputs, *program.data, *(one.item for one in program.nodes if one.item)}
-    if any(name.name not in own for asked in node.asked for name in asked.expression.names):
+    read = {name.name for asked in node.asked for name in asked.expression.names}
+    others = read - program.inputs.keys() - program.data.keys()
+    if others and not others <= {one.item for one in program.nodes}:
         return False
     parts = (part for asked in node.asked for part, _ in walk(asked.expression.tree))
     return not any(isinstance(part, Index | Field) or _divides(part) for part in parts)
