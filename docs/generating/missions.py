@@ -12,11 +12,11 @@ from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.asked import Asked, Assignment
 from rbxcompose.missions.goals import skill_of, topic_skill
 from rbxcompose.missions.messages import Message
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.moments import Moments
-from rbxcompose.missions.program import Asked, Assignment
 from rbxcompose.missions.reading import INTERRUPT_KEYS
 from rbxcompose.missions.registry import Kind, kinds
 from rbxcompose.schema.asking import Asking, first_line
@@ -167,9 +167,9 @@ def of_kind(kind: Kind) -> str:
     rows = [(code(key), takes(told, key), kind.options.get(key, "")) for key in told.words]
     return "\n".join(
         [
-            f"### {code(kind.name)}\n{about(kind.task)}\n",
+            f"### {code(kind.name)}\n{about(kind)}\n",
             table(_HEAD, rows),
-            example(example_of(kind.task), "yaml mission"),
+            example(example_of(kind), "yaml mission"),
         ]
     )
 
@@ -177,7 +177,7 @@ def of_kind(kind: Kind) -> str:
 def told_by(kind: Kind) -> Told:
     """Return what each key of a kind takes."""
     told = Told(kind.name)
-    kind.task.read(told)
+    kind.read(told)
     return told
 
 

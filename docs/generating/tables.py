@@ -73,7 +73,7 @@ def of_node(kind: Kind) -> tuple[str, str, str, str]:
     """Return the row of a kind."""
     told = told_by(kind)
     options = [f"{code(key)}: {words}" for key, words in told.words.items() if key != kind.name]
-    return linked(kind), told.words.get(kind.name, ""), "; ".join(options), about(kind.task).partition("\n\n")[0]
+    return linked(kind), told.words.get(kind.name, ""), "; ".join(options), about(kind).partition("\n\n")[0]
 
 
 def steps() -> str:

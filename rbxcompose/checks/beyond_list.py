@@ -59,7 +59,7 @@ def _expressions(program: Program) -> Iterator[tuple[Scalar, Expression]]:
     """Yield all expressions of a mission, the arguments of its skills included."""
     yield from ((asked.scalar, asked.expression) for _, asked in program.asked())
     for node in program.nodes:
-        for argument in node.arguments:
+        for argument in node.step.arguments:
             if isinstance(argument.value, Scalar):
                 try:
                     yield argument.value, expression_of(argument.value)

@@ -39,7 +39,7 @@ def charge_elsewhere(robot: Robot) -> Iterator[Finding]:
         for number, here in ways.starts_at.items():
             node = mission.program.nodes[number]
             charger, charges = charger_of(robot, node.skill) or (None, None)
-            may_fail = node.modifiers.keys() & {"optional", "only_if"}
+            may_fail = node.may_be_left_out or node.is_forgiven
             if charger is None or charges is None or charges.place is None or may_fail:
                 continue
             dock = charges.place.value

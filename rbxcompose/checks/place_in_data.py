@@ -11,7 +11,6 @@ from rbxcompose.findings import Finding, Related, Span, suggest
 from rbxcompose.manifest.tree import Mapping, Scalar, Sequence, at
 from rbxcompose.missions.deeds import replaced, written
 from rbxcompose.missions.facts import Constants
-from rbxcompose.missions.kinds.for_ import ForOptions
 from rbxcompose.missions.program import Node, Program
 from rbxcompose.missions.spans import expression_of
 from rbxcompose.model.charging import constants
@@ -83,7 +82,7 @@ def _goals(robot: Robot, program: Program) -> Iterator[tuple[Node, str]]:
     """Yield each skill that gets a pose by `$name` alone, with that name."""
     for node in program.nodes:
         skill = robot.skills[node.skill].skill if node.skill in robot.skills else None
-        for argument in node.arguments if skill else ():
+        for argument in node.step.arguments if skill else ():
             wanted = skill.arguments.get(argument.name or skill.main) if skill else None
             if wanted is None or wanted.kind is not TypeKind.POSE or not isinstance(argument.value, Scalar):
                 continue
@@ -101,7 +100,7 @@ def _texts(program: Program, node: Node, name: str, known: Constants) -> Iterato
     while above.parent is not None:
         above = program.nodes[above.parent]
         if above.item == name:
-            items = above.options.items if isinstance(above.options, ForOptions) else ()
+            items = above.step.items or ()
             listed = items.tree.name if not isinstance(items, tuple) and isinstance(items.tree, Variable) else ""
             found = known.get(listed)
             texts = found if isinstance(found, list | tuple | dict) else ()

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from rbxcompose.checking import check
 from rbxcompose.findings import Finding, Severity
-from rbxcompose.missions.deeds import saved_name
 from rbxcompose.model.robot import Robot
 
 
@@ -44,7 +43,7 @@ def unread_name(robot: Robot) -> Iterator[Finding]:
         seen.add(program.file)
         read = program.reads()
         for node in program.nodes:
-            kept = saved_name(node)
+            kept = node.saved
             if kept and kept.text not in read:
                 message = f"the mission '{program.name}' never reads what it keeps as '{kept.text}'"
                 help_text = f"take 'save' out, or write '${kept.text}' where it belongs"

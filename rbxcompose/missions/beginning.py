@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.missions.machines import MachineOptions
 from rbxcompose.missions.program import Node, Program
 
 
@@ -37,13 +36,13 @@ def start_at(program: Program, path: str) -> dict[int, str]:
 
 
 def _states(machine: Node) -> tuple[str, ...]:
-    return machine.options.states if isinstance(machine.options, MachineOptions) else ()
+    return machine.step.states.names if machine.step.states else ()
 
 
 def _outermost(program: Program, number: int) -> Iterator[Node]:
     """Yield the machines below a node, but for those inside others."""
     node = program.nodes[number]
-    if isinstance(node.options, MachineOptions):
+    if node.step.states:
         yield node
         return
     for child in node.children:

@@ -1,22 +1,20 @@
-"""The branches of a parallel: their results as values, and the outcomes that conditions over them decide."""
+"""Branches: what decides between nodes at the same time, the outcomes by conditions over them, cases of a value."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.values import NotArrived, Value
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions import codes
-from rbxcompose.missions.program import Asked
+from rbxcompose.missions.asked import Asked
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.scopes import Inner, MissionScope
 from rbxcompose.missions.statuses import FAILURE, NAMES, SKIPPED, SUCCESS
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
-
+ALL, ANY = "all", "any"
 OTHERWISE, HALTED = "otherwise", "halted"
 RESULTS = (NAMES[SUCCESS], NAMES[FAILURE], NAMES[SKIPPED], HALTED)
 
@@ -28,6 +26,32 @@ class Outcome:
     name: str
     condition: Expression | None
     asked: Asked | None
+
+
+@dataclass(frozen=True, slots=True)
+class Branches:
+    """What decides how nodes end that are done at the same time: `all`, `any`, or a number of them; or one branch.
+
+    `names` are those of the branches, in the order of the children, if they have any.
+    """
+
+    names: tuple[str, ...] = ()
+    succeed_when: Expression | str = ALL
+    fail_when: Expression | str = ANY
+    ends_with: str = ""
+    outcomes: tuple[Outcome, ...] = ()
+
+    def deciding(self, children: tuple[int, ...]) -> tuple[int, ...]:
+        """Return the children whose results count."""
+        return (children[self.names.index(self.ends_with)],) if self.ends_with in self.names else children
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What is asked, and the value of each case, in the order of the children."""
+
+    asked: Expression
+    cases: tuple[Asked, ...] = ()
 
 
 class Ended(str):
@@ -65,7 +89,7 @@ class BranchScope(Inner):
         return self._ended[name] if name in self._ended else self.outer.variable(name)
 
 
-def read_outcomes(reader: NodeReader, branches: tuple[str, ...]) -> tuple[Outcome, ...]:
+def read_outcomes(reader: Reader, branches: tuple[str, ...]) -> tuple[Outcome, ...]:
     """Read the outcomes of a parallel with these branches; `otherwise` comes last and must be there."""
     if not reader.has("outcomes"):
         return ()

@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-from rbxcompose.missions.kinds.parallel import ParallelOptions
+from rbxcompose.missions.engine_base import EngineBase
+from rbxcompose.missions.history import WithHistory
 from rbxcompose.missions.leaf import Leaf
-from rbxcompose.missions.modifiers.registry import modifiers
+from rbxcompose.missions.modifiers.registry import decorator_of
 from rbxcompose.missions.observing import Branch, Named, Observed, Since
 from rbxcompose.missions.program import Node, Program, RobotNames
-from rbxcompose.missions.registry import all_kinds
+from rbxcompose.missions.registry import task_of
 from rbxcompose.missions.run import Run
 from rbxcompose.missions.scopes import ItemScope, MissionScope, SinceScope, new_names
-from rbxcompose.missions.skill import SkillTask
 from rbxcompose.missions.task import Site, Task
-
-if TYPE_CHECKING:
-    from rbxcompose.missions.engine import Engine
 
 
 class Builder:
     """Makes the runs and tasks of one engine; `leaves` are those that wait for results, by node number."""
 
-    def __init__(self, engine: Engine, robot: RobotNames) -> None:
+    def __init__(self, engine: EngineBase, robot: RobotNames) -> None:
         self.engine = engine
         self.robot = robot
         self.nodes = engine.program.nodes
@@ -55,22 +51,22 @@ class Builder:
         inner = self.run(node.inner) if node.inner else None
         children = () if node.inner else tuple(self._below(node, run, item or own))
         site = Site(self.engine, run, node, own, children, item, inner)
-        task = self._kept(self._inside(site, node))
-        for name in reversed(tuple(modifiers())):
-            if name in node.modifiers:
-                task = self._kept(modifiers()[name](site, node.modifiers[name], task))
+        task = self._kept(self._inside(site, run))
+        for modifier in reversed(tuple(node.modifiers.values())):
+            task = self._kept(decorator_of(modifier, site, task))
         return self._around(site, since, task, branch)
 
     def _below(self, node: Node, run: Run, scope: MissionScope) -> Iterator[Task]:
-        branches = node.options.branches if isinstance(node.options, ParallelOptions) else ()
-        for child, branch in zip(node.children, branches or ("",) * len(node.children), strict=True):
+        names = node.step.branches.names if node.step.branches else ()
+        for child, branch in zip(node.children, names or ("",) * len(node.children), strict=True):
             yield self.build(child, run, scope, branch)
 
-    def _inside(self, site: Site, node: Node) -> Task:
-        kind = all_kinds().get(node.kind)
-        task = kind.task(site, node.options) if kind else SkillTask(site, self.robot.skills[node.skill], node.arguments)
+    def _inside(self, site: Site, run: Run) -> Task:
+        task = task_of(site)
         if isinstance(task, Leaf):
-            self.leaves[node.number] = task
+            self.leaves[site.node.number] = task
+        if isinstance(task, WithHistory) and task.number == run.program.main:
+            run.keepers.append(task)
         return task
 
     def _around(self, site: Site, since: SinceScope | None, task: Task, branch: str) -> Task:

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from rbxcompose.findings import Span
-from rbxcompose.missions.calling import UseOptions
-
-if TYPE_CHECKING:
-    from rbxcompose.missions.program import Node, Program, RobotNames
+from rbxcompose.missions.program import Node, Program, RobotNames
 
 
 def claims_of(program: Program, robot: RobotNames, within: tuple[str, ...] = ()) -> frozenset[str]:
@@ -25,8 +21,7 @@ def claims_below(
         skill = robot.skills.get(node.skill)
         if skill and skill.claims:
             yield skill.claims, node.span
-        if isinstance(node.options, UseOptions) and node.options.mission not in within:
-            name = node.options.mission
-            if name in robot.missions:
-                for claim in claims_of(robot.missions[name], robot, (*within, name)):
-                    yield claim, node.span
+        name = node.step.uses.text if node.step.uses else ""
+        if name in robot.missions and name not in within:
+            for claim in claims_of(robot.missions[name], robot, (*within, name)):
+                yield claim, node.span

@@ -88,6 +88,11 @@ class Reaction(Course):
         self.is_armed = True  # it may act: its condition was false since it last did
         self.trouble = ""  # why the condition had no value when it was last asked
 
+    @property
+    def path(self) -> str:
+        """Return where in the mission it is."""
+        return f"interrupts.{self.name}"
+
     def holds(self) -> bool:
         """Ask the condition; raises what an expression may raise."""
         return holds(self.watched.condition, self.scope)

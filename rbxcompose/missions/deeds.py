@@ -1,36 +1,33 @@
-"""What a node sets and sends, by itself or in its hooks."""
+"""What nodes set and send, by themselves or in their hooks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
-from rbxcompose.expressions.tree import Expression, Field, Index, Variable
-from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions.kinds.for_ import ForOptions
-from rbxcompose.missions.messages import CALL, Message
-from rbxcompose.missions.moments import Deeds, Moments
-from rbxcompose.missions.program import Assignment, Node, Program
+from rbxcompose.missions.asked import Assignment
+from rbxcompose.missions.messages import Message
+from rbxcompose.missions.moments import Deeds
+from rbxcompose.missions.program import Node, Program
 
 
 def assignments(node: Node) -> Iterator[Assignment]:
     """Yield what a node sets."""
-    if isinstance(node.options, tuple):
-        yield from (one for one in node.options if isinstance(one, Assignment))
+    yield from node.step.effects.assignments
     for deeds in _deeds(node):
         yield from deeds.assignments
 
 
 def published(node: Node) -> Iterator[Message]:
     """Yield the messages that a node publishes."""
-    if isinstance(node.options, Message) and node.kind != CALL:
-        yield node.options
+    if message := node.step.effects.published:
+        yield message
     yield from (deeds.message for deeds in _deeds(node) if deeds.message)
 
 
 def called(node: Node) -> Iterator[Message]:
     """Yield the request that a node makes."""
-    if isinstance(node.options, Message) and node.kind == CALL:
-        yield node.options
+    if request := node.step.effects.called:
+        yield request
 
 
 def replaced(program: Program) -> frozenset[str]:
@@ -40,27 +37,18 @@ def replaced(program: Program) -> frozenset[str]:
 
 def written(program: Program) -> frozenset[str]:
     """Return the names of all data that change while a mission runs, also those that only lose items."""
-    return replaced(program).union(*(shortened(node) for node in program.nodes))
+    shortened = (node.step.effects.shortened for node in program.nodes)
+    return replaced(program).union(name for name in shortened if name)
 
 
-def shortened(node: Node) -> frozenset[str]:
-    """Return the name of the data that a loop takes its items from, if it removes those that are done."""
-    options = node.options
-    if not isinstance(options, ForOptions) or not options.removes_done or not isinstance(options.items, Expression):
-        return frozenset()
-    tree = options.items.tree
-    while isinstance(tree, Field | Index):
-        tree = tree.of
-    return frozenset({tree.name} if isinstance(tree, Variable) else ())
-
-
-def saved_name(node: Node) -> Scalar | None:
-    """Return the name under which a node keeps its result."""
-    name = node.modifiers.get("save")
-    return name if isinstance(name, Scalar) and name.text else None
+def sent_by(programs: Iterable[Program]) -> tuple[set[str], set[str]]:
+    """Return the topics on which missions publish, and the services that they call, as they write them."""
+    nodes = [node for program in programs for node in program.nodes]
+    topics = {message.target.text for node in nodes for message in published(node)}
+    return topics, {message.target.text for node in nodes for message in called(node)}
 
 
 def _deeds(node: Node) -> Iterator[Deeds]:
-    for value in node.modifiers.values():
-        if isinstance(value, Moments):
-            yield from value.deeds.values()
+    for modifier in node.modifiers.values():
+        if modifier.moments:
+            yield from modifier.moments.deeds.values()

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression, Field, Index, Node, Variable
 from rbxcompose.expressions.values import Value, is_same
-from rbxcompose.missions.task import NodeFailed
-
-if TYPE_CHECKING:
-    from rbxcompose.missions.scopes import MissionScope
+from rbxcompose.missions.results import NodeFailed
+from rbxcompose.missions.scopes import MissionScope
 
 
 def without(target: Node, item: Value, data: dict[str, Value], scope: MissionScope) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from rbxcompose.missions.outcomes import Ending
+from rbxcompose.missions.ending import Ending
 from rbxcompose.missions.program import Program, RobotNames
 from rbxcompose.missions.views import NodeScope, View, base_scope, views
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from rbxcompose.config import Place
 from rbxcompose.expressions.tree import (
@@ -20,8 +20,8 @@ from rbxcompose.expressions.tree import Node as Tree
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.answers import Skipped
 from rbxcompose.missions.deeds import written
-from rbxcompose.missions.kinds.for_ import ForOptions
 from rbxcompose.missions.program import Node, Program
 from rbxcompose.missions.spans import expression_of
 
@@ -34,9 +34,9 @@ def constants_of(program: Program, inputs: Constants) -> dict[str, Value]:
     return {**{name: datum.value for name, datum in program.data.items() if name not in changed}, **inputs}
 
 
-def number_of(expression: object, constants: Constants) -> float | None:
-    """Return the number that an option of a node always gives, if it is an expression and that simple."""
-    return number_in(expression.tree, constants) if isinstance(expression, Expression) else None
+def number_of(expression: Expression | None, constants: Constants) -> float | None:
+    """Return the number that an option of a node always gives, if it is there and that simple."""
+    return number_in(expression.tree, constants) if expression else None
 
 
 def number_in(tree: Tree, constants: Constants) -> float | None:
@@ -63,7 +63,7 @@ def place_of(expression: Expression, constants: Constants, places: Mapping[str, 
 
 def goal_place(node: Node, main: str, constants: Constants, places: Mapping[str, Place]) -> Place | None:
     """Return the place that a skill's main argument always is, if it is that simple."""
-    for argument in node.arguments:
+    for argument in node.step.arguments:
         if argument.name in ("", main) and isinstance(argument.value, Scalar):
             try:
                 return place_of(expression_of(argument.value), constants, places)
@@ -74,7 +74,9 @@ def goal_place(node: Node, main: str, constants: Constants, places: Mapping[str,
 
 def items_of(node: Node, constants: Constants, places: Mapping[str, Place]) -> list[Place] | None:
     """Return the places that a loop goes through, if that is all it does and they are written down."""
-    items = node.options.items if isinstance(node.options, ForOptions) else ()
+    items = node.step.items
+    if items is None:
+        return []
     if isinstance(items, tuple):
         found = [place_of(item, constants, places) for item in items]
     else:
@@ -83,28 +85,13 @@ def items_of(node: Node, constants: Constants, places: Mapping[str, Place]) -> l
     return [place for place in found if place] if all(found) else None
 
 
-def starts_always(node: Node) -> bool:
-    """Tell whether nothing can keep a node from starting."""
-    return "only_if" not in node.modifiers
-
-
 def never_skipped(program: Program, node: Node) -> bool:
     """Tell whether a node is always done, so that its result is success or failure."""
-    if any(key in node.modifiers for key in ("only_if", "skip_if", "once", "cooldown")):
+    if node.may_be_left_out:
         return False
-    if node.kind in _GROUPS:
+    if node.step.skipped is Skipped.WITH_ALL_INSIDE:
         return any(never_skipped(program, program.nodes[child]) for child in node.children)
-    return node.kind not in _MAY_DO_NOTHING
-
-
-def never_fails(node: Node) -> bool:
-    """Tell whether a node can only succeed, its modifiers left aside."""
-    rule = _NEVER_FAILS.get(node.kind)
-    return rule is not None and rule(node)
-
-
-def _says_text(node: Node) -> bool:
-    return not any(asked.expression.names for asked in node.asked)
+    return node.step.skipped is Skipped.NEVER
 
 
 def is_simple(node: Node) -> bool:
@@ -114,15 +101,25 @@ def is_simple(node: Node) -> bool:
     return not any(isinstance(part, Index | Field | Arithmetic) for tree in trees for part, _ in walk(tree))
 
 
-_GROUPS = ("sequence", "fallback", "parallel")  # skipped if all in them is
-_MAY_DO_NOTHING = ("if", "choose", "for", "repeat", "machine", "use", "run")
-_NEVER_FAILS: Mapping[str, Callable[[Node], bool]] = {
-    "wait": lambda node: isinstance(node.options, Expression) and isinstance(node.options.tree, Number),
-    "wait_for": is_simple,
-    "log": _says_text,
-}
+def is_sure(node: Node, program: Program) -> bool:
+    """Tell whether a node reads only what is there from the start, in ways that cannot go wrong."""
+    read = {name.name for asked in node.asked for name in asked.expression.names}
+    others = read - program.inputs.keys() - program.data.keys()
+    if others and not others <= {one.item for one in program.nodes}:
+        return False
+    parts = (part for asked in node.asked for part, _ in walk(asked.expression.tree))
+    return not any(isinstance(part, Index | Field) or _divides(part) for part in parts)
 
 
-def place_in_text(node: Node, expression: object) -> Span:
+def _divides(part: Tree) -> bool:
+    return isinstance(part, Arithmetic) and part.operator == "/"
+
+
+def takes_time(pause: Expression | None) -> bool:
+    """Tell whether a time is there and not written out as none."""
+    return pause is not None and not (isinstance(pause.tree, Number) and pause.tree.value == 0)
+
+
+def place_in_text(node: Node, expression: Expression | None) -> Span:
     """Return where an expression of a node stands."""
     return next((asked.scalar.span for asked in node.asked if asked.expression is expression), node.span)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
-from rbxcompose.missions.places import DEEP, HISTORIES
+from rbxcompose.missions.places import DEEP, HISTORIES, NO_HISTORY
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.task import Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
-
 HISTORY = "Where it starts again after it was halted: `last` at the child it was in, `deep` also inside that child."
+
+
+def read_history(reader: Reader) -> str:
+    """Read the option; `none` if it is not there."""
+    return reader.choice("history", HISTORIES)
 
 
 class WithHistory(Task):
@@ -20,21 +23,16 @@ class WithHistory(Task):
     history: str
     is_kept_after_failure: ClassVar[bool] = False
 
-    @staticmethod
-    def read_history(reader: NodeReader) -> str:
-        """Read the option; `none` if it is not there."""
-        return reader.choice("history", HISTORIES)
-
     def halt(self) -> None:
         """Stop what runs, and keep the place."""
         places = self.engine.places
         before, places.is_deep = places.is_deep, places.is_deep or self.history == DEEP
-        if self.history != HISTORIES[0]:
+        if self.history != NO_HISTORY:
             places.kept.add(self)
         super().halt()
         places.is_deep = before
 
     def forget_places(self) -> None:
         """Forget where this node and those below it were: it has ended."""
-        if self.history != HISTORIES[0]:
+        if self.history != NO_HISTORY:
             self.engine.places.forget(self.number, self.end)

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from dataclasses import dataclass, field
+from typing import ClassVar, Self
 
-from rbxcompose.missions.history import HISTORY, WithHistory
+from rbxcompose.missions.answers import Skipped
+from rbxcompose.missions.families import Straight
+from rbxcompose.missions.history import HISTORY, WithHistory, read_history
+from rbxcompose.missions.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, FAILS, NEVER, Outcomes
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.statuses import FAILURE, IDLE, RUNNING, SKIPPED
 from rbxcompose.missions.task import Site
 from rbxcompose.missions.watching import Watched
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.program import Node
-
 WRITTEN, RANDOM = "written", "random"
-ASKING = ("check", "wait_for")
-LISTS = ("sequence", "fallback")
 OPTIONS: Mapping[str, str] = {
     "reactive": "Whether earlier conditions (`check`, `wait_for`, lists of only those) are asked again at each tick.",
     "history": HISTORY,
@@ -26,40 +25,58 @@ OPTIONS: Mapping[str, str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class InTurnOptions:
-    """How the nodes of a list are gone through."""
+class InTurn(Straight):
+    """A list of nodes: the first that ends as `decides` ends the list alike."""
 
-    reactive: bool = False
-    history: str = "none"
-    order: str = WRITTEN
+    reactive: bool
+    history: str = field()
+    order: str = field()
+
+    only_asks = True
+    skipped = Skipped.WITH_ALL_INSIDE
+    decides: ClassVar[str]
+
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
+        """Read the list and its options."""
+        reader.steps()
+        reactive = reader.flag("reactive") if reader.has("reactive") else False
+        return cls(reactive, read_history(reader), reader.choice("order", (WRITTEN, RANDOM)))
+
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return what decides of any child, and all of the last one that is reached."""
+        found, goes_on_never = NEVER, ALWAYS_FAILS if self.decides == FAILS else ALWAYS_SUCCEEDS
+        for child in map(endings.of, node.children[:-1]):
+            found = found.both(child.of(self.decides))
+            if child.plain in (NEVER, goes_on_never):
+                return found
+        return found.both(endings.of(node.children[-1])) if node.children else found
+
+    @property
+    def comes_again(self) -> bool:
+        """Tell that an earlier condition may let it go back."""
+        return self.reactive
 
 
-class InTurn(WithHistory):
+class InTurnTask(WithHistory):
     """Does the nodes of a list in order; the first that ends as `decides` ends the list alike.
 
     If none does, it ends as those that were not skipped did.
     """
 
-    __slots__ = ("all", "children", "conditions", "did", "index", "options", "order")
+    __slots__ = ("all", "children", "conditions", "did", "index", "is_random", "order")
     saved = ("did", "index", "order")
     decides: ClassVar[int]
 
-    def __init__(self, site: Site, options: InTurnOptions) -> None:
+    def __init__(self, site: Site, step: InTurn) -> None:
         super().__init__(site)
-        self.options = options
-        self.history = options.history
+        self.is_random = step.order == RANDOM
+        self.history = step.history
         self.all = self.children = site.children
         self.order: list[int] = []  # in which the children are done, if it was drawn
-        self.conditions = _conditions(site) if options.reactive else {}
+        self.conditions = _conditions(site) if step.reactive else {}
         self.index = 0
         self.did = SKIPPED
-
-    @staticmethod
-    def read(reader: NodeReader) -> InTurnOptions:
-        """Read the list and its options."""
-        reader.steps()
-        reactive = reader.flag("reactive") if reader.has("reactive") else False
-        return InTurnOptions(reactive, WithHistory.read_history(reader), reader.choice("order", (WRITTEN, RANDOM)))
 
     def begin(self) -> int:
         """Start with the first child, or with the one at which it was halted."""
@@ -68,7 +85,7 @@ class InTurn(WithHistory):
             return self.proceed()
         self.index = 0
         self.did = SKIPPED
-        if self.options.order == RANDOM:
+        if self.is_random:
             self.order = list(range(len(self.all)))
             self.engine.chance().shuffle(self.order)
             self.arrange()
@@ -154,9 +171,7 @@ def _conditions(site: Site) -> dict[int, tuple[Watched, ...]]:
 
 
 def _only_asks(nodes: tuple[Node, ...], node: Node) -> bool:
-    return node.kind in ASKING or (
-        node.kind in LISTS and all(_only_asks(nodes, nodes[child]) for child in node.children)
-    )
+    return node.step.only_asks and all(_only_asks(nodes, nodes[child]) for child in node.children)
 
 
 def _asked(nodes: tuple[Node, ...]) -> list[Watched]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from rbxcompose.missions.calling import UseOptions
 from rbxcompose.missions.program import Interrupt, Node, Program, Target
 
 MOST_NODES = 20_000  # of a mission with all that it uses
@@ -18,7 +17,7 @@ def link(program: Program, missions: Mapping[str, Program]) -> Program:
     Raises:
         KeyError: if a mission is used that does not exist; checks find that before, and also circles.
     """
-    if not any(isinstance(node.options, UseOptions) for node in program.nodes):
+    if not any(node.step.uses for node in program.nodes):
         return program
     linker = _Linker(missions)
     linked = linker.mission(program, None, "")
@@ -48,8 +47,8 @@ class _Linker:
         own = f"{path}{node.path}"
         children = tuple(self.copy(program, child, number, path, numbers) for child in node.children)
         inner = None
-        if isinstance(node.options, UseOptions):
-            used = self.missions[node.options.mission]
+        if node.step.uses:
+            used = self.missions[node.step.uses.text]
             inner = self.mission(used, number, f"{own}.")
             roots = (one.root for one in inner.interrupts if one.root is not None)
             children = (inner.main, *roots)

@@ -23,18 +23,10 @@ class Next:
 
 
 @dataclass(frozen=True, slots=True)
-class MachineOptions:
+class States:
     """The first state, the names of the states in the order of the children, the ends with what they count as."""
 
     start: str = ""
-    states: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
     ends: Mapping[str, str] = field(default_factory=dict)
-    history: str = "none"
     start_span: Span | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class StateOptions:
-    """Where a state leads to; None for one whose body never ends."""
-
-    next: Next | None = None

@@ -13,6 +13,7 @@ from rbxcompose.manifest.brackets import bracketed, without_brackets
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
 from rbxcompose.missions.adrift import among_branches
+from rbxcompose.missions.asked import Argument, Asked, Assignment
 from rbxcompose.missions.assigning import EXAMPLE, read_line
 from rbxcompose.missions.dashes import needs_dashes, steps_of
 from rbxcompose.missions.hook_slips import is_step, step_in_hook, without_dashes
@@ -20,13 +21,13 @@ from rbxcompose.missions.messages import Message, Shape, Written
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.moments import DEEDS, LEVELS, OPTIONS, Deeds, Moments
 from rbxcompose.missions.naming import NAME, no_name
-from rbxcompose.missions.program import Argument, Asked, Assignment
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kinds
 from rbxcompose.missions.spans import expression_of, inner_span
-from rbxcompose.missions.value_reader import Nodes, ValueReader, read_expression
+from rbxcompose.missions.value_reader import Nodes, read_expression
 
 
-class NodeReader(ValueReader):
+class NodeReader(Reader):
     """One mapping of a mission, being read, with the nodes below it."""
 
     def __init__(self, mapping: Mapping, key: str, number: int, nodes: Nodes) -> None:

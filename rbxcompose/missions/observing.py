@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from rbxcompose.missions.events import BranchEnded, NodeEnded, NodeStarted
-from rbxcompose.missions.machines import STATE
-from rbxcompose.missions.modifiers.registry import Modifier
+from rbxcompose.missions.look import Form
+from rbxcompose.missions.modifiers.registry import Decorator
 from rbxcompose.missions.scopes import SinceScope
 from rbxcompose.missions.statuses import IDLE, NAMES, RUNNING
 from rbxcompose.missions.task import Site, Task
-
-if TYPE_CHECKING:
-    from rbxcompose.missions.world import Observer
+from rbxcompose.missions.world import Observer
 
 
-class Since(Modifier):
+class Since(Decorator):
     """Counts messages from the start of its node, around one that asks `new($x)`."""
 
     __slots__ = ("view",)
     saved = ("seen",)
 
     def __init__(self, site: Site, options: SinceScope, inner: Task) -> None:
-        super().__init__(site, options, inner)
+        super().__init__(site, inner)
         self.view = options
 
     @property
@@ -40,7 +36,7 @@ class Since(Modifier):
         return self.advance(self.inner)
 
 
-class Around(Modifier):
+class Around(Decorator):
     """Hears when its node starts, ends or is halted; a node that begins anew after an interrupt is halted."""
 
     __slots__ = ()
@@ -88,9 +84,9 @@ class Named(Around):
     __slots__ = ("is_state", "name")
 
     def __init__(self, site: Site, options: str, inner: Task) -> None:
-        super().__init__(site, options, inner)
+        super().__init__(site, inner)
         self.name = options
-        self.is_state = site.node.kind == STATE
+        self.is_state = site.node.step.look.form is Form.STATE
 
     def started(self) -> None:
         """Say it."""
@@ -107,7 +103,7 @@ class Branch(Around):
     __slots__ = ("name",)
 
     def __init__(self, site: Site, options: str, inner: Task) -> None:
-        super().__init__(site, options, inner)
+        super().__init__(site, inner)
         self.name = options
 
     def started(self) -> None:
@@ -124,7 +120,7 @@ class Observed(Around):
     __slots__ = ("observer",)
 
     def __init__(self, site: Site, options: Observer, inner: Task) -> None:
-        super().__init__(site, options, inner)
+        super().__init__(site, inner)
         self.observer = options
 
     def started(self) -> None:

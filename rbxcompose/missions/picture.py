@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, is_dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
-from rbxcompose.expressions.tree import Expression
-from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.manifest.tree import Node as Located
-from rbxcompose.manifest.tree import Scalar
-from rbxcompose.manifest.tree import Sequence as Listed
-from rbxcompose.missions.calling import UseOptions
 from rbxcompose.missions.linking import link
-from rbxcompose.missions.machines import MachineOptions, StateOptions
-from rbxcompose.missions.messages import Message
-from rbxcompose.missions.modifiers.registry import modifiers
-from rbxcompose.missions.program import Asked, Assignment, Interrupt, Node, Program, RobotNames
+from rbxcompose.missions.look import Form
+from rbxcompose.missions.program import Interrupt, Node, Program, RobotNames
 
 LONGEST = 60  # characters of what stands in a node
 
@@ -34,6 +26,7 @@ class Drawn:
     """One node: its number in the linked program, what it is, what stands in it, and what is around it.
 
     `role` tells what it is to its parent (`then`, a branch); an interrupt is a node of its own, without a number.
+    `form` is a word of `Form`.
     """
 
     number: int | None
@@ -44,7 +37,9 @@ class Drawn:
     notes: tuple[str, ...] = ()
     arrows: tuple[Arrow, ...] = ()
     is_start: bool = False
-    children: tuple[Drawn, ...] = field(default_factory=tuple)
+    children: tuple[Drawn, ...] = ()
+    sign: str = ""
+    form: str = Form.AFTER
 
     @property
     def title(self) -> str:
@@ -110,85 +105,32 @@ def _interrupt(linked: Program, one: Interrupt) -> Drawn:
 
 def _drawn(linked: Program, number: int, role: str = "", is_start: bool = False) -> Drawn:
     node = linked.nodes[number]
-    options = node.options
-    start = options.start if isinstance(options, MachineOptions) else ""
-    roles = _roles(linked, node)
+    step, look = node.step, node.step.look
+    start = step.states.start if step.states else ""
     children = tuple(
         _drawn(linked, child, one, bool(start) and linked.nodes[child].name == start)
-        for child, one in zip(node.children, roles, strict=True)
+        for child, one in zip(node.children, _roles(linked, node), strict=True)
     )
     if node.inner is not None:
         reactions = [one for one in node.inner.interrupts if one.root is not None]
         children = (children[0], *(_interrupt(linked, one) for one in reactions))
-    arrows: tuple[Arrow, ...] = ()
-    if isinstance(options, StateOptions) and options.next is not None:
-        arrows = tuple(Arrow(outcome, to) for outcome, to in options.next.to.items())
+    leads = step.leads_to.to.items() if step.leads_to else ()
+    arrows = tuple(Arrow(outcome, to) for outcome, to in leads)
     name = "" if role == node.name else node.name
-    return Drawn(number, node.kind or node.skill, _text(node), name, role, _notes(node), arrows, is_start, children)
+    text, notes = _short(step.text(node)), tuple(_notes(node))
+    return Drawn(number, step.word, text, name, role, notes, arrows, is_start, children, look.sign, look.form)
 
 
 def _roles(linked: Program, node: Node) -> Sequence[str]:
     """Return what each child is to its node: the key under which it was written, where that says something."""
     written = [linked.nodes[child].path.removeprefix(node.path).strip(".").partition(".")[0] for child in node.children]
-    says = node.kind in ("if", "choose", "parallel")
-    return [one if says and not one.isdecimal() else "" for one in written]
+    return [one if node.step.look.has_roles and not one.isdecimal() else "" for one in written]
 
 
-def _text(node: Node) -> str:
-    """Return what stands in a node, shortened."""
-    if node.skill:
-        return _short(", ".join(_argument(one.name, one.value) for one in node.arguments))
-    match node.options:
-        case UseOptions(mission=mission):
-            return mission
-        case Message(target=target):
-            return target.text
-        case StateOptions() | MachineOptions():
-            return ""
-    if isinstance(node.options, tuple) and node.options and isinstance(node.options[0], Assignment):
-        return _short(", ".join(f"{one.name} = {one.asked.scalar.text}" for one in node.options))
-    asked = _own(node)
-    if node.item:
-        items = ", ".join(one.scalar.text for one in asked)
-        return _short(f"{node.item} in {items}" if items else node.item)
-    return _short(", ".join(one.scalar.text for one in asked[:2]))
-
-
-def _own(node: Node) -> list[Asked]:
-    """Return the expressions of a node that belong to no modifier."""
-    parts = [part for value in node.modifiers.values() for part in (value, *_parts(value))]
-    return [one for one in node.asked if not any(one.expression is part for part in parts)]
-
-
-def _parts(value: object) -> list[object]:
-    return [getattr(value, one.name) for one in fields(value)] if is_dataclass(value) else []
-
-
-def _argument(name: str, value: Located) -> str:
-    return f"{name} {_written(value)}".strip()
-
-
-def _written(value: Located) -> str:
-    match value:
-        case Scalar():
-            return value.text
-        case Listed():
-            return ", ".join(_written(one) for one in value.items)
-        case Tree():
-            return ", ".join(f"{key} {_written(entry.value)}" for key, entry in value.entries.items())
-
-
-def _notes(node: Node) -> tuple[str, ...]:
-    """Return the modifiers of a node, from the outside in, in words."""
-    found = []
-    for key in modifiers():
-        if key in node.modifiers:
-            value = node.modifiers[key]
-            text = value.text if isinstance(value, Scalar) else ""
-            said = [part.text for part in (value, *_parts(value)) if isinstance(part, Expression)]
-            told = ", ".join(said) or text
-            found.append(_short(f"{key} {told}".strip().replace("_", " ")))
-    return tuple(found)
+def _notes(node: Node) -> Iterator[str]:
+    """Yield the modifiers of a node, from the outside in, in words."""
+    for key, modifier in node.modifiers.items():
+        yield _short(f"{key} {modifier.said}".strip().replace("_", " "))
 
 
 def _short(text: str) -> str:

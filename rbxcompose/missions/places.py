@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.task import Task
+NO_HISTORY, LAST, DEEP = "none", "last", "deep"
+HISTORIES = (NO_HISTORY, LAST, DEEP)  # the default first
 
-LAST, DEEP = "last", "deep"
-HISTORIES = ("none", LAST, DEEP)  # the default first
+
+class Placed(Protocol):
+    """A task, as far as places know it."""
+
+    number: int
 
 
 class Places:
@@ -18,15 +21,15 @@ class Places:
     """
 
     def __init__(self) -> None:
-        self.kept: set[Task] = set()
+        self.kept: set[Placed] = set()
         self.is_deep = False
 
-    def leave(self, task: Task) -> None:
+    def leave(self, task: Placed) -> None:
         """Note that a task is being halted."""
         if self.is_deep:
             self.kept.add(task)
 
-    def take_up(self, task: Task) -> bool:
+    def take_up(self, task: Placed) -> bool:
         """Tell whether a task that starts has a place to start at; it is told once."""
         if task in self.kept:
             self.kept.remove(task)

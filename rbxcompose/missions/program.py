@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar, Protocol, Self
 
 from rbxcompose.config import Place
+from rbxcompose.expressions.check import StaticScope
 from rbxcompose.expressions.text import parse_template
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import Type
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Mapping as LocatedMapping
-from rbxcompose.manifest.tree import Node as Located
 from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.answers import Advice, Counted, Flow, Skipped
+from rbxcompose.missions.asked import Argument, Asked
+from rbxcompose.missions.branches import Branches, Choice
+from rbxcompose.missions.look import Look
+from rbxcompose.missions.machines import Next, States
+from rbxcompose.missions.modifier import Modifier
+from rbxcompose.missions.moments import Effects
+from rbxcompose.missions.outcomes import Outcomes
+from rbxcompose.missions.places import NO_HISTORY
+from rbxcompose.missions.possible import Possibility
+from rbxcompose.missions.reader import Reader
 
 ROOT = 0  # number of the node under `do`
 RATE = 20.0  # [Hz] of conditions that nothing announces
+NOTHING: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,69 +93,225 @@ class Input:
     most: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """An expression of a node, the type that its value must have, and the scalar that it stands in.
+class Endings(Protocol):
+    """Who knows how the nodes of a mission may end."""
 
-    One that is assigned must have the type of its datum.
+    program: Program
+    robot: RobotNames
+
+    def of(self, number: int, /) -> Outcomes:
+        """Return how a node may end, its modifiers included."""
+        ...
+
+    def of_mission(self, name: str, /) -> Outcomes:
+        """Return how another mission may end."""
+        ...
+
+
+class Step(ABC):
+    """What a node does: a kind of the language with its options, which are the fields of the subclass.
+
+    What is abstract every kind answers, itself or by its family (`families.py`). What is not is a capability: a kind
+    without it has nothing to say.
     """
 
-    expression: Expression
-    wanted: Type
-    scalar: Scalar
-    is_assigned: bool = False
+    __slots__ = ()
+    name: ClassVar[str]  # the word of the language
+    options: ClassVar[Mapping[str, str]]  # the keys that belong to it, each with what it is for
+    is_inner: ClassVar[bool]  # it stands only inside another one, as a state in a machine: it has no word
 
+    @classmethod
+    @abstractmethod
+    def read(cls, reader: Reader) -> Self:
+        """Read the kind's value and options."""
 
-@dataclass(frozen=True, slots=True)
-class Assignment:
-    """A name that is set, its place, and the expression for its new value."""
+    @abstractmethod
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return how it may end, its modifiers left aside."""
 
-    name: str
-    span: Span
-    asked: Asked
+    @abstractmethod
+    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+        """Yield what may come of it, as far as a test should see each of it."""
 
+    @abstractmethod
+    def shows(self, node: Node, scope: StaticScope) -> Mapping[str, Type]:
+        """Return the names that only the nodes inside see, with their types."""
 
-@dataclass(frozen=True, slots=True)
-class Argument:
-    """An argument of a skill as written; what it means depends on the skill. The main one has no name."""
+    @abstractmethod
+    def endless(self, ends: Outcomes) -> Advice | None:
+        """Return what to say if it goes on for ever without a pause; `ends` is how it may end."""
 
-    name: str
-    value: Located
-    span: Span
+    @property
+    @abstractmethod
+    def skipped(self) -> Skipped:
+        """Return when it does nothing."""
+
+    @property
+    @abstractmethod
+    def only_asks(self) -> bool:
+        """Tell whether all that it does by itself is to ask conditions, which may be done again at any time."""
+
+    @property
+    @abstractmethod
+    def waits(self) -> bool:
+        """Tell whether it takes time by itself."""
+
+    @property
+    @abstractmethod
+    def comes_again(self) -> bool:
+        """Tell whether what is inside may be done more than once."""
+
+    @property
+    @abstractmethod
+    def effects(self) -> Effects:
+        """Return what it does by itself."""
+
+    @property
+    @abstractmethod
+    def has_result(self) -> bool:
+        """Tell whether it has something that `save` keeps."""
+
+    @property
+    @abstractmethod
+    def flow(self) -> Flow:
+        """Return how it goes through those inside."""
+
+    @property
+    @abstractmethod
+    def look(self) -> Look:
+        """Return how it is drawn."""
+
+    # Capabilities: what only some kinds have.
+
+    @property
+    def word(self) -> str:
+        """Return what people call it: the word of the language, or the name of a skill."""
+        return self.name
+
+    def text(self, node: Node) -> str:
+        """Return what stands in it where it is drawn: its own expressions."""
+        return ", ".join(asked.scalar.text for asked in node.asked[: min(node.own, 2)])
+
+    @property
+    def skill(self) -> str:
+        """Return the skill that it asks; empty for none."""
+        return ""
+
+    @property
+    def ends_mission(self) -> str:
+        """Return the result with which it ends the mission that it is part of; empty if it does not."""
+        return ""
+
+    @property
+    def uses(self) -> Scalar | None:
+        """Return the name of the mission that it runs."""
+        return None
+
+    @property
+    def arguments(self) -> tuple[Argument, ...]:
+        """Return what it gives to its skill or mission."""
+        return ()
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Return the `$names` that it reads beside its expressions, messages and arguments."""
+        return NOTHING
+
+    @property
+    def lasts(self) -> Expression | None:
+        """Return the time that it takes."""
+        return None
+
+    @property
+    def numbers(self) -> tuple[Counted, ...]:
+        """Return what it counts."""
+        return ()
+
+    @property
+    def history(self) -> str:
+        """Return where it starts again after it was halted, as a word of `HISTORIES`."""
+        return NO_HISTORY
+
+    @property
+    def goes_on_after(self) -> str:
+        """Return the result of a child after which the next one comes, if they come in their order."""
+        return ""
+
+    @property
+    def items(self) -> Expression | tuple[Expression, ...] | None:
+        """Return what it goes through, item by item."""
+        return None
+
+    @property
+    def choice(self) -> Choice | None:
+        """Return by which value it chooses one of its children."""
+        return None
+
+    @property
+    def branches(self) -> Branches | None:
+        """Return what decides, if its children run at the same time."""
+        return None
+
+    @property
+    def states(self) -> States | None:
+        """Return the states that its children are."""
+        return None
+
+    @property
+    def leads_to(self) -> Next | None:
+        """Return where a state leads to."""
+        return None
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
     """One mission node. Those below it have the numbers from `number + 1` to `end` (exclusive).
 
-    `kind` is the word of the language, or empty for a skill, whose name is then `skill`. `options` is what the kind's
-    own `read` returned, or the arguments of a skill; `modifiers` are by key; `asked` are all expressions, for
-    checking. `item` is the name that a loop gives to its item. `held` tells where a node that a `run` does stands in
-    the data. `inner` is the mission that a `use` runs, in a program
+    `step` is what it does; `modifiers` are by key, from the outside in. `asked` are all expressions, for checking, and
+    first those of the step itself, which are `own` in number. `item` is the name that a loop gives to its item. `held`
+    tells where a node that a `run` does stands in the data. `inner` is the mission that a `use` runs, in a program
     that was linked: its nodes are below this one.
     """
 
     number: int
-    kind: str
+    step: Step
     name: str
     path: str
     span: Span
     parent: int | None
     children: tuple[int, ...]
     end: int
-    options: object
-    modifiers: Mapping[str, object] = field(default_factory=dict)
+    modifiers: Mapping[str, Modifier] = field(default_factory=dict)
     asked: tuple[Asked, ...] = ()
+    own: int = 0
     item: str = ""
-    skill: str = ""
     held: tuple[str, ...] = ()
     inner: Program | None = None
 
     @property
-    def arguments(self) -> tuple[Argument, ...]:
-        """Return the arguments of a skill as written; other kinds have none."""
-        written = self.options if self.skill and isinstance(self.options, tuple) else ()
-        return tuple(argument for argument in written if isinstance(argument, Argument))
+    def skill(self) -> str:
+        """Return the skill that it asks; empty for none."""
+        return self.step.skill
+
+    @property
+    def saved(self) -> Scalar | None:
+        """Return the name under which it keeps its result."""
+        return next((one.saved for one in self.modifiers.values() if one.saved), None)
+
+    @property
+    def limit(self) -> Expression | None:
+        """Return the time that it may take."""
+        return next((one.limit for one in self.modifiers.values() if one.limit), None)
+
+    @property
+    def may_be_left_out(self) -> bool:
+        """Tell whether a modifier may keep it from starting."""
+        return any(one.may_skip for one in self.modifiers.values())
+
+    @property
+    def is_forgiven(self) -> bool:
+        """Tell whether its failure may count as success."""
+        return any(one.forgives for one in self.modifiers.values())
 
 
 CONTINUE, RESTART, END = "continue", "restart", "end"
@@ -210,15 +380,15 @@ class Program:
     @property
     def saved(self) -> frozenset[str]:
         """Return the names under which results are kept."""
-        names = (node.modifiers.get("save") for node in self.nodes)
-        return frozenset(name.text for name in names if isinstance(name, Scalar))
+        return frozenset(node.saved.text for node in self.nodes if node.saved)
 
     def reads(self) -> frozenset[str]:
         """Return all `$names` that are read anywhere, arguments of skills and of missions included."""
         read = {name.name for _, asked in self.asked() for name in asked.expression.names}
-        options = (getattr(node.options, "arguments", node.arguments) for node in self.nodes)
-        written = (one.value.text for arguments in options for one in arguments if isinstance(one.value, Scalar))
         for node in self.nodes:
-            for part in (node.options, *node.modifiers.values()):
-                read.update(getattr(part, "names", ()))  # of messages, hooks, outcomes, the order of a loop
-        return frozenset(read.union(name.name for text in written for name in parse_template(text).names))
+            step, messages = node.step, (node.step.effects.published, node.step.effects.called)
+            read.update(step.reads, *(message.names for message in messages if message))
+            read.update(*(one.moments.names for one in node.modifiers.values() if one.moments))
+            texts = (one.value.text for one in step.arguments if isinstance(one.value, Scalar))
+            read.update(name.name for text in texts for name in parse_template(text).names)
+        return frozenset(read)

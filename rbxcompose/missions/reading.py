@@ -11,6 +11,7 @@ from rbxcompose.findings import Finding, Related, Report, Span
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes, program
 from rbxcompose.missions.adrift import settled
+from rbxcompose.missions.asked import Asked
 from rbxcompose.missions.header import read_data, read_inputs, read_rate
 from rbxcompose.missions.held import ITEM, Pattern, matching, pattern_of, with_held
 from rbxcompose.missions.keys import find_key
@@ -18,8 +19,8 @@ from rbxcompose.missions.machines import STATE
 from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
 from rbxcompose.missions.naming import NAME, NAME_HELP, no_name
 from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.program import AFTERWARDS, RESTART, Asked, Interrupt, Program, Target
-from rbxcompose.missions.registry import Kind, all_kinds, kinds
+from rbxcompose.missions.program import AFTERWARDS, RESTART, Interrupt, Program, Target
+from rbxcompose.missions.registry import SKILL, Kind, all_kinds, kinds
 from rbxcompose.missions.restart_slips import restart_in_line
 from rbxcompose.missions.spans import inner_span
 from rbxcompose.missions.state_reading import MACHINE_KEYS, STATE_KEYS, as_state
@@ -199,26 +200,25 @@ class _Reader:
         self, reader: NodeReader, kind: Kind | None, parent: int | None, name: str, span: Span | None = None
     ) -> program.Node:
         """Read the value, the options and the modifiers of a node."""
-        options = kind.task.read(reader) if kind else reader.arguments()
-        read = {}
+        step = (kind or all_kinds()[SKILL]).read(reader)
+        own, read = len(reader.asked), {}
+        is_state = kind is not None and kind.is_inner
         for key, cls in modifiers().items():
-            is_state = kind is not None and kind.is_inner
             if any(reader.has(one) for one in (key, *cls.keys)) and (is_state or not cls.only_states):
                 read[key] = cls.read(reader, key)
         return program.Node(
             number=reader.number,
-            kind=kind.name if kind else "",
+            step=step,
             name=name,
             path=self.paths[-1],
             span=span or reader.span,
             parent=parent,
             children=tuple(reader.children),
             end=len(self.nodes),
-            options=options,
             modifiers=read,
             asked=tuple(reader.asked),
+            own=own,
             item=reader.item,
-            skill="" if kind else reader.key,
         )
 
     def name_of(self, mapping: Mapping) -> str:

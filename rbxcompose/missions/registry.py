@@ -3,68 +3,70 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import pkgutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TypeAlias, TypeVar
 
 from rbxcompose.missions import kinds as package
+from rbxcompose.missions.program import Step
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.expressions.types import Type
-    from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.program import Node
-    from rbxcompose.missions.views import View
+Kind: TypeAlias = type[Step]
+S = TypeVar("S", bound=Step)
+SKILL = "skill"  # the kind of all nodes that are named after a skill of the robot
+KINDS: dict[str, Kind] = {}
+_TASKS: dict[Kind, Callable[[Site], Task]] = {}
 
 
-class KindTask(Protocol):
-    """A task class that knows how its kind is read."""
+def kind(
+    name: str,
+    task: Callable[[Site, S], Task],
+    options: Mapping[str, str] = MappingProxyType({}),
+    *,
+    is_inner: bool = False,
+) -> Callable[[type[S]], type[S]]:
+    """Register a kind under its word, with the task that carries it out.
 
-    def __call__(self, site: Site, options: Any, /) -> Task:
-        """Make the task of a node with these options."""
-        ...
+    `options` tells in a sentence what each of its keys is for. One that is `inner` has no word of the language.
 
-    def read(self, reader: NodeReader, /) -> object:
-        """Read the kind's value and options."""
-        ...
-
-    def waits(self, node: Node, /) -> bool:
-        """Tell whether a node of this kind takes time by itself."""
-        ...
-
-    def item_type(self, view: View, /) -> Type:
-        """Return the type of the items of a loop."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class Kind:
-    """A kind of mission node: its word, the keys that belong to it with what each is for, and its task class.
-
-    One that is `inner` stands only inside another one, as a state in a machine: it has no word of the language.
+    Raises:
+        TypeError: if the kind leaves something unanswered that every kind answers.
     """
 
-    name: str
-    options: Mapping[str, str]
-    task: KindTask
-    is_inner: bool = False
+    def register(cls: type[S]) -> type[S]:
+        if inspect.isabstract(cls):
+            raise TypeError(f"the kind '{name}' does not answer {', '.join(sorted(cls.__abstractmethods__))}")
 
+        def make(site: Site) -> Task:
+            if not isinstance(site.node.step, cls):
+                raise TypeError(f"'{site.node.path}' is no '{name}'")
+            return task(site, site.node.step)
 
-K = TypeVar("K", bound=KindTask)
-_KINDS: dict[str, Kind] = {}
-
-
-def kind(name: str, options: Mapping[str, str] = MappingProxyType({}), *, is_inner: bool = False) -> Callable[[K], K]:
-    """Register a task class under the word of its kind; `options` tells in a sentence what each of its keys is for."""
-
-    def register(task: K) -> K:
-        _KINDS[name] = Kind(name, options, task, is_inner)
-        return task
+        cls.name, cls.options, cls.is_inner = name, options, is_inner
+        KINDS[name], _TASKS[cls] = cls, make
+        _look_again()
+        return cls
 
     return register
+
+
+def forget(name: str) -> None:
+    """Take a kind out again, as tests do with theirs."""
+    del _TASKS[KINDS.pop(name)]
+    _look_again()
+
+
+def _look_again() -> None:
+    kinds.cache_clear()
+    all_kinds.cache_clear()
+
+
+def task_of(site: Site) -> Task:
+    """Return the task that carries out a node, with nothing around it."""
+    return _TASKS[type(site.node.step)](site)
 
 
 @cache
@@ -78,4 +80,4 @@ def all_kinds() -> dict[str, Kind]:
     """Return all kinds of nodes in a program by name, sorted."""
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{package.__name__}.{module.name}")
-    return dict(sorted(_KINDS.items()))
+    return dict(sorted(KINDS.items()))

@@ -1,11 +1,11 @@
-"""How a skill or a call ended, as its server tells it."""
+"""How a skill or a call ended, as its server tells it; and that a node cannot go on."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from rbxcompose.expressions.values import Value
+from rbxcompose.expressions.values import EvaluationError, NotArrivedError, Value
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,3 +16,14 @@ class Result:
     message: str = ""
     outcome: str = ""
     values: Mapping[str, Value] = field(default_factory=dict)
+
+
+class NodeFailed(Exception):  # noqa: N818 - it ends a node, as a failure would; it is no error of ours
+    """Raised by a task whose node cannot go on; the text is the reason that is reported."""
+
+
+def words(error: Exception) -> str:
+    """Return an error in words for the robot's story."""
+    if isinstance(error, EvaluationError | NotArrivedError | NodeFailed):
+        return str(error)
+    return f"{type(error).__name__}: {error}"

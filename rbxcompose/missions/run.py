@@ -3,52 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
-from rbxcompose.expressions.text import Template, fill
-from rbxcompose.expressions.types import Type
-from rbxcompose.expressions.values import NOT_ARRIVED, EvaluationError, NotArrivedError, Value
-from rbxcompose.missions import showing
+from rbxcompose.expressions.values import NOT_ARRIVED, Value
 from rbxcompose.missions.course import Course, Reaction
+from rbxcompose.missions.engine_base import EngineBase
 from rbxcompose.missions.events import InterruptEnded, InterruptStarted, Reported
 from rbxcompose.missions.history import WithHistory
 from rbxcompose.missions.places import DEEP
 from rbxcompose.missions.program import CONTINUE, END, Program, RobotNames, Target
-from rbxcompose.missions.scopes import MissionScope, RunScope
+from rbxcompose.missions.results import words
+from rbxcompose.missions.run_base import RunBase
 from rbxcompose.missions.statuses import FAILURE, RUNNING, SUCCESS
-from rbxcompose.missions.task import NodeFailed, Task
-
-if TYPE_CHECKING:
-    from rbxcompose.missions.engine import Engine
 
 STILL_HOLDS = "its condition still holds after its reaction; it can act again once that has been false"
 
 
-class Run:
+class Run(RunBase):
     """Runs a mission as a whole, or one that another uses: then the times that it is told are those of its caller.
 
-    At a tick the interrupts are looked at, then the course on top is ticked. `begun` counts how often it began.
+    At a tick the interrupts are looked at, then the course on top is ticked.
     """
 
-    def __init__(self, engine: Engine, program: Program, robot: RobotNames) -> None:
-        self.engine = engine
-        self.program = program
-        self.data: dict[str, Value] = {}
-        self.inputs: dict[str, Value] = {}
-        self.scope = RunScope(self.data, self.inputs, robot.places, engine.world)
-        self.begun = 0
-        self.ending: int | None = None  # the status with which an `end` node ends it
-        self.message = ""  # of that node
+    def __init__(self, engine: EngineBase, program: Program, robot: RobotNames) -> None:
+        super().__init__(engine, program, robot)
         self.failed: Course | None = None  # what made it fail
         self.mission = Course(len(program.interrupts))
         self.reactions = [Reaction(order, one, self.scope) for order, one in enumerate(program.interrupts)]
         self.stack: list[Course] = [self.mission]  # what was cut short, and on top what runs
         self.returns: list[tuple[int, ...]] = []  # the leaves that each reaction of the stack halted
-        self._types: dict[str, Type] = {
-            **robot.values,
-            **{name: one.type for name, one in program.inputs.items()},
-            **{name: datum.type for name, datum in program.data.items()},
-        }
+        self.keepers: list[WithHistory] = []  # the tasks of the main node that can keep a place
 
     def begin(self, inputs: Mapping[str, Value]) -> None:
         """Start afresh: initial data, nothing runs, every interrupt is armed."""
@@ -97,24 +80,9 @@ class Run:
         """Stop the leaves that run, and keep the place."""
         self.stack[-1].cut(anew)
 
-    def main_tasks(self) -> list[Task]:
+    def main_tasks(self) -> list[WithHistory]:
         """Return the tasks of the main node that can keep a place."""
-        return [
-            task for task in self.engine.tasks if task.number == self.program.main and isinstance(task, WithHistory)
-        ]
-
-    def show(self, name: str, value: Value) -> str:
-        """Write the value of a name for people."""
-        return showing.show_briefly(self._types.get(name), value)
-
-    def filled(self, template: Template, scope: MissionScope) -> str:
-        """Return a text for people with its values: names of places have no underscores there."""
-        places = self.engine.robot.places
-        return fill(template, scope, lambda name, value: self.show(name, showing.spoken(value, places)))
-
-    def written(self, template: Template, scope: MissionScope) -> str:
-        """Return a text for programs with its values: what was written down as a text stays as it is."""
-        return fill(template, scope, self.show)
+        return self.keepers
 
     def _look(self, now: float) -> None:
         """Look at the interrupts: the first that holds, and may, cuts what runs."""
@@ -135,7 +103,7 @@ class Run:
         except Exception as error:  # a condition without a value does not hold
             holding, trouble = False, words(error)
         if trouble and trouble != reaction.trouble:
-            self.engine.say(Reported(f"interrupts.{reaction.name}", trouble))
+            self.engine.say(Reported(reaction.path, trouble))
         reaction.trouble = trouble
         return holding
 
@@ -177,7 +145,7 @@ class Run:
             reaction.is_armed = False
         self.engine.say(InterruptEnded(reaction.name, afterwards, back, anew))
         if not reaction.is_armed and self._holds(reaction):
-            self.engine.say(Reported(f"interrupts.{reaction.name}", STILL_HOLDS))
+            self.engine.say(Reported(reaction.path, STILL_HOLDS))
         self.engine.again(reaction)
         return RUNNING
 
@@ -195,17 +163,10 @@ class Run:
     def _forget_place_of(self, number: int) -> None:
         """Forget where a node was that is to begin anew; those inside it keep the places of histories of their own."""
         node = self.engine.program.nodes[number]
-        is_deep = getattr(node.options, "history", "") == DEEP
+        is_deep = node.step.history == DEEP
         self.engine.places.forget(number, node.end if is_deep else number + 1)
 
     def _finish(self, course: Course, status: int) -> int:
         self.halt()
         self.failed = course if status == FAILURE else None
         return FAILURE if status == FAILURE else SUCCESS
-
-
-def words(error: Exception) -> str:
-    """Return an error in words for the robot's story."""
-    if isinstance(error, EvaluationError | NotArrivedError | NodeFailed):
-        return str(error)
-    return f"{type(error).__name__}: {error}"

@@ -8,9 +8,10 @@ from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Entry, Scalar
 from rbxcompose.manifest.tree import Mapping as Tree
 from rbxcompose.missions import codes
-from rbxcompose.missions.history import WithHistory
-from rbxcompose.missions.machines import ENDS, MachineOptions, Next, StateOptions
-from rbxcompose.missions.node_reader import NodeReader
+from rbxcompose.missions.history import read_history
+from rbxcompose.missions.machines import ENDS, Next, States
+from rbxcompose.missions.places import NO_HISTORY
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.state_names import with_names
 from rbxcompose.missions.statuses import FAILURE, NAMES, SUCCESS
 from rbxcompose.missions.value_reader import WORDS
@@ -22,11 +23,11 @@ ASKING = ("if", "then", "else", "when", "check", "choose", "cases")  # that ask,
 RESULTS = (NAMES[SUCCESS], NAMES[FAILURE])
 
 
-def read_machine(reader: NodeReader) -> MachineOptions:
-    """Read the map below `machine`: the first state, the states, ends and history."""
+def read_machine(reader: Reader) -> tuple[States, str]:
+    """Read the map below `machine`: the first state, the states and ends; and the history."""
     value = reader.map_of(reader.key, "'start' and 'states' below it")
     if value is None:
-        return MachineOptions()
+        return States(), NO_HISTORY
     value, misnamed = with_names(value)
     for finding in misnamed:
         reader.add(finding)
@@ -48,11 +49,11 @@ def read_machine(reader: NodeReader) -> MachineOptions:
     start = inner.scalar("start", "the name of a state") if "start" in value else None
     if "start" not in value:
         reader.add(codes.MISSING.at(reader.span, "a machine needs 'start': the state in which it begins"))
-    history = WithHistory.read_history(inner)
-    return MachineOptions(start.text if start else "", names, ends, history, start.span if start else None)
+    history = read_history(inner)
+    return States(start.text if start else "", names, ends, start.span if start else None), history
 
 
-def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:
+def _ends(inner: Reader, states: tuple[str, ...]) -> Mapping[str, str]:
     """Read the ends with what each counts as; `finished` and `failed` are always there."""
     value = inner.mapping.get("ends")
     if value is None:
@@ -77,7 +78,7 @@ def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:
     return read
 
 
-def read_state(reader: NodeReader) -> StateOptions:
+def read_state(reader: Reader) -> Next | None:
     """Read the body of a state and where it leads to."""
     bodies = [key for key in BODIES if reader.has(key)]
     if len(bodies) == len(BODIES):
@@ -89,10 +90,10 @@ def read_state(reader: NodeReader) -> StateOptions:
     else:
         entry = reader.mapping.entries["machine"]
         reader.child_node(Tree({"machine": entry}, entry.key.span), "machine")
-    return StateOptions(_next(reader))
+    return _next(reader)
 
 
-def _next(reader: NodeReader) -> Next | None:
+def _next(reader: Reader) -> Next | None:
     value = reader.mapping.get("next")
     if value is None:
         return None

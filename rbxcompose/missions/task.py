@@ -4,24 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.expressions.values import Value
+from rbxcompose.missions.engine_base import EngineBase
+from rbxcompose.missions.events import Reported
+from rbxcompose.missions.program import Node, Target
+from rbxcompose.missions.results import NodeFailed, words
+from rbxcompose.missions.run_base import RunBase
+from rbxcompose.missions.scopes import ItemScope, MissionScope
 from rbxcompose.missions.statuses import FAILURE, IDLE, RUNNING
-
-if TYPE_CHECKING:
-    from rbxcompose.missions.engine import Engine
-    from rbxcompose.missions.program import Node, Target
-    from rbxcompose.missions.run import Run
-    from rbxcompose.missions.scopes import ItemScope, MissionScope
-    from rbxcompose.missions.views import View
-
-
-class NodeFailed(Exception):  # noqa: N818 - it ends a node, as a failure would; it is no error of ours
-    """Raised by a task whose node cannot go on; the text is the reason that is reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +26,13 @@ class Site:
     `use` runs.
     """
 
-    engine: Engine
-    run: Run
+    engine: EngineBase
+    run: RunBase
     node: Node
     scope: MissionScope
     children: tuple[Task, ...] = ()
     item: ItemScope | None = None
-    inner: Run | None = None
+    inner: RunBase | None = None
 
 
 class Task(ABC):
@@ -51,6 +45,9 @@ class Task(ABC):
 
     __slots__ = ("current", "end", "engine", "number", "run", "scope", "statuses")
     saved: ClassVar[tuple[str, ...]] = ()
+    times: ClassVar[tuple[str, ...]] = ()  # those of them that are times [s]
+    fresh: ClassVar[tuple[str, ...]] = ()  # those that mean nothing before the next start, which computes them
+    told: ClassVar[tuple[str, ...]] = ()  # those that change nothing but what is told
 
     def __init__(self, site: Site) -> None:
         self.engine = site.engine
@@ -123,16 +120,6 @@ class Task(ABC):
         """Return what `save` keeps of this node."""
         return None
 
-    @staticmethod
-    def waits(node: Node) -> bool:
-        """Tell whether a node of this kind takes time by itself."""
-        return False
-
-    @staticmethod
-    def item_type(view: View) -> Type:
-        """Return the type of the items of a loop."""
-        return UNKNOWN
-
     @abstractmethod
     def begin(self) -> int:
         """Do the first tick."""
@@ -174,9 +161,27 @@ class Task(ABC):
             raise NodeFailed(f"{what} must be a whole number, not {self.run.show('', value)}")
         return int(value)
 
+    @property
+    def path(self) -> str:
+        """Return where in the mission it is."""
+        return self.engine.program.nodes[self.number].path
+
+    def cut(self, because: str) -> None:
+        """Stop what runs below, since this task fails, and keep the reason."""
+        engine = self.engine
+        engine.reasons[self.number] = engine.because = because
+        self.halt_below()
+        engine.because = engine.outcome = ""
+
+    def report(self, error: Exception) -> None:
+        """Tell why this task cannot go on."""
+        message = words(error)
+        self.engine.reasons[self.number] = message
+        self.engine.say(Reported(self.path, message))
+
     def _broken(self, error: Exception) -> int:
         self.halt_below()
         self.engine.places.forget(self.number, self.end)
         self.engine.outcome = ""
-        self.engine.failed(self, error)
+        self.report(error)
         return FAILURE

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from rbxcompose.missions.machines import MachineOptions, StateOptions
+from rbxcompose.missions.machines import States
 from rbxcompose.missions.program import Node, Program
 
 Leads = Mapping[str, frozenset[str]]  # the states and ends that each state leads to, by its name
 
 
-def transitions(program: Program) -> Iterator[tuple[MachineOptions, list[Node], Leads]]:
+def transitions(program: Program) -> Iterator[tuple[States, list[Node], Leads]]:
     """Yield each machine, its states in the order of the text, and where each leads to."""
     for node in program.nodes:
-        if isinstance(node.options, MachineOptions):
+        if node.step.states:
             states = [program.nodes[child] for child in node.children]
-            yield node.options, states, {state.name: _targets(state) for state in states}
+            yield node.step.states, states, {state.name: _targets(state) for state in states}
 
 
 def reached(start: str, leads: Leads) -> frozenset[str]:
@@ -29,5 +29,4 @@ def reached(start: str, leads: Leads) -> frozenset[str]:
 
 
 def _targets(state: Node) -> frozenset[str]:
-    leads_to = state.options.next if isinstance(state.options, StateOptions) else None
-    return frozenset(leads_to.to.values() if leads_to else ())
+    return frozenset(state.step.leads_to.to.values() if state.step.leads_to else ())

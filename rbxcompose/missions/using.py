@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
 from rbxcompose.findings import Finding, Related, Span, kind
-from rbxcompose.missions.calling import UseOptions
 from rbxcompose.missions.linking import DEEPEST, MOST_NODES
 from rbxcompose.missions.program import Program
 
@@ -46,8 +45,8 @@ def used_by(program: Program) -> dict[str, Span]:
     """Return the names of the missions that a mission uses, each with its first place."""
     found: dict[str, Span] = {}
     for node in program.nodes:
-        if isinstance(node.options, UseOptions) and node.options.mission:
-            found.setdefault(node.options.mission, node.options.span)
+        if node.step.uses and node.step.uses.text:
+            found.setdefault(node.step.uses.text, node.step.uses.span)
     return found
 
 
@@ -77,8 +76,8 @@ class Using:
         sizes = {one: self._walk(one, [*above, name]) for one in self._uses[name]}
         nodes = len(self._missions[name].nodes)
         for node in self._missions[name].nodes:
-            if isinstance(node.options, UseOptions):
-                nodes += sizes.get(node.options.mission, (0, 0))[0]
+            if node.step.uses:
+                nodes += sizes.get(node.step.uses.text, (0, 0))[0]
         self._sizes[name] = nodes, 1 + max((depth for _, depth in sizes.values()), default=0)
         return self._sizes[name]
 

@@ -13,9 +13,9 @@ from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
+from rbxcompose.missions.asked import Asked
 from rbxcompose.missions.naming import NAME, no_name
 from rbxcompose.missions.other_words import ENDLESS, FLAGS, digits_of, in_digits, not_our_word
-from rbxcompose.missions.program import Asked
 from rbxcompose.missions.spans import expression_of, inner_span
 from rbxcompose.units import NUMBER, TIME
 

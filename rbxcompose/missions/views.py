@@ -12,7 +12,6 @@ from rbxcompose.findings import Finding, Kind, Span, nearest, replacement
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions import codes
 from rbxcompose.missions.program import Node, Program, RobotNames
-from rbxcompose.missions.registry import all_kinds
 from rbxcompose.missions.spans import inner_span
 from rbxcompose.missions.watching import POSE as POSE_NAME
 
@@ -56,16 +55,11 @@ class View:
     @property
     def waits(self) -> bool:
         """Tell whether the node, or any below it, takes time by itself."""
-        return any(below.skill or _waits(below) for below in self.program.below(self.node.number))
+        return any(below.step.waits for below in self.program.below(self.node.number))
 
     def typed(self, expression: Expression, wanted: Type, scalar: Scalar, kind: Kind) -> Iterator[Finding]:
         """Yield what is wrong with an expression that must have the type `wanted`."""
         return findings_of(expression, wanted, scalar, self.scope, kind)
-
-
-def _waits(node: Node) -> bool:
-    kind = all_kinds().get(node.kind)
-    return kind is not None and kind.task.waits(node)
 
 
 def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
@@ -91,10 +85,8 @@ def views(program: Program, robot: RobotNames) -> Iterator[View]:
     for node in program.nodes:
         scope = base if node.parent is None else below[node.parent]
         view = View(program, robot, node, scope)
-        below[node.number] = scope
-        if node.item and node.kind:
-            item = all_kinds()[node.kind].task.item_type(view)
-            below[node.number] = replace(scope, names={**scope.names, node.item: item})
+        shown = node.step.shows(node, scope)
+        below[node.number] = replace(scope, names={**scope.names, **shown}) if shown else scope
         yield view
 
 

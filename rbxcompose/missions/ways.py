@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from rbxcompose.config import Place
-from rbxcompose.missions.facts import Constants, goal_place, items_of, number_of, starts_always
+from rbxcompose.missions.answers import Flow
+from rbxcompose.missions.facts import Constants, goal_place, items_of, number_of
 from rbxcompose.missions.program import ROOT, Node, Program
 
 MOST_STEPS = 2_000  # of a mission that are gone through; loops in loops would take for ever
@@ -55,31 +56,30 @@ class Ways:
             return None, 0.0
         node = self.program.nodes[number]
         there, takes = self._inside(node, here, constants)
-        given = number_of(node.modifiers.get("timeout"), constants)
+        given = number_of(node.limit, constants)
         if given and takes > given:
             worst = self.short.get(number)
             if worst is None or worst.needs < takes:
                 self.short[number] = TooShort(node, given, takes, self.leg if node.skill else None)
         takes = takes if given is None else min(takes, given)
-        if not starts_always(node):
+        if node.may_be_left_out:
             return (there if there is here else None), 0.0
-        return there, 0.0 if node.modifiers.get("optional") else takes
+        return there, 0.0 if node.is_forgiven else takes
 
     def _inside(self, node: Node, here: Here, constants: Constants) -> tuple[Here, float]:
-        match node.kind:
-            case "":
-                return self._skill(node, here, constants)
-            case "sequence" | "repeat":
+        if node.skill:
+            return self._skill(node, here, constants)
+        if not node.children:
+            return here, number_of(node.step.lasts, constants) or 0.0
+        match node.step.flow:
+            case Flow.IN_TURN:
                 return self._in_turn(node, here, constants)
-            case "for":
+            case Flow.PER_ITEM:
                 return self._loop(node, here, constants)
-            case "wait":
-                return here, number_of(node.options, constants) or 0.0
-            case "if" | "fallback":
+            case Flow.ONE_OF:
                 for child in node.children:
                     self.go(child, None, constants)
-                return None, 0.0
-        return here, 0.0
+        return None, 0.0
 
     def _skill(self, node: Node, here: Here, constants: Constants) -> tuple[Here, float]:
         if node.skill != self.driving.skill:

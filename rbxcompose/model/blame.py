@@ -8,8 +8,8 @@ from rbxcompose.expressions.check import check_condition
 from rbxcompose.expressions.types import FLAG
 from rbxcompose.findings import Related, Span
 from rbxcompose.manifest.tree import at
+from rbxcompose.missions.asked import Asked
 from rbxcompose.missions.bounds import Bounds, truth
-from rbxcompose.missions.program import Asked
 from rbxcompose.missions.views import NodeScope, base_scope, views
 from rbxcompose.missions.watching import POSE
 from rbxcompose.model.charging import batteries, constants

@@ -11,7 +11,7 @@ from rbxcompose.config import Config
 from rbxcompose.diagnostics.levels import LOG_LEVELS
 from rbxcompose.findings import Report
 from rbxcompose.manifest.models import DESCRIPTION, ComponentEntry, ComponentOptions, RobotManifest
-from rbxcompose.missions.messages import sent_by
+from rbxcompose.missions.deeds import sent_by
 from rbxcompose.missions.sources import ValueSource
 from rbxcompose.model.missions import read_missions
 from rbxcompose.model.robot import Part, Robot

@@ -9,11 +9,12 @@ from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import COUNT, FLAG, UNKNOWN, Type, TypeKind
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.missions.asked import Asked, Assignment
 from rbxcompose.missions.messages import Message
-from rbxcompose.missions.modifiers.registry import Modifier, modifiers
+from rbxcompose.missions.modifier import Modifier
+from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.moments import Moments
 from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.program import Asked, Assignment
 from rbxcompose.missions.registry import Kind
 from rbxcompose.missions.value_reader import UNREADABLE
 from rbxcompose.schema.scalars import Schema, computed
@@ -94,7 +95,7 @@ class Asking(NodeReader):
 
     def map_of(self, key: str, what: str) -> Mapping | None:
         """Note a map."""
-        self.schemas[key] = MAPS[key]
+        self.schemas[key] = MAPS.get(key, {"type": "object", "minProperties": 1})
         return None
 
     def branch(self, key: str, branches: tuple[str, ...]) -> str:
@@ -177,8 +178,8 @@ class Asking(NodeReader):
 def kind_schema(kind: Kind) -> tuple[dict[str, Schema], list[str]]:
     """Return the schemas of the keys of a kind, described, and those that must be there."""
     asking = Asking(kind.name)
-    kind.task.read(asking)
-    about = {kind.name: first_line(kind.task.__doc__), **kind.options}
+    kind.read(asking)
+    about = {kind.name: first_line(kind.__doc__), **kind.options}
     made = {key: {**_beside(schema), "description": about.get(key, "")} for key, schema in asking.schemas.items()}
     return made, sorted(set(made) - asking.optional)
 

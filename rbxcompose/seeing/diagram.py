@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from rbxcompose.bus.names import resolve
-from rbxcompose.missions.messages import sent_by
+from rbxcompose.missions.deeds import sent_by
 from rbxcompose.missions.sources import Way
 from rbxcompose.missions.watching import POSE
 from rbxcompose.model.robot import Part, Robot, RobotMission

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 
+from rbxcompose.missions.look import Form
 from rbxcompose.missions.picture import Drawn, Picture
 from rbxcompose.missions.statuses import NAMES
 from rbxcompose.seeing.mission_text import status_of
@@ -26,7 +27,7 @@ def mission_dot(picture: Picture, statuses: Sequence[int] = ()) -> str:
 def label_of(drawn: Drawn) -> str:
     """Return what stands in a box, in lines."""
     names = [one for one in dict.fromkeys((drawn.role, drawn.name)) if one]
-    title = "state" if drawn.kind == "state" else drawn.title
+    title = "state" if drawn.form == Form.STATE else drawn.title
     return "\n".join([*([": ".join(names)] if names else []), title, *drawn.notes])
 
 
@@ -41,8 +42,8 @@ def _edges(picture: Picture) -> Iterator[tuple[str, str, str, bool]]:
     keys = _keys(picture)
     for one in (one for root in picture.roots for one in root.all()):
         yield from ((keys[id(one)], keys[id(child)], "", False) for child in one.children)
-        states = {child.name: keys[id(child)] for child in one.children if child.kind == "state"}
-        for state in (child for child in one.children if child.kind == "state"):
+        states = {child.name: keys[id(child)] for child in one.children if child.form == Form.STATE}
+        for state in (child for child in one.children if child.form == Form.STATE):
             for arrow in state.arrows:
                 to = states.get(arrow.to, f"{keys[id(one)]}_{arrow.to}")
                 yield states[state.name], to, arrow.outcome, True
@@ -52,7 +53,7 @@ def _ends(picture: Picture) -> Iterator[tuple[str, str]]:
     """Yield the ends of machines that are reached: key and name."""
     keys = _keys(picture)
     for one in (one for root in picture.roots for one in root.all()):
-        states = {child.name for child in one.children if child.kind == "state"}
+        states = {child.name for child in one.children if child.form == Form.STATE}
         reached = dict.fromkeys(arrow.to for child in one.children for arrow in child.arrows)
         yield from ((f"{keys[id(one)]}_{name}", name) for name in reached if name not in states)
 
@@ -62,7 +63,7 @@ def _mermaid(picture: Picture, statuses: Sequence[int]) -> Iterator[str]:
     keys = _keys(picture)
     for one in (one for root in picture.roots for one in root.all()):
         text = label_of(one).translate(_SAFE).replace("\n", "<br>")
-        begin, end = ("([", "])") if one.kind == "state" else ("[", "]") if one.children else ("(", ")")
+        begin, end = ("([", "])") if one.form == Form.STATE else ("[", "]") if one.children else ("(", ")")
         style = f":::{NAMES[status_of(one, statuses)]}" if statuses and status_of(one, statuses) else ""
         yield f'  {keys[id(one)]}{begin}"{text}"{end}{style}'
     yield from (f'  {key}((("{name}")))' for key, name in _ends(picture))
@@ -78,7 +79,7 @@ def _dot(picture: Picture, statuses: Sequence[int]) -> Iterator[str]:
     yield '  rankdir=LR node [shape=box fontname="sans-serif" fontsize=11] edge [fontname="sans-serif" fontsize=10]'
     keys = _keys(picture)
     for one in (one for root in picture.roots for one in root.all()):
-        shape = " shape=ellipse" if one.kind == "state" else " style=rounded" if not one.children else ""
+        shape = " shape=ellipse" if one.form == Form.STATE else " style=rounded" if not one.children else ""
         status = NAMES[status_of(one, statuses)]
         colour = f' color="{COLOURS[status]}" penwidth=2.5' if statuses and status in COLOURS else ""
         yield f"  {keys[id(one)]} [label={_quoted(label_of(one))}{shape}{colour}]"

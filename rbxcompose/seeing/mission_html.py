@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
+from rbxcompose.missions.look import Form
 from rbxcompose.missions.picture import Drawn, Picture
 from rbxcompose.missions.statuses import IDLE, NAMES
 from rbxcompose.seeing.layout import Item, Layout, Point, lay_out
@@ -12,9 +13,8 @@ from rbxcompose.seeing.mission_style import STYLE
 from rbxcompose.seeing.mission_text import MARKS, status_of
 
 _LETTER, _SMALL = 7.6, 6.6  # width of a letter of names and of small text [px]
+_BESIDE = (Form.BESIDE, Form.MACHINE)
 _BOX, _PILL = 34.0, 22.0  # heights [px]
-_BESIDE = frozenset({"parallel", "machine", "choose", "if"})  # whose children do not follow each other
-_SIGNS = {"sequence": "→", "fallback": "?", "parallel": "⇉", "repeat": "↻", "for": "↻", "machine": "◉", "use": "↗"}
 
 
 def mission_html(picture: Picture, statuses: Sequence[int] = ()) -> str:
@@ -48,10 +48,10 @@ def _box(drawn: Drawn, statuses: Sequence[int]) -> Iterator[str]:
     kinds = f"box {NAMES[status]} {escape(drawn.kind)} {'group' if drawn.children else 'leaf'}"
     number = "" if drawn.number is None else f' data-node="{drawn.number}"'
     yield f'<div class="{kinds}"{number} title="{escape(NAMES[status])}">{_head(drawn, status, bool(statuses))}'
-    if drawn.kind == "machine":
+    if drawn.form == Form.MACHINE:
         yield from _states(drawn, statuses)
     if drawn.children:
-        flow = "beside" if drawn.kind in _BESIDE else "after"
+        flow = "beside" if drawn.form in _BESIDE else "after"
         yield f'<div class="inside {flow}">'
         for child in drawn.children:
             yield from _box(child, statuses)
@@ -61,7 +61,7 @@ def _box(drawn: Drawn, statuses: Sequence[int]) -> Iterator[str]:
 
 def _head(drawn: Drawn, status: int, is_live: bool) -> str:
     mark = f'<b class="mark">{MARKS[status]}</b>' if is_live and status != IDLE else ""
-    sign = f'<i class="sign">{_SIGNS[drawn.kind]}</i>' if drawn.kind in _SIGNS else ""
+    sign = f'<i class="sign">{drawn.sign}</i>' if drawn.sign else ""
     names = " ".join(dict.fromkeys(one for one in (drawn.role, drawn.name) if one))
     name = f'<b class="name">{escape(names)}</b>' if names else ""
     kind = f'<span class="kind">{escape(drawn.kind)}</span>'

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from rbxcompose.missions.look import Form
 from rbxcompose.missions.picture import Drawn, Picture
 from rbxcompose.missions.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
 from rbxcompose.plain import fitted, plain
@@ -62,8 +63,8 @@ def status_of(drawn: Drawn, statuses: Sequence[int]) -> int:
 
 def _words(drawn: Drawn) -> str:
     role = f"{drawn.role}: " if drawn.role else ""
-    name = f"{drawn.name}: " if drawn.name and drawn.kind != "state" else ""
-    title = f"state {drawn.name}" if drawn.kind == "state" else drawn.title
+    name = f"{drawn.name}: " if drawn.name and drawn.form != Form.STATE else ""
+    title = f"state {drawn.name}" if drawn.form == Form.STATE else drawn.title
     notes = f"  ({', '.join(drawn.notes)})" if drawn.notes else ""
     start = "  (start)" if drawn.is_start else ""
     return plain(f"{role}{name}{title}{notes}{start}")

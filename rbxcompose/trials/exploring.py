@@ -25,9 +25,6 @@ from rbxcompose.missions.task import Task
 from rbxcompose.trials.model import FAILS, SUCCEEDS
 from rbxcompose.trials.representatives import representatives
 
-STARTED = "started"  # only told, and never asked
-TIMES = ("deadline", "due", "ended_at")  # what tasks save of times [s]
-FORGOTTEN = ("deadline", "due", "allowed", "period", "arguments")  # computed anew at each start
 _DONE = {SUCCEEDS: "succeeds", FAILS: "fails"}
 
 
@@ -306,8 +303,8 @@ def _state(task: Task, state: Sequence[Any], now: float, runs: bool) -> list[Any
     """Return what counts of a task's state: of one that does not run, what its latest run left behind is forgotten."""
     counting = []
     for name, value in zip(("current", *task.saved), state, strict=True):
-        is_time = name in TIMES and isinstance(value, float)
-        if name != STARTED and (runs or name not in FORGOTTEN):
+        is_time = name in task.times and isinstance(value, float)
+        if name not in task.told and (runs or name not in task.fresh):
             counting.append(round(value - now, 6) if is_time else value)
     return counting
 

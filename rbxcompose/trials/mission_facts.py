@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from rbxcompose.missions.messages import Message
-from rbxcompose.missions.moments import Moments
-from rbxcompose.missions.outcomes import Ending
+from rbxcompose.missions.deeds import sent_by
+from rbxcompose.missions.ending import Ending
 from rbxcompose.missions.program import Program, RobotNames, Skill
 from rbxcompose.missions.watching import POSE
 from rbxcompose.trials.model import FAILS, SUCCEEDS
@@ -39,26 +38,13 @@ class Facts:
                 own = Ending(program, robot).of(node.number).named
                 named[node.name] = {**named.get(node.name, {}), **own}
         skills = {node.skill: robot.skills[node.skill] for node in program.nodes if node.skill in robot.skills}
+        published, called = sent_by([program])
         read = frozenset[str]().union(*(one.reads() for one in missions_in(program)))
         return cls(
             skills,
-            frozenset(_targets(program, "call")),
+            frozenset(called),
             read & {*robot.values, POSE} - {*program.inputs, *program.data},
-            frozenset({*_targets(program, "publish"), *_published_by_hooks(program)}),
+            frozenset(published),
             {**named, **{name: skill.outcomes for name, skill in skills.items()}},
             {SUCCEEDS: SUCCEEDS, FAILS: FAILS, **Ending(program, robot).mission().named},
         )
-
-
-def _targets(program: Program, kind: str) -> Iterator[str]:
-    """Yield the services that are called, or the topics on which is published, by nodes."""
-    for node in program.nodes:
-        if node.kind == kind and isinstance(node.options, Message):
-            yield node.options.target.text
-
-
-def _published_by_hooks(program: Program) -> Iterator[str]:
-    for node in program.nodes:
-        for moments in node.modifiers.values():
-            if isinstance(moments, Moments):
-                yield from (one.message.target.text for one in moments.deeds.values() if one.message)

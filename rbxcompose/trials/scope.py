@@ -16,11 +16,11 @@ from rbxcompose.missions import showing
 from rbxcompose.missions.literals import WrongValue, literal, typed
 from rbxcompose.missions.program import Program, RobotNames
 from rbxcompose.missions.scopes import Values
-from rbxcompose.missions.skill import PLACED
 from rbxcompose.missions.spans import expression_of
 from rbxcompose.missions.typing import check_written
 from rbxcompose.missions.views import NodeScope, View
 from rbxcompose.missions.watching import POSE as POSE_NAME
+from rbxcompose.missions.written import PLACED
 from rbxcompose.trials import codes
 from rbxcompose.trials.model import Setting
 

@@ -15,8 +15,8 @@ from rbxcompose.findings import Report
 from rbxcompose.geometry import Pose2
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.missions.deeds import sent_by
 from rbxcompose.missions.goals import skill_of
-from rbxcompose.missions.messages import sent_by
 from rbxcompose.missions.program import Program, Skill
 from rbxcompose.missions.reading import read_program
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, Way

@@ -256,4 +256,4 @@ def test_each_docs_page_shows_what_is_found_and_how_it_is_right(code: str) -> No
 
 def test_every_kind_says_what_it_does() -> None:
     for kind in kinds().values():
-        assert (kind.task.__doc__ or "").strip()
+        assert (kind.__doc__ or "").strip()

@@ -44,7 +44,7 @@ def test_names_stand_in_paths_in_place_of_kind_and_index() -> None:
 
 def test_a_word_a_list_and_a_mapping_are_nodes() -> None:
     program = program_of("do:\n  - a\n  - [b]\n  - go_to: dock")
-    assert [node.kind or node.skill for node in program.nodes] == ["sequence", "a", "sequence", "b", "go_to"]
+    assert [node.step.word for node in program.nodes] == ["sequence", "a", "sequence", "b", "go_to"]
 
 
 def test_data_keeps_its_values_in_si_with_their_types() -> None:

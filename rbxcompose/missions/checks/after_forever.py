@@ -7,10 +7,10 @@ from itertools import pairwise
 
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.ending import Ending
 from rbxcompose.missions.examined import Examined
 from rbxcompose.missions.facts import never_skipped
-from rbxcompose.missions.in_turn import RANDOM, InTurnOptions
-from rbxcompose.missions.outcomes import FAILS, SUCCEEDS, Ending
+from rbxcompose.missions.outcomes import SUCCEEDS
 from rbxcompose.missions.program import Node, Program
 
 
@@ -39,7 +39,7 @@ def after_forever(mission: Examined) -> Iterator[Finding]:
     ```
     """
     for node in mission.program.nodes:
-        if node.kind in ("sequence", "fallback") and (found := _barrier(mission.program, node, mission.ending)):
+        if found := _barrier(mission.program, node, mission.ending):
             barrier, following, why = found
             yield after_forever.at(
                 following.span,
@@ -50,12 +50,12 @@ def after_forever(mission: Examined) -> Iterator[Finding]:
 
 def _barrier(program: Program, node: Node, ending: Ending) -> tuple[Node, Node, str] | None:
     """Return the first step that none can follow, the step behind it, and why."""
-    if isinstance(node.options, InTurnOptions) and node.options.order == RANDOM:
-        return None
     steps = [program.nodes[child] for child in node.children]
-    for step, following in pairwise(steps):
-        if node.kind == "sequence" and not ending.of(step.number).counting_as(SUCCEEDS):
+    for step, following in pairwise(steps) if node.step.goes_on_after else ():
+        if ending.of(step.number).counting_as(node.step.goes_on_after):
+            continue
+        if node.step.goes_on_after == SUCCEEDS:
             return step, following, "never ends in success"
-        if node.kind == "fallback" and not ending.of(step.number).counting_as(FAILS) and never_skipped(program, step):
+        if never_skipped(program, step):
             return step, following, "never fails"
     return None

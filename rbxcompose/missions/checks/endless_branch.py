@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from rbxcompose.expressions.tree import Expression, Number
 from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.missions.branches import ALL, Branches
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.kinds.parallel import ALL, ParallelOptions
 from rbxcompose.missions.outcomes import SUCCEEDS
 from rbxcompose.missions.program import Node
 
@@ -50,12 +50,12 @@ def endless_branch(mission: Examined) -> Iterator[Finding]:
     """
     program, ending = mission.program, mission.ending
     for node in program.nodes:
-        options = node.options
-        if not isinstance(options, ParallelOptions) or options.ends_with:
+        branches = node.step.branches
+        if branches is None or branches.ends_with:
             continue
         endless = [child for child in node.children if not ending.of(child).counting_as(SUCCEEDS)]
         others = [child for child in node.children if child not in endless]
-        if endless and others and _most_wanted(node, options) > len(others):
+        if endless and others and _most_wanted(node, branches) > len(others):
             yield endless_branch.at(
                 program.nodes[endless[0]].span,
                 "this branch never succeeds, and the parallel waits for it",
@@ -64,9 +64,9 @@ def endless_branch(mission: Examined) -> Iterator[Finding]:
             )
 
 
-def _most_wanted(node: Node, options: ParallelOptions) -> float:
+def _most_wanted(node: Node, branches: Branches) -> float:
     """Return how many branches must succeed, as far as that is written down; else none."""
-    if options.succeed_when == ALL:
+    if branches.succeed_when == ALL:
         return len(node.children)
-    tree = options.succeed_when.tree if isinstance(options.succeed_when, Expression) else None
+    tree = branches.succeed_when.tree if isinstance(branches.succeed_when, Expression) else None
     return tree.value if isinstance(tree, Number) else 0

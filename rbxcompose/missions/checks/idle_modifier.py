@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Finding, Severity
+from rbxcompose.missions.answers import Serves
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
 from rbxcompose.missions.facts import place_in_text
-from rbxcompose.missions.in_turn import InTurnOptions
-from rbxcompose.missions.modifiers.limits import Tries
 from rbxcompose.missions.outcomes import FAILS
 from rbxcompose.missions.program import CONTINUE, Node, Program
-
-AGAIN = ("for", "repeat", "machine")  # kinds that do what is in them more than once
 
 
 @mission_check("RBX4127", Severity.WARNING)
@@ -39,27 +36,19 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
     ```
     """
     for node in mission.program.nodes:
-        for key in ("optional", "attempts"):
-            value = node.modifiers.get(key)
-            has_timeout = isinstance(value, Tries) and value.timeout is not None
-            if value and not has_timeout and not mission.ending.inside_of(node, key).counting_as(FAILS):
-                most = value.most if isinstance(value, Tries) else None
+        for key, modifier in node.modifiers.items():
+            if modifier.serves is Serves.FAILING and not mission.ending.inside_of(node, key).counting_as(FAILS):
                 yield idle_modifier.at(
-                    place_in_text(node, most),
-                    f"'{key}' changes nothing here: {_what(node)} cannot fail",
+                    place_in_text(node, modifier.value),
+                    f"'{key}' changes nothing here: '{node.step.word}' cannot fail",
                     help="it belongs to the step that can fail",
                 )
-        for key in ("once", "cooldown"):
-            if node.modifiers.get(key) and not _comes_again(mission.program, node):
+            if modifier.serves is Serves.REPEATED and not _comes_again(mission.program, node):
                 yield idle_modifier.at(
                     node.span,
                     f"'{key}' changes nothing here: this step is done only once anyway",
                     help="it belongs to a step inside a loop or a machine",
                 )
-
-
-def _what(node: Node) -> str:
-    return f"'{node.kind or node.skill}'"
 
 
 def _comes_again(program: Program, node: Node) -> bool:
@@ -70,6 +59,5 @@ def _comes_again(program: Program, node: Node) -> bool:
     if parent is None:
         return node.number != program.main  # a reaction comes as often as its interrupt
     above = program.nodes[parent]
-    is_reactive = isinstance(above.options, InTurnOptions) and above.options.reactive
-    is_anew = "attempts" in above.modifiers or is_reactive
-    return above.kind in AGAIN or is_anew or _comes_again(program, above)
+    is_repeated = above.step.comes_again or any(one.repeats for one in above.modifiers.values())
+    return is_repeated or _comes_again(program, above)

@@ -8,7 +8,6 @@ from rbxcompose.expressions.tree import Comparison, Node, Variable, Word, walk
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.kinds.parallel import ParallelOptions
 from rbxcompose.missions.outcomes import FAILS, SUCCEEDS, Outcomes
 from rbxcompose.missions.spans import inner_span
 
@@ -62,9 +61,8 @@ def impossible_result(mission: Examined) -> Iterator[Finding]:
     ```
     """
     for node in mission.program.nodes:
-        options = node.options
         ends = mission.ending.of_branches(node)
-        for outcome in options.outcomes if isinstance(options, ParallelOptions) else ():
+        for outcome in node.step.branches.outcomes if node.step.branches else ():
             for tree, _ in walk(outcome.condition.tree) if outcome.condition else ():
                 compared = _compared(tree)
                 if outcome.asked and compared and _is_impossible(ends.get(compared[0]), compared[1]):

@@ -7,10 +7,8 @@ from collections.abc import Iterator
 from rbxcompose.findings import Finding, Related
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.codes import NAME_CLASH
-from rbxcompose.missions.deeds import saved_name
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.kinds.parallel import ParallelOptions
-from rbxcompose.missions.machines import STATE
+from rbxcompose.missions.look import Form
 from rbxcompose.missions.program import Node, Program, RobotNames
 from rbxcompose.missions.registry import kinds
 from rbxcompose.missions.views import View
@@ -40,16 +38,15 @@ def _declared(program: Program, robot: RobotNames) -> Iterator[Finding]:
 
 
 def _of_node(node: Node, program: Program, robot: RobotNames) -> Iterator[Finding]:
-    if node.name in robot.skills and node.kind != STATE:
+    if node.name in robot.skills and node.step.look.form is not Form.STATE:
         yield NAME_CLASH.at(node.span, f"a node cannot be named like the skill '{node.name}'")
-    saved = saved_name(node)
+    saved = node.saved
     if saved and (saved.text in robot.values or saved.text in program.inputs):
         yield NAME_CLASH.at(saved.span, f"'{saved.text}' is taken: choose another name for what is kept")
 
 
 def _branches(node: Node, program: Program, robot: RobotNames) -> Iterator[Finding]:
-    options = node.options
-    names = options.branches if isinstance(options, ParallelOptions) else ()
+    names = node.step.branches.names if node.step.branches else ()
     for branch, child in zip(names, node.children, strict=False):
         if branch in kinds() or branch in robot.skills:
             message = f"the branch '{branch}' is named like a kind or a skill"

@@ -6,9 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.findings import Finding
 from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.deeds import saved_name
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.modifiers.saving import SAVED
 
 
 @mission_check("RBX4136")
@@ -31,7 +29,6 @@ def nothing_to_keep(mission: Examined) -> Iterator[Finding]:
     ```
     """
     for node in mission.program.nodes:
-        name = saved_name(node)
-        if name and node.kind and node.kind not in SAVED:
-            message = f"'{node.kind}' has no result to keep"
-            yield nothing_to_keep.at(name.span, message, help="skills, 'call', 'use' and 'for' have one")
+        if node.saved and not node.step.has_result:
+            message = f"'{node.step.word}' has no result to keep"
+            yield nothing_to_keep.at(node.saved.span, message, help="skills, 'call', 'use' and 'for' have one")

@@ -6,9 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.findings import Finding
 from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.deeds import shortened
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.kinds.for_ import ForOptions
 
 
 @mission_check("RBX4137")
@@ -40,7 +38,7 @@ def nothing_to_shorten(mission: Examined) -> Iterator[Finding]:
     ```
     """
     for node in mission.program.nodes:
-        removes = isinstance(node.options, ForOptions) and node.options.removes_done
-        if removes and not shortened(node) & mission.program.data.keys():
+        shortened = node.step.effects.shortened
+        if shortened is not None and shortened not in mission.program.data:
             help_text = "write the list under 'data', and its name after 'in'"
             yield nothing_to_shorten.at(node.span, "'remove_done' needs an 'in' that names data", help=help_text)

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from rbxcompose.findings import Finding
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.machines import Next, StateOptions
+from rbxcompose.missions.look import Form
+from rbxcompose.missions.machines import Next
 from rbxcompose.missions.outcomes import FAILS, Outcomes
 from rbxcompose.missions.program import Node
 
@@ -49,8 +50,8 @@ def open_outcome(mission: Examined) -> Iterator[Finding]:
     ```
     """
     for node in mission.program.nodes:
-        if isinstance(node.options, StateOptions):
-            yield from _open(node, node.options.next, mission.ending.of(node.number))
+        if node.step.look.form is Form.STATE:
+            yield from _open(node, node.step.leads_to, mission.ending.of(node.number))
 
 
 def _open(state: Node, leads_to: Next | None, ends: Outcomes) -> Iterator[Finding]:

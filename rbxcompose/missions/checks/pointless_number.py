@@ -9,9 +9,6 @@ from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
 from rbxcompose.missions.facts import place_in_text
-from rbxcompose.missions.kinds.repeat import RepeatOptions
-from rbxcompose.missions.modifiers.limits import Tries
-from rbxcompose.missions.program import Node
 
 
 @mission_check("RBX4128", Severity.WARNING)
@@ -34,31 +31,15 @@ def pointless_number(mission: Examined) -> Iterator[Finding]:
     ```
     """
     for node in mission.program.nodes:
-        for what, expression, least in _numbers(node):
+        modifiers = (one for modifier in node.modifiers.values() for one in modifier.numbers)
+        for what, expression, least in (*node.step.numbers, *modifiers):
             value = _written(expression)
-            if value is not None and (value < least or (least == 0 and value < 0)):
+            if value is not None and value < least:
                 yield pointless_number.at(
                     place_in_text(node, expression),
                     f"{what} must be above zero to have a meaning",
                     help="write a larger number, or leave it out",
                 )
-
-
-def _numbers(node: Node) -> Iterator[tuple[str, Expression | None, float]]:
-    """Yield what a node counts or waits for, its expression, and the least number that makes sense."""
-    options, tries, timeout = node.options, node.modifiers.get("attempts"), node.modifiers.get("timeout")
-    if isinstance(options, RepeatOptions):
-        yield "'repeat'", options.rounds, 1
-        yield "'every'", options.every, 0
-    if node.kind == "wait" and isinstance(options, Expression):
-        yield "a wait", options, 0
-    if isinstance(tries, Tries):
-        yield "'attempts'", tries.most, 1
-    if isinstance(timeout, Expression):
-        yield "a timeout", timeout, TINY
-
-
-TINY = 1e-6  # [s]
 
 
 def _written(expression: Expression | None) -> float | None:

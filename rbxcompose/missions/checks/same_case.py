@@ -8,10 +8,9 @@ from rbxcompose.expressions.check import check
 from rbxcompose.expressions.tree import Expression, Flag, Number, Text, Word
 from rbxcompose.expressions.types import Type, TypeKind
 from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.missions.asked import Asked
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.kinds.choose import ChooseOptions
-from rbxcompose.missions.program import Asked
 
 WORDS = (TypeKind.TEXT, TypeKind.CHOICE, TypeKind.PLACE)
 NUMBERS = (TypeKind.QUANTITY, TypeKind.COUNT)
@@ -53,12 +52,12 @@ def same_case(mission: Examined) -> Iterator[Finding]:
     ```
     """
     for view in mission.views:
-        options = view.node.options
-        if not isinstance(options, ChooseOptions):
+        choice = view.node.step.choice
+        if choice is None:
             continue
-        chosen, _ = check(options.asked, view.scope)
+        chosen, _ = check(choice.asked, view.scope)
         seen: dict[object, Asked] = {}
-        for asked in options.cases:
+        for asked in choice.cases:
             value, text = _constant(asked.expression), asked.scalar.text
             if value in seen:
                 related = [Related(seen[value].scalar.span, "the first one")]
@@ -67,7 +66,7 @@ def same_case(mission: Examined) -> Iterator[Finding]:
             elif value is not None:
                 seen[value] = asked
                 if not _can_be(asked.expression, chosen):
-                    message = f"the case '{text}' is never taken: '{options.asked.text}' is {chosen.detail}"
+                    message = f"the case '{text}' is never taken: '{choice.asked.text}' is {chosen.detail}"
                     yield same_case.at(asked.scalar.span, message)
 
 

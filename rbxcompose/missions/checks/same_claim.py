@@ -9,7 +9,6 @@ from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.claims import claims_below
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.kinds.parallel import ParallelOptions
 
 
 @mission_check("RBX4152", Severity.WARNING)
@@ -38,7 +37,7 @@ def same_claim(mission: Examined) -> Iterator[Finding]:
     """
     program, robot = mission.program, mission.robot
     for node in program.nodes:
-        if not isinstance(node.options, ParallelOptions):
+        if node.step.branches is None:
             continue
         claimed = [dict(claims_below(program.below(child), robot)) for child in node.children]
         for first, second in combinations(claimed, 2):

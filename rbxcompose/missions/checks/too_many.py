@@ -8,7 +8,6 @@ from rbxcompose.expressions.tree import Expression, Number
 from rbxcompose.findings import Finding
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.kinds.parallel import ParallelOptions
 
 
 @mission_check("RBX4153")
@@ -38,9 +37,10 @@ def too_many(mission: Examined) -> Iterator[Finding]:
     ```
     """
     for node in mission.program.nodes:
-        if not isinstance(node.options, ParallelOptions):
+        branches = node.step.branches
+        if branches is None:
             continue
-        for key, wanted in (("succeed_when", node.options.succeed_when), ("fail_when", node.options.fail_when)):
+        for key, wanted in (("succeed_when", branches.succeed_when), ("fail_when", branches.fail_when)):
             tree = wanted.tree if isinstance(wanted, Expression) else None
             if isinstance(tree, Number) and tree.value > len(node.children) > 0:
                 span = next(asked.scalar.span for asked in node.asked if asked.expression is wanted)

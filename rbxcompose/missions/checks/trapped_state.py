@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.machines import StateOptions
 from rbxcompose.missions.program import Node
 from rbxcompose.missions.transitions import reached, transitions
 
@@ -67,4 +66,4 @@ def trapped_state(mission: Examined) -> Iterator[Finding]:
 
 
 def _is_endless(state: Node) -> bool:
-    return isinstance(state.options, StateOptions) and state.options.next is None
+    return state.step.leads_to is None

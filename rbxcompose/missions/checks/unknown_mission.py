@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Finding
-from rbxcompose.missions.calling import UseOptions
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
 
@@ -32,7 +31,8 @@ def unknown_mission(mission: Examined) -> Iterator[Finding]:
     """
     missions = mission.robot.missions
     for node in mission.program.nodes:
-        name = node.options.mission if isinstance(node.options, UseOptions) else ""
-        if isinstance(node.options, UseOptions) and name and name not in missions and name not in mission.robot.unread:
+        used = node.step.uses
+        name = used.text if used else ""
+        if used and name and name not in missions and name not in mission.robot.unread:
             message = f"the robot has no mission '{name}'"
-            yield unknown_mission.misspelt(node.options.span, message, name, missions, "missions of this robot")
+            yield unknown_mission.misspelt(used.span, message, name, missions, "missions of this robot")

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from rbxcompose.findings import Finding
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.machines import StateOptions
 
 
 @mission_check("RBX4142", is_fixable=True)
@@ -42,7 +41,7 @@ def unknown_outcome(mission: Examined) -> Iterator[Finding]:
     ```
     """
     for node in mission.program.nodes:
-        leads_to = node.options.next if isinstance(node.options, StateOptions) else None
+        leads_to = node.step.leads_to
         if leads_to is None or "" in leads_to.to:
             continue
         words, handled = mission.ending.of(node.number).words, leads_to.to

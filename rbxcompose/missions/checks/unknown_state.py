@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.findings import Finding
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.machines import MachineOptions, StateOptions
+from rbxcompose.missions.machines import States
 from rbxcompose.missions.program import Node
 
 
@@ -46,21 +46,21 @@ def unknown_state(mission: Examined) -> Iterator[Finding]:
     ```
     """
     for node in mission.program.nodes:
-        if isinstance(node.options, MachineOptions):
-            yield from _start(node.options)
+        if node.step.states:
+            yield from _start(node.step.states)
             for child in node.children:
-                yield from _targets(mission.program.nodes[child], node.options)
+                yield from _targets(mission.program.nodes[child], node.step.states)
 
 
-def _start(machine: MachineOptions) -> Iterator[Finding]:
-    if machine.start_span and machine.states and machine.start not in machine.states:
+def _start(machine: States) -> Iterator[Finding]:
+    if machine.start_span and machine.names and machine.start not in machine.names:
         message, what = f"there is no state '{machine.start}'", "states of this machine"
-        yield unknown_state.misspelt(machine.start_span, message, machine.start, machine.states, what)
+        yield unknown_state.misspelt(machine.start_span, message, machine.start, machine.names, what)
 
 
-def _targets(state: Node, machine: MachineOptions) -> Iterator[Finding]:
-    leads_to = state.options.next if isinstance(state.options, StateOptions) else None
-    known = (*machine.states, *machine.ends)
+def _targets(state: Node, machine: States) -> Iterator[Finding]:
+    leads_to = state.step.leads_to
+    known = (*machine.names, *machine.ends)
     if leads_to is None:
         return
     for outcome, to in leads_to.to.items():

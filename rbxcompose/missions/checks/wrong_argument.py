@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.asked import Argument
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.program import Argument, Skill
+from rbxcompose.missions.program import Skill
 from rbxcompose.missions.typing import check_written
 from rbxcompose.missions.views import View
 
@@ -41,13 +42,13 @@ def wrong_argument(mission: Examined) -> Iterator[Finding]:
     for view in mission.views:
         skill = mission.robot.skills.get(view.node.skill)
         if skill:
-            for argument in view.node.arguments:
+            for argument in view.node.step.arguments:
                 yield from _argument(view, skill, argument)
             yield from _missing(view, skill)
 
 
 def _missing(view: View, skill: Skill) -> Iterator[Finding]:
-    given = {argument.name or skill.main for argument in view.node.arguments}
+    given = {argument.name or skill.main for argument in view.node.step.arguments}
     if given - skill.arguments.keys():
         return  # what seems to be missing may be what is misspelt
     for name in sorted(skill.required - given):
@@ -62,7 +63,7 @@ def _argument(view: View, skill: Skill, argument: Argument) -> Iterator[Finding]
         yield wrong_argument.at(argument.span, f"the skill '{skill.name}' takes no single value")
     elif name not in skill.arguments:
         message = f"the skill '{skill.name}' has no argument '{name}'"
-        taken = {one.name for one in view.node.arguments}
+        taken = {one.name for one in view.node.step.arguments}
         arguments = skill.arguments
         yield wrong_argument.misspelt(argument.span, message, name, arguments, "its arguments", taken=taken)
     elif isinstance(argument.value, Scalar):

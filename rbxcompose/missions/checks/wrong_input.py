@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions.calling import UseOptions
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.codes import WRONG_INPUT
 from rbxcompose.missions.examined import Examined
@@ -19,26 +18,26 @@ from rbxcompose.missions.views import View
 def wrong_input(mission: Examined) -> Iterator[Finding]:
     """Yield what `with` of a `use` gives wrongly, or does not give."""
     for view in mission.views:
-        options = view.node.options
-        program = mission.robot.missions.get(options.mission) if isinstance(options, UseOptions) else None
-        if isinstance(options, UseOptions) and program:
-            yield from _given(view, options, program)
-            yield from _missing(view, options, program)
+        used = view.node.step.uses
+        program = mission.robot.missions.get(used.text) if used else None
+        if used and program:
+            yield from _given(view, used.text, program)
+            yield from _missing(view, used.text, program)
 
 
-def _given(view: View, options: UseOptions, program: Program) -> Iterator[Finding]:
+def _given(view: View, name: str, program: Program) -> Iterator[Finding]:
     inputs = program.inputs
-    for argument in options.arguments:
+    for argument in view.node.step.arguments:
         if argument.name not in inputs:
-            message = f"the mission '{options.mission}' has no input '{argument.name}'"
+            message = f"the mission '{name}' has no input '{argument.name}'"
             yield WRONG_INPUT.misspelt(argument.span, message, argument.name, inputs, "its inputs")
         elif isinstance(argument.value, Scalar):
             yield from check_written(view, argument.value, inputs[argument.name].type, WRONG_INPUT)
 
 
-def _missing(view: View, options: UseOptions, program: Program) -> Iterator[Finding]:
-    given = {argument.name for argument in options.arguments}
+def _missing(view: View, mission: str, program: Program) -> Iterator[Finding]:
+    given = {argument.name for argument in view.node.step.arguments}
     for name, declared in program.inputs.items():
         if declared.default is None and name not in given:
-            message = f"the input '{name}' of the mission '{options.mission}' needs a value"
+            message = f"the input '{name}' of the mission '{mission}' needs a value"
             yield WRONG_INPUT.at(view.node.span, message, help=f"write it under 'with': '{name}: ...'")

@@ -9,16 +9,13 @@ from rbxcompose.expressions.check import check
 from rbxcompose.expressions.tree import Number
 from rbxcompose.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, TypeKind, choice_of, quantity_of
 from rbxcompose.findings import Finding
+from rbxcompose.missions.asked import Assignment
 from rbxcompose.missions.branches import RESULTS
 from rbxcompose.missions.checking import mission_check
 from rbxcompose.missions.codes import UNKNOWN_NAME, WRONG_TYPE
 from rbxcompose.missions.deeds import assignments
+from rbxcompose.missions.ending import Ending
 from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.kinds.choose import ChooseOptions
-from rbxcompose.missions.kinds.for_ import ForOptions
-from rbxcompose.missions.kinds.parallel import ParallelOptions
-from rbxcompose.missions.outcomes import Ending
-from rbxcompose.missions.program import Assignment
 from rbxcompose.missions.views import View, findings_of
 from rbxcompose.units import NUMBER
 
@@ -60,9 +57,9 @@ def _assigned(view: View, assignment: Assignment) -> Iterator[Finding]:
 
 def _not_listed(view: View) -> Iterator[Finding]:
     """Yield what a loop goes through, if that is no list and no map."""
-    options = view.node.options
-    if isinstance(options, ForOptions) and not isinstance(options.items, tuple) and view.node.asked:
-        found, _ = check(options.items, view.scope)
+    items = view.node.step.items
+    if items is not None and not isinstance(items, tuple) and view.node.asked:
+        found, _ = check(items, view.scope)
         if found.kind not in LISTED:
             message = f"'in' must be a list or a map; it is {found.phrase}"
             yield WRONG_TYPE.at(view.node.asked[0].scalar.span, message)
@@ -70,27 +67,27 @@ def _not_listed(view: View) -> Iterator[Finding]:
 
 def _other_cases(view: View) -> Iterator[Finding]:
     """Yield the cases that are a quantity of another dimension than what is chosen by."""
-    options = view.node.options
-    if not isinstance(options, ChooseOptions):
+    choice = view.node.step.choice
+    if choice is None:
         return
-    chosen, _ = check(options.asked, view.scope)
-    for case in options.cases if chosen.kind in NUMBERS else ():
+    chosen, _ = check(choice.asked, view.scope)
+    for case in choice.cases if chosen.kind in NUMBERS else ():
         tree = case.expression.tree
         if isinstance(tree, Number) and tree.dimension != chosen.measure:
-            message = f"the case is {tree.dimension.phrase}; '{options.asked.text}' is {chosen.phrase}"
+            message = f"the case is {tree.dimension.phrase}; '{choice.asked.text}' is {chosen.phrase}"
             yield WRONG_TYPE.at(case.scalar.span, message)
 
 
 def _outcomes(view: View, ending: Ending) -> Iterator[Finding]:
     """Yield what is wrong with the conditions over the branches of a parallel."""
-    options = view.node.options
-    if not isinstance(options, ParallelOptions) or not options.outcomes:
+    branches = view.node.step.branches
+    if branches is None or not branches.outcomes:
         return
     names = dict(view.scope.names)
     for branch, ends in ending.of_branches(view.node).items():
         names[branch] = choice_of(*RESULTS, *(word for word in ends.named if word not in RESULTS))
     scope = replace(view.scope, names=names)
-    for outcome in options.outcomes:
+    for outcome in branches.outcomes:
         if asked := outcome.asked:
             found = list(findings_of(asked.expression, asked.wanted, asked.scalar, scope, WRONG_TYPE))
             unknown = [one for one in found if one.code == UNKNOWN_NAME.code]

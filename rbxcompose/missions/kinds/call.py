@@ -2,46 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Self
 
+from rbxcompose.missions.families import LeafStep
 from rbxcompose.missions.leaf import Leaf
 from rbxcompose.missions.messages import Message
+from rbxcompose.missions.moments import Effects
+from rbxcompose.missions.outcomes import ANY, Outcomes
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
+from rbxcompose.missions.sending import fields_of
 from rbxcompose.missions.statuses import RUNNING
 from rbxcompose.missions.task import Site
 from rbxcompose.msgs import registry
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.program import Node
 
-
-@kind("call", {"request": "The fields of the request; a single value stands for the only field."})
-class Call(Leaf):
-    """Call a service of the robot; an answer that says `success: false` is a failure.
-
-    Example:
-        do:
-          call: set_battery_level
-          request: 100
-          timeout: 2 s
-    """
+class CallTask(Leaf):
+    """Asks the world, and returns its answer."""
 
     __slots__ = ("message",)
 
-    def __init__(self, site: Site, options: Message) -> None:
+    def __init__(self, site: Site, step: Call) -> None:
         super().__init__(site)
-        self.message = options
-
-    @staticmethod
-    def read(reader: NodeReader) -> Message:
-        """Read the service and `request`."""
-        return reader.message(reader.key, "request")
-
-    @staticmethod
-    def waits(node: Node) -> bool:
-        """It waits for the answer."""
-        return True
+        self.message = step.message
 
     def begin(self) -> int:
         """Ask."""
@@ -51,7 +36,7 @@ class Call(Leaf):
         """Send the request."""
         service = self.message.target.text
         request = registry.service(self.engine.robot.services[service]).Request
-        fields = self.message.fields(request, self)
+        fields = fields_of(self.message, request, self)
         self.status, self.is_asked = RUNNING, True
         try:
             self.engine.world.call(self.number, service, fields)
@@ -59,3 +44,41 @@ class Call(Leaf):
             self.is_asked = False
             raise
         return RUNNING
+
+
+@kind("call", CallTask, {"request": "The fields of the request; a single value stands for the only field."})
+@dataclass(frozen=True, slots=True)
+class Call(LeafStep):
+    """Call a service of the robot; an answer that says `success: false` is a failure.
+
+    Example:
+        do:
+          call: set_battery_level
+          request: 100
+          timeout: 2 s
+    """
+
+    message: Message
+
+    waits = True
+    has_result = True
+    lasts = None
+    only_asks = False
+
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
+        """Read the service and `request`."""
+        return cls(reader.message(reader.key, "request"))
+
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return that the service may refuse."""
+        return ANY
+
+    def text(self, node: Node) -> str:
+        """Return the service."""
+        return self.message.target.text
+
+    @property
+    def effects(self) -> Effects:
+        """Return the request."""
+        return Effects(called=self.message)

@@ -2,20 +2,38 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
+from rbxcompose.missions.families import LeafStep
+from rbxcompose.missions.moments import NO_EFFECTS
+from rbxcompose.missions.outcomes import ANY, Outcomes
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE, SUCCESS
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
+
+class CheckTask(Task):
+    """Asks once."""
+
+    __slots__ = ("condition",)
+
+    def __init__(self, site: Site, step: Check) -> None:
+        super().__init__(site)
+        self.condition = step.condition
+
+    def begin(self) -> int:
+        """Ask."""
+        return SUCCESS if holds(self.condition, self.scope) else FAILURE
 
 
-@kind("check")
-class Check(Task):
+@kind("check", CheckTask)
+@dataclass(frozen=True, slots=True)
+class Check(LeafStep):
     """Succeed if the condition holds, else fail.
 
     Example:
@@ -24,17 +42,19 @@ class Check(Task):
           - go_to: corner_1
     """
 
-    __slots__ = ("condition",)
+    condition: Expression
 
-    def __init__(self, site: Site, options: Expression) -> None:
-        super().__init__(site)
-        self.condition = options
+    waits = False
+    has_result = False
+    lasts = None
+    only_asks = True
+    effects = NO_EFFECTS
 
-    @staticmethod
-    def read(reader: NodeReader) -> Expression:
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
         """Read the condition."""
-        return reader.condition(reader.key)
+        return cls(reader.condition(reader.key))
 
-    def begin(self) -> int:
-        """Ask."""
-        return SUCCESS if holds(self.condition, self.scope) else FAILURE
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return that either may come out."""
+        return ANY

@@ -2,33 +2,56 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import Self
 
 from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.expressions.values import is_same
+from rbxcompose.missions.branches import Choice
+from rbxcompose.missions.families import Choosing
+from rbxcompose.missions.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import SKIPPED
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.program import Asked
+
+class ChooseTask(Task):
+    """Does what it has chosen."""
+
+    __slots__ = ("choice", "chosen", "index")
+    saved = ("index",)
+
+    def __init__(self, site: Site, step: Choose) -> None:
+        super().__init__(site)
+        self.choice = step.choice
+        self.chosen = site.children
+        self.index = -1  # of the child that was chosen
+
+    def begin(self) -> int:
+        """Choose, and start what was chosen."""
+        if not (self.engine.places.kept and self.engine.places.take_up(self)):
+            self.index = self._choose()
+        return SKIPPED if self.index < 0 else self.proceed()
+
+    def proceed(self) -> int:
+        """Go on with what was chosen."""
+        return self.advance(self.chosen[self.index])
+
+    def _choose(self) -> int:
+        cases = self.choice.cases
+        value = evaluate(self.choice.asked, self.scope)
+        for index, case in enumerate(cases):
+            if is_same(evaluate(case.expression, self.scope), value):
+                return index
+        return len(cases) if len(cases) < len(self.chosen) else -1
 
 
+@kind("choose", ChooseTask, {"cases": "What is done for which value.", "else": "What is done for all other values."})
 @dataclass(frozen=True, slots=True)
-class ChooseOptions:
-    """What is asked, and the value of each case, in the order of the children; `else` is the last child."""
-
-    asked: Expression
-    cases: tuple[Asked, ...] = ()
-    has_else: bool = False
-
-
-@kind("choose", {"cases": "What is done for which value.", "else": "What is done for all other values."})
-class Choose(Task):
+class Choose(Choosing):
     """Do the case of a value, which is asked once; without a match it is skipped.
 
     Example:
@@ -45,37 +68,23 @@ class Choose(Task):
             log: Nothing to do in $room
     """
 
-    __slots__ = ("chosen", "index", "options")
-    saved = ("index",)
+    choice: Choice = field()  # `else` is the child behind those of its cases
 
-    def __init__(self, site: Site, options: ChooseOptions) -> None:
-        super().__init__(site)
-        self.options = options
-        self.chosen = site.children
-        self.index = -1  # of the child that was chosen
-
-    @staticmethod
-    def read(reader: NodeReader) -> ChooseOptions:
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
         """Read the value, `cases` and `else`."""
         asked = reader.expression(reader.key, UNKNOWN, "a value, such as '$room'")
         cases = reader.cases("cases")
         if reader.has("else"):
             reader.child("else")
-        return ChooseOptions(asked, cases, reader.has("else"))
+        return cls(Choice(asked, cases))
 
-    def begin(self) -> int:
-        """Choose, and start what was chosen."""
-        if not (self.engine.places.kept and self.engine.places.take_up(self)):
-            self.index = self._choose()
-        return SKIPPED if self.index < 0 else self.proceed()
+    @property
+    def ways(self) -> tuple[str, ...]:
+        """Return the cases, and what is done for all other values."""
+        return (*(f"case {case.expression.text}" for case in self.choice.cases), "else")
 
-    def proceed(self) -> int:
-        """Go on with what was chosen."""
-        return self.advance(self.chosen[self.index])
-
-    def _choose(self) -> int:
-        value = evaluate(self.options.asked, self.scope)
-        for index, case in enumerate(self.options.cases):
-            if is_same(evaluate(case.expression, self.scope), value):
-                return index
-        return len(self.options.cases) if self.options.has_else else -1
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return what any case may do; a value that is not there is a failure."""
+        found = ALWAYS_SUCCEEDS.both(either(map(endings.of, node.children)))
+        return found.both(ALWAYS_FAILS) if node.asked else found

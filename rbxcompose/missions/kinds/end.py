@@ -3,27 +3,42 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Self
 
 from rbxcompose.expressions.text import Template
+from rbxcompose.missions.families import Deed
+from rbxcompose.missions.moments import NO_EFFECTS
+from rbxcompose.missions.outcomes import FAILS, NEVER, SUCCEEDS, Outcomes
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
-from rbxcompose.missions.statuses import FAILURE, NAMES, RUNNING, SUCCESS
+from rbxcompose.missions.statuses import FAILURE, RUNNING, SUCCESS
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
+
+class EndTask(Task):
+    """Ends the run that it belongs to."""
+
+    __slots__ = ("step",)
+
+    def __init__(self, site: Site, step: End) -> None:
+        super().__init__(site)
+        self.step = step
+
+    def begin(self) -> int:
+        """End it; the run of the mission sees to that as soon as this tick is done."""
+        message = self.run.filled(self.step.message, self.scope) if self.step.message else ""
+        status = SUCCESS if self.step.result == SUCCEEDS else FAILURE
+        if self.run.ending is None or (status, self.run.ending) == (FAILURE, SUCCESS):
+            self.run.ending, self.run.message = status, message
+            if status == FAILURE:
+                self.engine.reasons[self.number] = message or "the mission was to end in failure"
+        return RUNNING
 
 
+@kind("end", EndTask, {"message": "What is told about it."})
 @dataclass(frozen=True, slots=True)
-class EndOptions:
-    """How the mission ends, and what is told."""
-
-    result: str
-    message: Template | None
-
-
-@kind("end", {"message": "What is told about it."})
-class End(Task):
+class End(Deed):
     """End the mission in which this is written, in `success` or in `failure`; what runs is halted.
 
     Where two branches of a parallel end it at one tick, failure beats success.
@@ -38,24 +53,22 @@ class End(Task):
             go_to: corner_1
     """
 
-    __slots__ = ("options",)
+    result: str
+    message: Template | None
 
-    def __init__(self, site: Site, options: EndOptions) -> None:
-        super().__init__(site)
-        self.options = options
+    effects = NO_EFFECTS
 
-    @staticmethod
-    def read(reader: NodeReader) -> EndOptions:
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
         """Read the result and `message`."""
-        result = reader.choice(reader.key, (NAMES[SUCCESS], NAMES[FAILURE]))
-        return EndOptions(result, reader.template("message") if reader.has("message") else None)
+        result = reader.choice(reader.key, (SUCCEEDS, FAILS))
+        return cls(result, reader.template("message") if reader.has("message") else None)
 
-    def begin(self) -> int:
-        """End it; the run of the mission sees to that as soon as this tick is done."""
-        message = self.run.filled(self.options.message, self.scope) if self.options.message else ""
-        status = SUCCESS if self.options.result == NAMES[SUCCESS] else FAILURE
-        if self.run.ending is None or (status, self.run.ending) == (FAILURE, SUCCESS):
-            self.run.ending, self.run.message = status, message
-            if status == FAILURE:
-                self.engine.reasons[self.number] = message or "the mission was to end in failure"
-        return RUNNING
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return that it never ends: the mission does."""
+        return NEVER
+
+    @property
+    def ends_mission(self) -> str:
+        """Return how the mission ends."""
+        return self.result

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
-from rbxcompose.missions.in_turn import OPTIONS, InTurn
+from collections.abc import Iterator
+
+from rbxcompose.missions.answers import Flow
+from rbxcompose.missions.in_turn import OPTIONS, RANDOM, InTurn, InTurnTask
+from rbxcompose.missions.look import Look
+from rbxcompose.missions.outcomes import FAILS, SUCCEEDS
+from rbxcompose.missions.possible import Possibility, started
+from rbxcompose.missions.program import Node, RobotNames
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import SUCCESS
 
 
-@kind("fallback", OPTIONS)
+class FallbackTask(InTurnTask):
+    """A list that a success ends."""
+
+    __slots__ = ()
+    decides = SUCCESS
+
+
+@kind("fallback", FallbackTask, OPTIONS)
 class Fallback(InTurn):
     """Try the nodes of a list in order; the first success is the fallback's own, a skipped one is passed over.
 
@@ -19,4 +33,16 @@ class Fallback(InTurn):
     """
 
     __slots__ = ()
-    decides = SUCCESS
+    decides = SUCCEEDS
+    flow = Flow.ONE_OF
+    look = Look("?")
+
+    @property
+    def goes_on_after(self) -> str:
+        """Return failure."""
+        return "" if self.order == RANDOM else FAILS
+
+    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+        """Yield each node but the first, which is always tried."""
+        for index, child in enumerate(node.children[1:], 2):
+            yield Possibility(nodes[child].span, f"{node.path}: alternative {index}", started(child))

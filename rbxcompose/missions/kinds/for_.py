@@ -4,112 +4,54 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import Self
 
-from rbxcompose.expressions.check import check
+from rbxcompose.expressions.check import StaticScope, check
 from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.tree import Expression, Field, Index, Variable
 from rbxcompose.expressions.types import TEXT, UNKNOWN, Type, TypeKind
 from rbxcompose.expressions.values import NOT_ARRIVED, Located, NotArrivedError, Value
+from rbxcompose.missions.answers import Flow
 from rbxcompose.missions.editing import without
+from rbxcompose.missions.facts import constants_of
+from rbxcompose.missions.families import Loop
+from rbxcompose.missions.look import Look
+from rbxcompose.missions.moments import NO_EFFECTS, Effects
+from rbxcompose.missions.outcomes import ANY as ANYHOW
+from rbxcompose.missions.outcomes import Outcomes
+from rbxcompose.missions.program import NOTHING, Endings, Node, Program, Target
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
+from rbxcompose.missions.results import NodeFailed
+from rbxcompose.missions.scopes import ItemScope
 from rbxcompose.missions.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
-from rbxcompose.missions.task import NodeFailed, Site, Task
+from rbxcompose.missions.task import Site, Task
 from rbxcompose.missions.watching import POSE
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.program import Target
-    from rbxcompose.missions.scopes import ItemScope
-    from rbxcompose.missions.views import View
-
-LISTED = (TypeKind.LIST, TypeKind.MAP, TypeKind.UNKNOWN)
 WRITTEN, RANDOM, NEAREST = "written", "random", "nearest"
 STOP, NEXT = "stop", "next"
 ALL, ANY = "all", "any"
 
 
-@dataclass(frozen=True, slots=True)
-class ForOptions:
-    """What the loop goes through, in which order, and what results of its items mean."""
+class ForTask(Task):
+    """Does the body with one item after the other."""
 
-    items: Expression | tuple[Expression, ...]
-    goes_on: bool = False
-    order: str = WRITTEN
-    ends_at_success: bool = False
-    removes_done: bool = False
-
-    @property
-    def names(self) -> frozenset[str]:
-        """Return the names that it reads beside its expressions."""
-        return frozenset({POSE}) if self.order == NEAREST else frozenset()
-
-
-@kind(
-    "for",
-    {
-        "in": "What it goes through: a list, or a map, of which it takes the keys; it is read once, at the start.",
-        "do": "What is done for each item.",
-        "order": "In which order: as `written`, `random` (drawn anew at each start), or the `nearest` place first.",
-        "if_one_fails": "`stop` fails at once; `next` does the rest and fails at the end.",
-        "succeed_when": "`all` must succeed, or `any`: it goes on after a failure and ends at the first success.",
-        "remove_done": "Whether an item that has succeeded leaves the data that `in` names.",
-    },
-)
-class For(Task):
-    """Do the body for each item, which the body sees as `$item`.
-
-    Example:
-        do:
-          for: corner
-          in: [corner_1, corner_2]
-          if_one_fails: next
-          do:
-            go_to: $corner
-    """
-
-    __slots__ = ("body", "did", "done", "failed", "left", "options", "taken", "view")
+    __slots__ = ("body", "did", "done", "failed", "left", "step", "taken", "view")
     saved = ("did", "done", "failed", "left", "taken")
 
-    def __init__(self, site: Site, options: ForOptions) -> None:
+    def __init__(self, site: Site, step: For) -> None:
         super().__init__(site)
         if site.item is None:
             raise TypeError(f"the loop '{site.node.path}' has no item")
         self.body = site.children[0]
         self.view: ItemScope = site.item
-        self.options = options
+        self.step = step
         self.left: list[Value] = []  # items that have not been taken
         self.taken: Value = None  # the item that is being done
         self.done: list[Value] = []
         self.failed: list[Value] = []
         self.did = SKIPPED
-
-    @staticmethod
-    def read(reader: NodeReader) -> ForOptions:
-        """Read the item's name, `in`, `do` and what results mean."""
-        reader.item_name()
-        items = reader.items("in")
-        reader.child("do")
-        return ForOptions(
-            items,
-            reader.choice("if_one_fails", (STOP, NEXT)) == NEXT,
-            reader.choice("order", (WRITTEN, RANDOM, NEAREST)),
-            reader.choice("succeed_when", (ALL, ANY)) == ANY,
-            reader.flag("remove_done") if reader.has("remove_done") else False,
-        )
-
-    @staticmethod
-    def item_type(view: View) -> Type:
-        """Return the type that all items have."""
-        options = view.node.options
-        if not isinstance(options, ForOptions):
-            return UNKNOWN
-        if isinstance(options.items, tuple):
-            types = {check(item, view.scope)[0] for item in options.items}
-            return types.pop() if len(types) == 1 else UNKNOWN
-        found, _ = check(options.items, view.scope)
-        return TEXT if found.kind is TypeKind.MAP else found.entry
 
     def begin(self) -> int:
         """Read the list and begin with its first item, or with the one in which it was halted."""
@@ -120,7 +62,7 @@ class For(Task):
         self.did = SKIPPED
         if not self.left:
             return SKIPPED
-        if self.options.order == RANDOM:
+        if self.step.order == RANDOM:
             self.engine.chance().shuffle(self.left)
         self._take()
         return self.proceed()
@@ -161,18 +103,18 @@ class For(Task):
         if status == FAILURE:
             self.failed.append(self.taken)
             self.did = FAILURE
-            return not self.options.goes_on and not self.options.ends_at_success
+            return not self.step.goes_on and not self.step.ends_at_success
         if status == SUCCESS:
             self.done.append(self.taken)
             if self.did == SKIPPED:
                 self.did = SUCCESS
-            if self.options.removes_done and isinstance(self.options.items, Expression):
-                without(self.options.items.tree, self.taken, self.run.data, self.scope)
-            return self.options.ends_at_success
+            if self.step.removes_done and isinstance(self.step.items, Expression):
+                without(self.step.items.tree, self.taken, self.run.data, self.scope)
+            return self.step.ends_at_success
         return False
 
     def _take(self) -> None:
-        self.taken = self.left.pop(self._nearest() if self.options.order == NEAREST else 0)
+        self.taken = self.left.pop(self._nearest() if self.step.order == NEAREST else 0)
         self.view.item = self.taken
         self.engine.places.forget(self.number + 1, self.end)
         self.forget()
@@ -194,10 +136,106 @@ class For(Task):
         return found
 
     def _read_items(self) -> list[Value]:
-        items = self.options.items
+        items = self.step.items
         if isinstance(items, tuple):
             return [evaluate(item, self.scope) for item in items]
         value = evaluate(items, self.scope)
         if not isinstance(value, list | tuple | Mapping):
             raise NodeFailed(f"'in' must be a list or a map, not {self.run.show('', value)}")
         return list(value)
+
+
+@kind(
+    "for",
+    ForTask,
+    {
+        "in": "What it goes through: a list, or a map, of which it takes the keys; it is read once, at the start.",
+        "do": "What is done for each item.",
+        "order": "In which order: as `written`, `random` (drawn anew at each start), or the `nearest` place first.",
+        "if_one_fails": "`stop` fails at once; `next` does the rest and fails at the end.",
+        "succeed_when": "`all` must succeed, or `any`: it goes on after a failure and ends at the first success.",
+        "remove_done": "Whether an item that has succeeded leaves the data that `in` names.",
+    },
+)
+@dataclass(frozen=True, slots=True)
+class For(Loop):
+    """Do the body for each item, which the body sees as `$item`.
+
+    Example:
+        do:
+          for: corner
+          in: [corner_1, corner_2]
+          if_one_fails: next
+          do:
+            go_to: $corner
+    """
+
+    items: Expression | tuple[Expression, ...] = field()
+    goes_on: bool
+    order: str
+    ends_at_success: bool
+    removes_done: bool
+
+    has_result = True
+    flow = Flow.PER_ITEM
+    look = Look("↻")
+
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
+        """Read the item's name, `in`, `do` and what results mean."""
+        reader.item_name()
+        items = reader.items("in")
+        reader.child("do")
+        return cls(
+            items,
+            reader.choice("if_one_fails", (STOP, NEXT)) == NEXT,
+            reader.choice("order", (WRITTEN, RANDOM, NEAREST)),
+            reader.choice("succeed_when", (ALL, ANY)) == ANY,
+            reader.flag("remove_done") if reader.has("remove_done") else False,
+        )
+
+    def shows(self, node: Node, scope: StaticScope) -> Mapping[str, Type]:
+        """Return the item, with the type that all items have."""
+        if not node.item:
+            return {}
+        if isinstance(self.items, tuple):
+            types = {check(item, scope)[0] for item in self.items}
+            return {node.item: types.pop() if len(types) == 1 else UNKNOWN}
+        found, _ = check(self.items, scope)
+        return {node.item: TEXT if found.kind is TypeKind.MAP else found.entry}
+
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return that it fails with its body, and may fail to read its list."""
+        if self.order == NEAREST or self.removes_done or not node.children or not self._is_read(endings.program):
+            return ANYHOW
+        return Outcomes(fails=endings.of(node.children[0]).plain.fails)
+
+    def _is_read(self, program: Program) -> bool:
+        """Tell whether what it goes through is there whatever happens."""
+        if isinstance(self.items, tuple):
+            return not any(item.names for item in self.items)
+        written = self.items.tree.name if isinstance(self.items.tree, Variable) else ""
+        return isinstance(constants_of(program, {}).get(written), list | tuple | Mapping)
+
+    def endless(self, ends: Outcomes) -> None:
+        """Say nothing: every list has an end."""
+
+    def text(self, node: Node) -> str:
+        """Return the item and what it goes through."""
+        items = ", ".join(asked.scalar.text for asked in node.asked[: node.own])
+        return f"{node.item} in {items}" if items else node.item
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Return that the nearest item depends on where the robot is."""
+        return frozenset({POSE}) if self.order == NEAREST else NOTHING
+
+    @property
+    def effects(self) -> Effects:
+        """Return the data that it takes its items from, if it removes those that are done."""
+        if not self.removes_done:
+            return NO_EFFECTS
+        tree = None if isinstance(self.items, tuple) else self.items.tree
+        while isinstance(tree, Field | Index):
+            tree = tree.of
+        return Effects(shortened=tree.name if isinstance(tree, Variable) else "")

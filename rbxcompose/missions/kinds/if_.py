@@ -2,20 +2,47 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
+from rbxcompose.missions.facts import is_simple
+from rbxcompose.missions.families import Choosing
+from rbxcompose.missions.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import SKIPPED
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
+
+class IfTask(Task):
+    """Does what it has chosen."""
+
+    __slots__ = ("branches", "condition", "index")
+    saved = ("index",)
+
+    def __init__(self, site: Site, step: If) -> None:
+        super().__init__(site)
+        self.condition = step.condition
+        self.branches = site.children
+        self.index = 0  # of the one that was chosen
+
+    def begin(self) -> int:
+        """Choose, and start what was chosen."""
+        if not (self.engine.places.kept and self.engine.places.take_up(self)):
+            self.index = 0 if holds(self.condition, self.scope) else 1
+        return self.proceed() if self.index < len(self.branches) else SKIPPED
+
+    def proceed(self) -> int:
+        """Go on with what was chosen."""
+        return self.advance(self.branches[self.index])
 
 
-@kind("if", {"then": "What is done if the condition holds.", "else": "What is done if it does not."})
-class If(Task):
+@kind("if", IfTask, {"then": "What is done if the condition holds.", "else": "What is done if it does not."})
+@dataclass(frozen=True, slots=True)
+class If(Choosing):
     """Ask the condition once, then do `then` or `else`; without a match it is skipped.
 
     Example:
@@ -28,30 +55,20 @@ class If(Task):
             log: The battery has $battery
     """
 
-    __slots__ = ("branches", "condition", "index")
-    saved = ("index",)
+    condition: Expression
 
-    def __init__(self, site: Site, options: Expression) -> None:
-        super().__init__(site)
-        self.condition = options
-        self.branches = site.children
-        self.index = 0  # of the one that was chosen
+    ways = ("then", "else")
 
-    @staticmethod
-    def read(reader: NodeReader) -> Expression:
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
         """Read the condition, `then` and `else`."""
         condition = reader.condition(reader.key)
         reader.child("then")
         if reader.has("else"):
             reader.child("else")
-        return condition
+        return cls(condition)
 
-    def begin(self) -> int:
-        """Choose, and start what was chosen."""
-        if not (self.engine.places.kept and self.engine.places.take_up(self)):
-            self.index = 0 if holds(self.condition, self.scope) else 1
-        return self.proceed() if self.index < len(self.branches) else SKIPPED
-
-    def proceed(self) -> int:
-        """Go on with what was chosen."""
-        return self.advance(self.branches[self.index])
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return what either may do; a condition that cannot be asked is a failure."""
+        found = ALWAYS_SUCCEEDS.both(either(map(endings.of, node.children)))
+        return found if is_simple(node) else found.both(ALWAYS_FAILS)

@@ -3,29 +3,39 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Self
 
 from rbxcompose.expressions.text import Template
 from rbxcompose.missions.events import Logged
-from rbxcompose.missions.moments import LEVELS
+from rbxcompose.missions.facts import is_sure
+from rbxcompose.missions.families import Deed
+from rbxcompose.missions.moments import LEVELS, NO_EFFECTS
+from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import SUCCESS
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
+
+class LogTask(Task):
+    """Says one line."""
+
+    __slots__ = ("step",)
+
+    def __init__(self, site: Site, step: Log) -> None:
+        super().__init__(site)
+        self.step = step
+
+    def begin(self) -> int:
+        """Say it."""
+        self.engine.say(Logged(self.step.level, self.run.filled(self.step.template, self.scope)))
+        return SUCCESS
 
 
+@kind("log", LogTask, {"level": "How bad it is."})
 @dataclass(frozen=True, slots=True)
-class LogOptions:
-    """What is said, and how bad it is."""
-
-    text: Template
-    level: str
-
-
-@kind("log", {"level": "How bad it is."})
-class Log(Task):
+class Log(Deed):
     """Write one line; `$name` in it is filled in.
 
     Example:
@@ -34,18 +44,16 @@ class Log(Task):
           level: warn
     """
 
-    __slots__ = ("options",)
+    template: Template
+    level: str
 
-    def __init__(self, site: Site, options: LogOptions) -> None:
-        super().__init__(site)
-        self.options = options
+    effects = NO_EFFECTS
 
-    @staticmethod
-    def read(reader: NodeReader) -> LogOptions:
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
         """Read the text and `level`."""
-        return LogOptions(reader.template(reader.key), reader.choice("level", LEVELS))
+        return cls(reader.template(reader.key), reader.choice("level", LEVELS))
 
-    def begin(self) -> int:
-        """Say it."""
-        self.engine.say(Logged(self.options.level, self.run.filled(self.options.text, self.scope)))
-        return SUCCESS
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return that only what it reads can fail."""
+        return ALWAYS_SUCCEEDS if is_sure(node, endings.program) else ANY

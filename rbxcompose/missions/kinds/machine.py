@@ -2,22 +2,90 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Self
 
+from rbxcompose.expressions.values import Value
+from rbxcompose.missions.answers import Advice, Flow, Skipped
 from rbxcompose.missions.events import Transition
+from rbxcompose.missions.families import Loop, Straight
 from rbxcompose.missions.history import WithHistory
-from rbxcompose.missions.machines import ENDS, STATE, MachineOptions, StateOptions
+from rbxcompose.missions.look import Form, Look
+from rbxcompose.missions.machines import ENDS, FAILED, FINISHED, STATE, Next, States
+from rbxcompose.missions.outcomes import ANY, Outcomes
+from rbxcompose.missions.possible import Possibility, led
+from rbxcompose.missions.program import Endings, Node, RobotNames
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
+from rbxcompose.missions.results import NodeFailed
 from rbxcompose.missions.state_reading import read_machine, read_state
 from rbxcompose.missions.statuses import FAILURE, NAMES, RUNNING, SKIPPED, SUCCESS
-from rbxcompose.missions.task import NodeFailed, Site, Task
-
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
+from rbxcompose.missions.task import Site, Task
 
 
-@kind("machine")
-class Machine(WithHistory):
+class MachineTask(WithHistory):
+    """Is in one of its states."""
+
+    __slots__ = ("index", "is_first", "leads", "machine", "states")
+    saved = ("index", "is_first")
+
+    def __init__(self, site: Site, step: Machine) -> None:
+        super().__init__(site)
+        self.machine = step.states
+        self.history = step.history
+        self.states = site.children
+        self.leads = [site.engine.program.nodes[child].step.leads_to for child in site.node.children]
+        self.index = 0
+        self.is_first = True  # it has not begun yet: it may be told in which state to do so
+
+    def begin(self) -> int:
+        """Enter the first state, or the one in which it was halted."""
+        if not (self.engine.places.kept and self.engine.places.take_up(self)):
+            start = self.machine.start
+            if self.is_first:
+                start = self.engine.settings.start_at.get(self.number, start)
+            self.index = self.machine.names.index(start)
+        self.is_first = False
+        self.forget()
+        return self.proceed()
+
+    def proceed(self) -> int:
+        """Go on with the state; the next one is for another tick."""
+        self.engine.outcome = ""
+        status = self.advance(self.states[self.index])
+        if status == RUNNING:
+            return RUNNING
+        return self._go_on(SUCCESS if status == SKIPPED else status)
+
+    def _go_on(self, status: int) -> int:
+        name, counts_as = self.machine.names[self.index], NAMES[status]
+        outcome = self.engine.outcome or counts_as
+        to = self._next(name, outcome, counts_as)
+        self.engine.outcome = ""
+        self.engine.say(Transition(self.number, name, outcome, to))
+        if to in self.machine.names:
+            self.index = self.machine.names.index(to)
+            self.forget()
+            self.engine.again(self)
+            return RUNNING
+        self.forget_places()
+        ends = self.machine.ends
+        self.engine.outcome = to if to not in ENDS else ""
+        return SUCCESS if ends[to] == NAMES[SUCCESS] else FAILURE
+
+    def _next(self, state: str, outcome: str, counts_as: str) -> str:
+        """Return where an outcome leads to: its own transition, else that of what it counts as."""
+        leads = self.leads[self.index]
+        for key in (outcome, counts_as, "") if leads else ():
+            if leads and key in leads.to:
+                return leads.to[key]
+        raise NodeFailed(f"state '{state}' ended with '{outcome}', which leads nowhere")
+
+
+@kind("machine", MachineTask)
+@dataclass(frozen=True, slots=True)
+class Machine(Loop):
     """Be in one state after the other; how a state's body ends decides which is next.
 
     Below it stand `start`, `states`, and perhaps `ends` and `history`. A state has `do` or `machine`, modifiers,
@@ -41,81 +109,47 @@ class Machine(WithHistory):
                 failure: failed
     """
 
-    __slots__ = ("index", "is_first", "options", "states")
-    saved = ("index", "is_first")
+    states: States = field()
+    history: str = field()
 
-    def __init__(self, site: Site, options: MachineOptions) -> None:
-        super().__init__(site)
-        self.options = options
-        self.history = options.history
-        self.states = site.children
-        self.index = 0
-        self.is_first = True  # it has not begun yet: it may be told in which state to do so
+    flow = Flow.OPEN
+    look = Look("◉", Form.MACHINE)
 
-    @staticmethod
-    def read(reader: NodeReader) -> MachineOptions:
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
         """Read the states and what stands beside them."""
-        return read_machine(reader)
+        return cls(*read_machine(reader))
 
-    def begin(self) -> int:
-        """Enter the first state, or the one in which it was halted."""
-        if not (self.engine.places.kept and self.engine.places.take_up(self)):
-            start = self.options.start
-            if self.is_first:
-                start = self.engine.settings.start_at.get(self.number, start)
-            self.index = self.options.states.index(start)
-        self.is_first = False
-        self.forget()
-        return self.proceed()
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return the ends that its states lead to."""
+        leads = (endings.program.nodes[child].step.leads_to for child in node.children)
+        reached = {to for one in leads if one for to in one.to.values()}
+        named = {end: counts for end, counts in self.states.ends.items() if end in reached and end not in ENDS}
+        return Outcomes(FINISHED in reached, FAILED in reached, named)
 
-    def proceed(self) -> int:
-        """Go on with the state; the next one is for another tick."""
-        self.engine.outcome = ""
-        status = self.advance(self.states[self.index])
-        if status == RUNNING:
-            return RUNNING
-        return self._go_on(SUCCESS if status == SKIPPED else status)
+    def endless(self, ends: Outcomes) -> Advice | None:
+        """Say what a machine without an end needs."""
+        advice = Advice("this machine never ends and never waits", "put a 'wait' into a state, or lead to an end")
+        return None if ends.words else advice
 
-    def _go_on(self, status: int) -> int:
-        name, counts_as = self.options.states[self.index], NAMES[status]
-        outcome = self.engine.outcome or counts_as
-        to = self._next(name, outcome, counts_as)
-        self.engine.outcome = ""
-        self.engine.say(Transition(self.number, name, outcome, to))
-        if to in self.options.states:
-            self.index = self.options.states.index(to)
-            self.forget()
-            self.engine.again(self)
-            return RUNNING
-        self.forget_places()
-        ends = self.options.ends
-        self.engine.outcome = to if to not in ENDS else ""
-        return SUCCESS if ends[to] == NAMES[SUCCESS] else FAILURE
-
-    def _next(self, state: str, outcome: str, counts_as: str) -> str:
-        """Return where an outcome leads to: its own transition, else that of what it counts as."""
-        options = self.engine.program.nodes[self.states[self.index].number].options
-        leads = options.next.to if isinstance(options, StateOptions) and options.next else {}
-        for key in (outcome, counts_as, ""):
-            if key in leads:
-                return leads[key]
-        raise NodeFailed(f"state '{state}' ended with '{outcome}', which leads nowhere")
+    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+        """Yield the transitions."""
+        for state in (nodes[child] for child in node.children):
+            following = state.step.leads_to or Next()
+            for outcome, to in following.to.items():
+                words = f"{outcome}, on to {to}" if outcome else f"on to {to}"
+                span = following.keys.get(outcome, state.span)
+                yield Possibility(span, f"{state.path}: {words}", led(node.number, state.name, to, outcome))
 
 
-@kind(STATE, is_inner=True)
-class State(Task):
+class StateTask(Task):
     """The body of a state; its modifiers and hooks stand around it."""
 
     __slots__ = ("body",)
 
-    def __init__(self, site: Site, options: StateOptions) -> None:
+    def __init__(self, site: Site, step: State) -> None:
         super().__init__(site)
         self.body = site.children[0]
-
-    @staticmethod
-    def read(reader: NodeReader) -> StateOptions:
-        """Read the body and where it leads to."""
-        return read_state(reader)
 
     def begin(self) -> int:
         """Start the body."""
@@ -125,6 +159,27 @@ class State(Task):
         """Go on with the body."""
         return self.advance(self.body)
 
-    def result(self) -> object:
+    def result(self) -> Value:
         """Return what `save` keeps of the body."""
         return self.body.result()
+
+
+@kind(STATE, StateTask, is_inner=True)
+@dataclass(frozen=True, slots=True)
+class State(Straight):
+    """A state of a machine: its body, and where it leads to (None: its body never ends)."""
+
+    leads_to: Next | None = field()
+
+    skipped = Skipped.WITH_ALL_INSIDE
+    flow = Flow.IN_TURN
+    look = Look(form=Form.STATE)
+
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
+        """Read the body and where it leads to."""
+        return cls(read_state(reader))
+
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return how the body may end."""
+        return endings.of(node.children[0]) if node.children else ANY

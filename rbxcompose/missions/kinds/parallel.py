@@ -2,88 +2,41 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.missions.branches import BranchScope, Ended, Outcome, read_outcomes
+from rbxcompose.missions.answers import Flow, Skipped
+from rbxcompose.missions.branches import ALL, ANY, Branches, BranchScope, Ended, read_outcomes
+from rbxcompose.missions.families import Straight
+from rbxcompose.missions.look import Form, Look
+from rbxcompose.missions.outcomes import FAILS, SUCCEEDS, Outcomes, either
+from rbxcompose.missions.program import Endings, Node, Target
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
+from rbxcompose.missions.results import NodeFailed
 from rbxcompose.missions.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
-from rbxcompose.missions.task import NodeFailed, Site, Task
+from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.program import Target
-
-ALL, ANY = "all", "any"
+PLAIN = {SUCCEEDS: SUCCEEDS, FAILS: FAILS}
 
 
-@dataclass(frozen=True, slots=True)
-class ParallelOptions:
-    """When it has succeeded or failed (`all`, `any`, or a number of branches), and what its outcome is then."""
+class ParallelTask(Task):
+    """Ticks all branches that have not ended, then judges."""
 
-    branches: tuple[str, ...] = ()  # names, if they have any
-    succeed_when: Expression | str = ALL
-    fail_when: Expression | str = ANY
-    ends_with: str = ""
-    wait_for_all: bool = False
-    outcomes: tuple[Outcome, ...] = ()
-
-    @property
-    def names(self) -> frozenset[str]:
-        """Return all `$names` that its outcomes read beside its branches."""
-        conditions = (one.condition for one in self.outcomes if one.condition)
-        return frozenset(name.name for one in conditions for name in one.names).difference(self.branches)
-
-
-@kind(
-    "parallel",
-    {
-        "succeed_when": "How many branches must succeed: `all`, `any` or a number.",
-        "fail_when": "How many branches must fail for the whole to fail: `any`, `all` or a number.",
-        "ends_with": "The branch whose result is the result; failures of others do not count.",
-        "wait_for_all": "Whether it goes on until all branches have ended, also when it is decided.",
-        "outcomes": "Of a state's body: outcome by condition over the results of the branches; the first one wins.",
-    },
-)
-class Parallel(Task):
-    """Do several nodes at the same time; at each tick all that have not ended are ticked, then it is judged.
-
-    Example:
-        do:
-          parallel:
-            drive:
-              go_to: corner_1
-            talk:
-              log: On my way
-    """
-
-    __slots__ = ("children", "names", "options", "results", "runs", "wanted")
+    __slots__ = ("branches", "children", "names", "results", "runs", "waits_for_all", "wanted")
     saved = ("names", "results", "runs", "wanted")
 
-    def __init__(self, site: Site, options: ParallelOptions) -> None:
+    def __init__(self, site: Site, step: Parallel) -> None:
         super().__init__(site)
         self.children = site.children
-        self.options = options
+        self.branches = step.branches
+        self.waits_for_all = step.waits_for_all
         self.results = [IDLE] * len(self.children)
         self.names = [""] * len(self.children)  # outcomes of their own
         self.runs = [False] * len(self.children)
         self.wanted = (0, 0)  # how many must succeed, how many must fail; 0 for all
-
-    @staticmethod
-    def read(reader: NodeReader) -> ParallelOptions:
-        """Read the branches, and what decides."""
-        branches = reader.branches()
-        ends_with = reader.branch("ends_with", branches) if reader.has("ends_with") else ""
-        return ParallelOptions(
-            branches,
-            reader.count_or("succeed_when", (ALL, ANY)) if reader.has("succeed_when") else ALL,
-            reader.count_or("fail_when", (ANY, ALL)) if reader.has("fail_when") else ANY,
-            ends_with,
-            reader.flag("wait_for_all") if reader.has("wait_for_all") else False,
-            read_outcomes(reader, branches),
-        )
 
     def begin(self) -> int:
         """Start all branches; after a deep history those that had not ended."""
@@ -91,8 +44,11 @@ class Parallel(Task):
             self.results = [IDLE] * len(self.children)
             self.names = [""] * len(self.children)
         self.runs = [False] * len(self.children)
-        options = self.options
-        self.wanted = (self._many(options.succeed_when, "'succeed_when'"), self._many(options.fail_when, "'fail_when'"))
+        branches = self.branches
+        self.wanted = (
+            self._many(branches.succeed_when, "'succeed_when'"),
+            self._many(branches.fail_when, "'fail_when'"),
+        )
         return self.proceed()
 
     def proceed(self) -> int:
@@ -145,10 +101,10 @@ class Parallel(Task):
     def _judge(self) -> int:
         results = self.results
         open_ones = results.count(RUNNING)
-        if open_ones and self.options.wait_for_all:
+        if open_ones and self.waits_for_all:
             return RUNNING
-        if self.options.ends_with:
-            return results[self.options.branches.index(self.options.ends_with)]
+        if self.branches.ends_with:
+            return results[self.branches.names.index(self.branches.ends_with)]
         failed, succeeded = results.count(FAILURE), results.count(SUCCESS)
         counted = failed + succeeded + open_ones
         if not counted:
@@ -160,13 +116,13 @@ class Parallel(Task):
 
     def _name_outcome(self) -> None:
         """Find the outcome by the conditions; without them it is that of the branch it ends with, or the plain one."""
-        options = self.options
-        self.engine.outcome = self.names[options.branches.index(options.ends_with)] if options.ends_with else ""
-        if not options.outcomes:
+        branches = self.branches
+        self.engine.outcome = self.names[branches.names.index(branches.ends_with)] if branches.ends_with else ""
+        if not branches.outcomes:
             return
-        ended = {name: Ended.of(self.results[i], self.names[i]) for i, name in enumerate(options.branches)}
+        ended = {name: Ended.of(self.results[i], self.names[i]) for i, name in enumerate(branches.names)}
         scope = BranchScope(self.scope, ended)
-        for outcome in options.outcomes:
+        for outcome in branches.outcomes:
             if outcome.condition is None or holds(outcome.condition, scope):
                 self.engine.outcome = outcome.name
                 return
@@ -180,3 +136,60 @@ class Parallel(Task):
         if number < 1:
             raise NodeFailed(f"{what} must be at least 1")
         return number
+
+
+@kind(
+    "parallel",
+    ParallelTask,
+    {
+        "succeed_when": "How many branches must succeed: `all`, `any` or a number.",
+        "fail_when": "How many branches must fail for the whole to fail: `any`, `all` or a number.",
+        "ends_with": "The branch whose result is the result; failures of others do not count.",
+        "wait_for_all": "Whether it goes on until all branches have ended, also when it is decided.",
+        "outcomes": "Of a state's body: outcome by condition over the results of the branches; the first one wins.",
+    },
+)
+@dataclass(frozen=True, slots=True)
+class Parallel(Straight):
+    """Do several nodes at the same time; at each tick all that have not ended are ticked, then it is judged.
+
+    Example:
+        do:
+          parallel:
+            drive:
+              go_to: corner_1
+            talk:
+              log: On my way
+    """
+
+    branches: Branches = field()
+    waits_for_all: bool
+
+    skipped = Skipped.WITH_ALL_INSIDE
+    flow = Flow.OPEN
+    look = Look("⇉", Form.BESIDE, has_roles=True)
+
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
+        """Read the branches, and what decides."""
+        names = reader.branches()
+        ends_with = reader.branch("ends_with", names) if reader.has("ends_with") else ""
+        succeed_when = reader.count_or("succeed_when", (ALL, ANY)) if reader.has("succeed_when") else ALL
+        fail_when = reader.count_or("fail_when", (ANY, ALL)) if reader.has("fail_when") else ANY
+        waits_for_all = reader.flag("wait_for_all") if reader.has("wait_for_all") else False
+        outcomes = read_outcomes(reader, names)
+        return cls(Branches(names, succeed_when, fail_when, ends_with, outcomes), waits_for_all)
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Return all `$names` that its outcomes read beside its branches."""
+        conditions = (one.condition for one in self.branches.outcomes if one.condition)
+        return frozenset(name.name for one in conditions for name in one.names).difference(self.branches.names)
+
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return the outcomes by conditions, else those of the branch it ends with, else the plain ones."""
+        branches = self.branches
+        if branches.outcomes:
+            return Outcomes(False, False, {one.name: PLAIN.get(one.name, "") for one in branches.outcomes})
+        deciding = either(map(endings.of, branches.deciding(node.children)))
+        return deciding if branches.ends_with in branches.names else deciding.plain

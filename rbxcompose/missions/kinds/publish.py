@@ -2,20 +2,39 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Self
 
+from rbxcompose.missions.families import Deed
 from rbxcompose.missions.messages import Message
-from rbxcompose.missions.moments import publish
+from rbxcompose.missions.moments import Effects
+from rbxcompose.missions.outcomes import ANY, Outcomes
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
+from rbxcompose.missions.sending import publish
 from rbxcompose.missions.statuses import SUCCESS
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
+
+class PublishTask(Task):
+    """Publishes once."""
+
+    __slots__ = ("message",)
+
+    def __init__(self, site: Site, step: Publish) -> None:
+        super().__init__(site)
+        self.message = step.message
+
+    def begin(self) -> int:
+        """Publish it."""
+        publish(self.message, self)
+        return SUCCESS
 
 
-@kind("publish", {"message": "The fields of the message; a single value stands for the only field."})
-class Publish(Task):
+@kind("publish", PublishTask, {"message": "The fields of the message; a single value stands for the only field."})
+@dataclass(frozen=True, slots=True)
+class Publish(Deed):
     """Publish a message on a topic of the robot; fields that are left out are zero or empty.
 
     Example:
@@ -26,18 +45,22 @@ class Publish(Task):
               x: 0.1
     """
 
-    __slots__ = ("message",)
+    message: Message
 
-    def __init__(self, site: Site, options: Message) -> None:
-        super().__init__(site)
-        self.message = options
-
-    @staticmethod
-    def read(reader: NodeReader) -> Message:
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
         """Read the topic and `message`."""
-        return reader.message(reader.key, "message")
+        return cls(reader.message(reader.key, "message"))
 
-    def begin(self) -> int:
-        """Publish it."""
-        publish(self.message, self)
-        return SUCCESS
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return that a value may be missing or may not fit."""
+        return ANY
+
+    def text(self, node: Node) -> str:
+        """Return the topic."""
+        return self.message.target.text
+
+    @property
+    def effects(self) -> Effects:
+        """Return the message."""
+        return Effects(published=self.message)

@@ -4,81 +4,46 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression, Number
+from rbxcompose.missions.answers import Advice, Counted, Flow
+from rbxcompose.missions.facts import is_simple, takes_time
+from rbxcompose.missions.families import Loop
+from rbxcompose.missions.look import Look
+from rbxcompose.missions.outcomes import ANY, Outcomes
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.program import Node
 
+class RepeatTask(Task):
+    """Does one round after the other."""
 
-@dataclass(frozen=True, slots=True)
-class RepeatOptions:
-    """How many rounds (None: for ever), the condition that ends them, the time from start to start."""
-
-    rounds: Expression | None
-    until: Expression | None
-    every: Expression | None
-
-
-@kind(
-    "repeat",
-    {
-        "do": "What is done in each round.",
-        "until": "A condition that ends the loop; it is asked after each round and never cuts one.",
-        "every": "Time from the start of one round to the start of the next.",
-    },
-)
-class Repeat(Task):
-    """Do the body again and again; a round that fails fails it, a number that is used up succeeds.
-
-    Example:
-        do:
-          repeat: 3
-          every: 1 min
-          until: $battery < 40 %
-          do:
-            go_to: corner_1
-    """
-
-    __slots__ = ("body", "did", "due", "is_between", "left", "options", "period")
+    __slots__ = ("body", "did", "due", "is_between", "left", "period", "step")
     saved = ("did", "due", "is_between", "left", "period")
+    times = ("due",)
+    fresh = ("due", "period")
 
-    def __init__(self, site: Site, options: RepeatOptions) -> None:
+    def __init__(self, site: Site, step: Repeat) -> None:
         super().__init__(site)
         self.body = site.children[0]
-        self.options = options
+        self.step = step
         self.left = math.inf
         self.period = 0.0
         self.due = 0.0  # when the next round may start [s]
         self.is_between = False  # one round has ended and the next one has not started
         self.did = SKIPPED
 
-    @staticmethod
-    def read(reader: NodeReader) -> RepeatOptions:
-        """Read the number of rounds, `do`, `until` and `every`."""
-        rounds = reader.count_or_forever(reader.key)
-        reader.child("do")
-        until = reader.condition("until") if reader.has("until") else None
-        return RepeatOptions(rounds, until, reader.duration("every") if reader.has("every") else None)
-
-    @staticmethod
-    def waits(node: Node) -> bool:
-        """It waits between its rounds if they have a period."""
-        every = node.options.every if isinstance(node.options, RepeatOptions) else None
-        return every is not None and not (isinstance(every.tree, Number) and every.tree.value == 0)
-
     def begin(self) -> int:
         """Start the first round, or the one in which it was halted."""
         if self.engine.places.kept and self.engine.places.take_up(self):
             self.due = self.engine.time if self.is_between else self.engine.time + self.period
             return self.proceed()
-        rounds, every = self.options.rounds, self.options.every
+        rounds, every = self.step.rounds, self.step.every
         self.left = math.inf if rounds is None else self.count_of(rounds, "'repeat'")
         self.period = 0.0 if every is None else self.number_of(every, "'every'")
         if self.left < 1:
@@ -105,10 +70,76 @@ class Repeat(Task):
         if status == SUCCESS:
             self.did = SUCCESS
         self.left -= 1
-        until = self.options.until
+        until = self.step.until
         if self.left < 1 or (until is not None and holds(until, self.scope)):
             return self.did
         self.is_between = True
         if self.engine.is_due(self.due):
             self.engine.again(self)
         return RUNNING
+
+
+@kind(
+    "repeat",
+    RepeatTask,
+    {
+        "do": "What is done in each round.",
+        "until": "A condition that ends the loop; it is asked after each round and never cuts one.",
+        "every": "Time from the start of one round to the start of the next.",
+    },
+)
+@dataclass(frozen=True, slots=True)
+class Repeat(Loop):
+    """Do the body again and again; a round that fails fails it, a number that is used up succeeds.
+
+    Example:
+        do:
+          repeat: 3
+          every: 1 min
+          until: $battery < 40 %
+          do:
+            go_to: corner_1
+    """
+
+    rounds: Expression | None  # None: for ever
+    until: Expression | None
+    every: Expression | None  # from start to start
+
+    flow = Flow.IN_TURN
+    look = Look("↻")
+
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
+        """Read the number of rounds, `do`, `until` and `every`."""
+        rounds = reader.count_or_forever(reader.key)
+        reader.child("do")
+        until = reader.condition("until") if reader.has("until") else None
+        return cls(rounds, until, reader.duration("every") if reader.has("every") else None)
+
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return that a loop for ever ends with a failure only."""
+        body = endings.of(node.children[0]).plain if node.children else ANY
+        if self.rounds is None and self.until is None:
+            return Outcomes(succeeds=False, fails=body.fails)
+        return Outcomes(fails=body.fails) if self._is_counted(node) else ANY
+
+    def _is_counted(self, node: Node) -> bool:
+        """Tell whether the number of rounds and the time of one are written out, and `until` can always be asked."""
+        if not any(asked.expression.names for asked in node.asked):
+            return True
+        return is_simple(node) and all(one is None or isinstance(one.tree, Number) for one in (self.rounds, self.every))
+
+    def endless(self, ends: Outcomes) -> Advice | None:
+        """Say what a loop for ever needs."""
+        advice = Advice("this loop never waits", "give it 'every: 1 s', or a 'wait' in its body")
+        return advice if self.rounds is None else None
+
+    @property
+    def waits(self) -> bool:
+        """Tell that it waits between its rounds if they have a period."""
+        return takes_time(self.every)
+
+    @property
+    def numbers(self) -> tuple[Counted, ...]:
+        """Return the number of rounds and the time of each."""
+        return Counted("'repeat'", self.rounds, 1), Counted("'every'", self.every, 0)

@@ -2,21 +2,55 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Self
 
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN
+from rbxcompose.missions.answers import Flow, Skipped
+from rbxcompose.missions.families import Straight
 from rbxcompose.missions.held import HeldNode
+from rbxcompose.missions.look import PLAIN
+from rbxcompose.missions.outcomes import ALWAYS_FAILS, ANY, Outcomes, either
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
-from rbxcompose.missions.task import NodeFailed, Site, Task
-
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
+from rbxcompose.missions.results import NodeFailed
+from rbxcompose.missions.task import Site, Task
 
 
-@kind("run")
-class Run(Task):
+class RunTask(Task):
+    """Does the node that its expression gives."""
+
+    __slots__ = ("children", "expression", "index", "keys")
+    saved = ("index",)
+
+    def __init__(self, site: Site, step: Run) -> None:
+        super().__init__(site)
+        self.expression = step.expression
+        self.children = site.children
+        nodes = site.engine.program.nodes
+        self.keys = {nodes[child].held: index for index, child in enumerate(site.node.children)}
+        self.index = 0  # of the child that is done
+
+    def begin(self) -> int:
+        """Look the node up, and start it."""
+        if not (self.engine.places.kept and self.engine.places.take_up(self)):
+            value = evaluate(self.expression, self.scope)
+            if not isinstance(value, HeldNode) or value.key not in self.keys:
+                raise NodeFailed(f"'run' needs a node from the data, not {self.run.show('', value)}")
+            self.index = self.keys[value.key]
+        return self.proceed()
+
+    def proceed(self) -> int:
+        """Go on with it."""
+        return self.advance(self.children[self.index])
+
+
+@kind("run", RunTask)
+@dataclass(frozen=True, slots=True)
+class Run(Straight):
     """Do a node that stands in the data: a chore of a list, a step that was chosen before.
 
     Example:
@@ -31,33 +65,19 @@ class Run(Task):
             run: $step
     """
 
-    __slots__ = ("children", "expression", "index", "keys")
-    saved = ("index",)
+    expression: Expression
 
-    def __init__(self, site: Site, options: Expression) -> None:
-        super().__init__(site)
-        self.expression = options
-        self.children = site.children
-        nodes = site.engine.program.nodes
-        self.keys = {nodes[child].held: index for index, child in enumerate(site.node.children)}
-        self.index = 0  # of the child that is done
+    skipped = Skipped.PERHAPS
+    flow = Flow.OPEN
+    look = PLAIN
 
-    @staticmethod
-    def read(reader: NodeReader) -> Expression:
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
         """Read the expression; the nodes that it may give are read from the data."""
         expression = reader.expression(reader.key, UNKNOWN, "data that hold a node, such as '$chore'")
         reader.held(expression)
-        return expression
+        return cls(expression)
 
-    def begin(self) -> int:
-        """Look the node up, and start it."""
-        if not (self.engine.places.kept and self.engine.places.take_up(self)):
-            value = evaluate(self.expression, self.scope)
-            if not isinstance(value, HeldNode) or value.key not in self.keys:
-                raise NodeFailed(f"'run' needs a node from the data, not {self.run.show('', value)}")
-            self.index = self.keys[value.key]
-        return self.proceed()
-
-    def proceed(self) -> int:
-        """Go on with it."""
-        return self.advance(self.children[self.index])
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return what any of the nodes in the data may do; it fails where there is none."""
+        return either([ALWAYS_FAILS, *map(endings.of, node.children)]) if node.children else ANY

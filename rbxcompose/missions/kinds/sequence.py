@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from rbxcompose.missions.in_turn import OPTIONS, InTurn
+from rbxcompose.missions.answers import Flow
+from rbxcompose.missions.in_turn import OPTIONS, RANDOM, InTurn, InTurnTask
+from rbxcompose.missions.look import Look
+from rbxcompose.missions.outcomes import FAILS, SUCCEEDS
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE
 
 
-@kind("sequence", OPTIONS)
+class SequenceTask(InTurnTask):
+    """A list that a failure ends."""
+
+    __slots__ = ()
+    decides = FAILURE
+    is_kept_after_failure = True
+
+
+@kind("sequence", SequenceTask, OPTIONS)
 class Sequence(InTurn):
     """Do the nodes of a list in order; the first failure is the sequence's own.
 
@@ -19,5 +30,11 @@ class Sequence(InTurn):
     """
 
     __slots__ = ()
-    decides = FAILURE
-    is_kept_after_failure = True
+    decides = FAILS
+    flow = Flow.IN_TURN
+    look = Look("→")
+
+    @property
+    def goes_on_after(self) -> str:
+        """Return success."""
+        return "" if self.order == RANDOM else SUCCEEDS

@@ -2,20 +2,40 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Self
 
-from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.missions.program import Assignment
+from rbxcompose.missions.asked import Assignment
+from rbxcompose.missions.facts import is_sure
+from rbxcompose.missions.families import Deed
+from rbxcompose.missions.moments import Effects
+from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
+from rbxcompose.missions.sending import assign
 from rbxcompose.missions.statuses import SUCCESS
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
+
+class SetTask(Task):
+    """Sets once."""
+
+    __slots__ = ("assignments",)
+
+    def __init__(self, site: Site, step: Set) -> None:
+        super().__init__(site)
+        self.assignments = step.assignments
+
+    def begin(self) -> int:
+        """Set."""
+        assign(self.assignments, self)
+        return SUCCESS
 
 
-@kind("set")
-class Set(Task):
+@kind("set", SetTask)
+@dataclass(frozen=True, slots=True)
+class Set(Deed):
     """Compute all right sides first, then set them.
 
     Example:
@@ -28,20 +48,22 @@ class Set(Task):
           - log: $visited visited
     """
 
-    __slots__ = ("assignments",)
+    assignments: tuple[Assignment, ...]
 
-    def __init__(self, site: Site, options: tuple[Assignment, ...]) -> None:
-        super().__init__(site)
-        self.assignments = options
-
-    @staticmethod
-    def read(reader: NodeReader) -> tuple[Assignment, ...]:
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
         """Read the map from names to expressions."""
-        return reader.assignments(reader.key)
+        return cls(reader.assignments(reader.key))
 
-    def begin(self) -> int:
-        """Set, and let everyone look once more at what may depend on it."""
-        computed = {one.name: evaluate(one.asked.expression, self.scope) for one in self.assignments}
-        self.run.data.update(computed)
-        self.engine.again(self)
-        return SUCCESS
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return that only what it reads can fail."""
+        return ALWAYS_SUCCEEDS if is_sure(node, endings.program) else ANY
+
+    def text(self, node: Node) -> str:
+        """Return what is set."""
+        return ", ".join(f"{one.name} = {one.asked.scalar.text}" for one in self.assignments)
+
+    @property
+    def effects(self) -> Effects:
+        """Return what is set."""
+        return Effects(assignments=self.assignments)

@@ -2,55 +2,42 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import Self
 
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.values import NotArrivedError, Value
-from rbxcompose.missions.calling import UseOptions, read_use
-from rbxcompose.missions.history import HISTORY, WithHistory
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.answers import Flow, Skipped
+from rbxcompose.missions.asked import Argument
+from rbxcompose.missions.families import Straight
+from rbxcompose.missions.history import HISTORY, WithHistory, read_history
+from rbxcompose.missions.look import Look
+from rbxcompose.missions.outcomes import Outcomes
 from rbxcompose.missions.places import LAST
+from rbxcompose.missions.program import Endings, Node, Target
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
-from rbxcompose.missions.skill import PLACED, getter, place
 from rbxcompose.missions.statuses import FAILURE, RUNNING
 from rbxcompose.missions.task import Site
-
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.program import Target
+from rbxcompose.missions.written import PLACED, getter, place
 
 
-@kind("use", {"with": "Values for the inputs of the mission.", "history": HISTORY})
-class Use(WithHistory):
-    """Run another mission of the robot; its outputs can be kept with `save`.
+class UseTask(WithHistory):
+    """Runs the mission."""
 
-    It sees the robot's values and places, and of this mission only what `with` gives it.
-
-    Example:
-        do:
-          - go_to: corner_1
-          - use: patrol
-            with:
-              rounds: 1
-    """
-
-    __slots__ = ("getters", "inner", "options", "outputs")
+    __slots__ = ("getters", "inner", "outputs")
     saved = ("outputs",)
 
-    def __init__(self, site: Site, options: UseOptions) -> None:
+    def __init__(self, site: Site, step: Use) -> None:
         super().__init__(site)
         if site.inner is None:
             raise TypeError(f"the mission of '{site.node.path}' is not linked")
         self.inner = site.inner
-        self.options = options
-        self.history = options.history
+        self.history = step.history
         self.outputs: dict[str, Value] = {}
         inputs = self.inner.program.inputs
-        self.getters = {one.name: getter(one.value, inputs[one.name].type) for one in options.arguments}
-
-    @staticmethod
-    def read(reader: NodeReader) -> UseOptions:
-        """Read the name, `with` and `history`."""
-        return read_use(reader)
+        self.getters = {one.name: getter(one.value, inputs[one.name].type) for one in step.arguments}
 
     def begin(self) -> int:
         """Start the mission; with a deep history, with its data and at its place."""
@@ -115,3 +102,45 @@ class Use(WithHistory):
             except NotArrivedError:
                 continue
         return found
+
+
+@kind("use", UseTask, {"with": "Values for the inputs of the mission.", "history": HISTORY})
+@dataclass(frozen=True, slots=True)
+class Use(Straight):
+    """Run another mission of the robot; its outputs can be kept with `save`.
+
+    It sees the robot's values and places, and of this mission only what `with` gives it.
+
+    Example:
+        do:
+          - go_to: corner_1
+          - use: patrol
+            with:
+              rounds: 1
+    """
+
+    uses: Scalar = field()
+    arguments: tuple[Argument, ...] = field()
+    history: str = field()
+
+    skipped = Skipped.PERHAPS
+    has_result = True
+    flow = Flow.OPEN
+    look = Look("↗")
+
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
+        """Read the name of the mission, `with` and `history`."""
+        name = reader.scalar(reader.key, "the name of a mission") or Scalar("", reader.span)
+        given = reader.map_of("with", "a map from inputs to values") if reader.has("with") else None
+        entries = given.entries.items() if given else ()
+        arguments = tuple(Argument(key, entry.value, entry.key.span) for key, entry in entries)
+        return cls(name, arguments, read_history(reader))
+
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return how the mission may end."""
+        return endings.of_mission(self.uses.text)
+
+    def text(self, node: Node) -> str:
+        """Return the mission."""
+        return self.uses.text

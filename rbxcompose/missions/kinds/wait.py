@@ -2,45 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import Self
 
-from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.tree import Expression, Number
+from rbxcompose.missions.answers import Counted
+from rbxcompose.missions.families import LeafStep
+from rbxcompose.missions.moments import NO_EFFECTS
+from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import RUNNING, SUCCESS
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.program import Node
 
-
-@kind("wait")
-class Wait(Task):
-    """Succeed after a time; it goes on with the rest when the mission was cut short meanwhile.
-
-    Example:
-        do:
-          - wait: 5 s
-          - go_to: corner_1
-    """
+class WaitTask(Task):
+    """Has a deadline."""
 
     __slots__ = ("deadline", "duration")
-    saved = ("deadline",)
+    saved = times = fresh = ("deadline",)
 
-    def __init__(self, site: Site, options: Expression) -> None:
+    def __init__(self, site: Site, step: Wait) -> None:
         super().__init__(site)
-        self.duration = options
+        self.duration = step.lasts
         self.deadline = 0.0
-
-    @staticmethod
-    def read(reader: NodeReader) -> Expression:
-        """Read the duration."""
-        return reader.duration(reader.key)
-
-    @staticmethod
-    def waits(node: Node) -> bool:
-        """It does nothing else."""
-        return True
 
     def begin(self) -> int:
         """Set the deadline."""
@@ -50,3 +36,36 @@ class Wait(Task):
     def proceed(self) -> int:
         """See whether the time has come."""
         return SUCCESS if self.engine.is_due(self.deadline) else RUNNING
+
+
+@kind("wait", WaitTask)
+@dataclass(frozen=True, slots=True)
+class Wait(LeafStep):
+    """Succeed after a time; it goes on with the rest when the mission was cut short meanwhile.
+
+    Example:
+        do:
+          - wait: 5 s
+          - go_to: corner_1
+    """
+
+    lasts: Expression = field()
+
+    waits = True
+    has_result = False
+    only_asks = False
+    effects = NO_EFFECTS
+
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
+        """Read the duration."""
+        return cls(reader.duration(reader.key))
+
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return that a time that is written out can be waited for."""
+        return ALWAYS_SUCCEEDS if isinstance(self.lasts.tree, Number) else ANY
+
+    @property
+    def numbers(self) -> tuple[Counted, ...]:
+        """Return its time."""
+        return (Counted("a wait", self.lasts, 0),)

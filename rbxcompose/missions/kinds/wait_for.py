@@ -2,45 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
+from rbxcompose.missions.facts import is_simple
+from rbxcompose.missions.families import LeafStep
+from rbxcompose.missions.moments import NO_EFFECTS
+from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
+from rbxcompose.missions.program import Endings, Node
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import IDLE, RUNNING, SUCCESS
 from rbxcompose.missions.task import Site, Task
 from rbxcompose.missions.watching import Watched
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
-    from rbxcompose.missions.program import Node
 
-
-@kind("wait_for")
-class WaitFor(Task):
-    """Succeed as soon as the condition holds; `timeout` bounds it.
-
-    Example:
-        do:
-          wait_for: $battery > 50 %
-          timeout: 1 min
-    """
+class WaitForTask(Task):
+    """Asks whenever the answer may have changed."""
 
     __slots__ = ("watched",)
 
-    def __init__(self, site: Site, options: Expression) -> None:
+    def __init__(self, site: Site, step: WaitFor) -> None:
         super().__init__(site)
-        self.watched = Watched.of(options)
-
-    @staticmethod
-    def read(reader: NodeReader) -> Expression:
-        """Read the condition."""
-        return reader.condition(reader.key)
-
-    @staticmethod
-    def waits(node: Node) -> bool:
-        """It does nothing else."""
-        return True
+        self.watched = Watched.of(step.condition)
 
     def begin(self) -> int:
         """Ask for the first time."""
@@ -58,3 +44,32 @@ class WaitFor(Task):
         if anew:
             self.statuses[self.number] = IDLE
         return anew
+
+
+@kind("wait_for", WaitForTask)
+@dataclass(frozen=True, slots=True)
+class WaitFor(LeafStep):
+    """Succeed as soon as the condition holds; `timeout` bounds it.
+
+    Example:
+        do:
+          wait_for: $battery > 50 %
+          timeout: 1 min
+    """
+
+    condition: Expression
+
+    waits = True
+    has_result = False
+    lasts = None
+    only_asks = True
+    effects = NO_EFFECTS
+
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
+        """Read the condition."""
+        return cls(reader.condition(reader.key))
+
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return that only a condition which cannot be asked is a failure."""
+        return ALWAYS_SUCCEEDS if is_simple(node) else ANY

@@ -2,21 +2,59 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import Self
 
-from rbxcompose.missions.modifiers.registry import Modifier, modifier
+from rbxcompose.missions.modifiers.families import Plain
+from rbxcompose.missions.modifiers.registry import Decorator, modifier
+from rbxcompose.missions.moments import Moments
+from rbxcompose.missions.reader import Reader
+from rbxcompose.missions.sending import act, act_safely
 from rbxcompose.missions.statuses import RUNNING
 from rbxcompose.missions.task import Site, Task
-
-if TYPE_CHECKING:
-    from rbxcompose.missions.moments import Moments
-    from rbxcompose.missions.node_reader import NodeReader
 
 ON_ENTER, ON_EXIT = "on_enter", "on_exit"
 
 
-@modifier(ON_ENTER)
-class Entering(Modifier):
+class EnteringTask(Decorator):
+    """Hears when a state is entered and left."""
+
+    __slots__ = ("moments",)
+
+    def __init__(self, site: Site, options: Entering, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.moments = options.moments
+
+    def begin(self) -> int:
+        """Do what belongs to entering."""
+        act(self.moments, ON_ENTER, self)
+        return self.proceed()
+
+    def proceed(self) -> int:
+        """Go on, and do what belongs to leaving."""
+        status = self.advance(self.inner)
+        if status != RUNNING:
+            act(self.moments, ON_EXIT, self)
+        return status
+
+    def suspend(self, anew: bool) -> bool:
+        """An interrupt halts leaves, not states: the state stays entered, what is in it begins anew."""
+        if self.current is not None and self.inner.suspend(anew):
+            self.current = None
+        return False
+
+    def halt(self) -> None:
+        """Stop what runs, and leave, unless the mission as a whole is ended from outside."""
+        super().halt()
+        if not self.engine.is_aborting:
+            act_safely(self.moments, ON_EXIT, self)
+
+
+@modifier(
+    ON_ENTER, EnteringTask, {ON_EXIT: "What is set, logged or published when the state is left."}, only_states=True
+)
+@dataclass(frozen=True, slots=True)
+class Entering(Plain):
     """Do something small when a state is entered and when it is left: `set`, `log`, `publish`.
 
     Leaving also counts when something inside the mission halts the state, entering also when its history brings the
@@ -38,39 +76,11 @@ class Entering(Modifier):
                 failure: failed
     """
 
-    __slots__ = ("moments",)
-    keys = {ON_EXIT: "What is set, logged or published when the state is left."}
-    only_states = True
+    moments: Moments = field()
 
-    def __init__(self, site: Site, options: Moments, inner: Task) -> None:
-        super().__init__(site, options, inner)
-        self.moments = options
+    value = None
 
-    @staticmethod
-    def read(reader: NodeReader, key: str) -> Moments:
+    @classmethod
+    def read(cls, reader: Reader, key: str) -> Self:
         """Read what is there of the two."""
-        return reader.moments((key, *Entering.keys))
-
-    def begin(self) -> int:
-        """Do what belongs to entering."""
-        self.moments.act(ON_ENTER, self)
-        return self.proceed()
-
-    def proceed(self) -> int:
-        """Go on, and do what belongs to leaving."""
-        status = self.advance(self.inner)
-        if status != RUNNING:
-            self.moments.act(ON_EXIT, self)
-        return status
-
-    def suspend(self, anew: bool) -> bool:
-        """An interrupt halts leaves, not states: the state stays entered, what is in it begins anew."""
-        if self.current is not None and self.inner.suspend(anew):
-            self.current = None
-        return False
-
-    def halt(self) -> None:
-        """Stop what runs, and leave, unless the mission as a whole is ended from outside."""
-        super().halt()
-        if not self.engine.is_aborting:
-            self.moments.act_safely(ON_EXIT, self)
+        return cls(reader.moments((key, *cls.keys)))

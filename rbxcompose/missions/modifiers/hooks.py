@@ -3,22 +3,66 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import Self
 
-from rbxcompose.missions.modifiers.registry import Modifier, modifier
+from rbxcompose.missions.modifiers.families import Plain
+from rbxcompose.missions.modifiers.registry import Decorator, modifier
+from rbxcompose.missions.moments import Moments
+from rbxcompose.missions.reader import Reader
+from rbxcompose.missions.sending import act, act_safely
 from rbxcompose.missions.statuses import FAILURE, SUCCESS
 from rbxcompose.missions.task import Site, Task
-
-if TYPE_CHECKING:
-    from rbxcompose.missions.moments import Moments
-    from rbxcompose.missions.node_reader import NodeReader
 
 ON_START, ON_SUCCESS, ON_FAILURE, ON_HALT = "on_start", "on_success", "on_failure", "on_halt"
 _ON: Mapping[int, str] = {SUCCESS: ON_SUCCESS, FAILURE: ON_FAILURE}
 
 
-@modifier(ON_START)
-class Hooks(Modifier):
+class HooksTask(Decorator):
+    """Hears when its node starts, ends or is halted."""
+
+    __slots__ = ("moments",)
+
+    def __init__(self, site: Site, options: Hooks, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.moments = options.moments
+
+    def begin(self) -> int:
+        """Do what belongs to the start."""
+        act(self.moments, ON_START, self)
+        return self.proceed()
+
+    def proceed(self) -> int:
+        """Go on, and do what belongs to the end."""
+        status = self.advance(self.inner)
+        if status in _ON:
+            act(self.moments, _ON[status], self)
+        return status
+
+    def halt(self) -> None:
+        """Stop what runs, and do what belongs to that."""
+        super().halt()
+        act_safely(self.moments, ON_HALT, self)
+
+    def suspend(self, anew: bool) -> bool:
+        """A node that begins anew is halted."""
+        is_anew = super().suspend(anew)
+        if is_anew:
+            act_safely(self.moments, ON_HALT, self)
+        return is_anew
+
+
+@modifier(
+    ON_START,
+    HooksTask,
+    {
+        ON_SUCCESS: "What is set, logged or published when the node succeeds.",
+        ON_FAILURE: "What is set, logged or published when the node fails.",
+        ON_HALT: "What is set, logged or published when the node is halted.",
+    },
+)
+@dataclass(frozen=True, slots=True)
+class Hooks(Plain):
     """Do something small when the node starts or ends: `set`, `log`, `publish`.
 
     They run once per node, not per attempt, and see its result before `optional` and `invert`.
@@ -35,42 +79,11 @@ class Hooks(Modifier):
               missed: $missed + 1
     """
 
-    __slots__ = ("moments",)
-    keys = {
-        ON_SUCCESS: "What is set, logged or published when the node succeeds.",
-        ON_FAILURE: "What is set, logged or published when the node fails.",
-        ON_HALT: "What is set, logged or published when the node is halted.",
-    }
+    moments: Moments = field()
 
-    def __init__(self, site: Site, options: Moments, inner: Task) -> None:
-        super().__init__(site, options, inner)
-        self.moments = options
+    value = None
 
-    @staticmethod
-    def read(reader: NodeReader, key: str) -> Moments:
+    @classmethod
+    def read(cls, reader: Reader, key: str) -> Self:
         """Read the hooks that are there."""
-        return reader.moments((key, *Hooks.keys))
-
-    def begin(self) -> int:
-        """Do what belongs to the start."""
-        self.moments.act(ON_START, self)
-        return self.proceed()
-
-    def proceed(self) -> int:
-        """Go on, and do what belongs to the end."""
-        status = self.advance(self.inner)
-        if status in _ON:
-            self.moments.act(_ON[status], self)
-        return status
-
-    def halt(self) -> None:
-        """Stop what runs, and do what belongs to that."""
-        super().halt()
-        self.moments.act_safely(ON_HALT, self)
-
-    def suspend(self, anew: bool) -> bool:
-        """A node that begins anew is halted."""
-        is_anew = super().suspend(anew)
-        if is_anew:
-            self.moments.act_safely(ON_HALT, self)
-        return is_anew
+        return cls(reader.moments((key, *cls.keys)))

@@ -3,42 +3,46 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions import codes
-from rbxcompose.missions.modifiers.registry import Modifier, modifier
+from rbxcompose.missions.answers import Advice, Counted, Serves
+from rbxcompose.missions.facts import takes_time
+from rbxcompose.missions.modifier import Modifier
+from rbxcompose.missions.modifiers.registry import Decorator, modifier
+from rbxcompose.missions.outcomes import ALWAYS_FAILS, SUCCEEDS, Outcomes
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.statuses import FAILURE, RUNNING
 from rbxcompose.missions.task import Site, Task
 from rbxcompose.missions.watching import Watched
 from rbxcompose.units import TIME, format_quantity
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
+SHORTEST = 1e-6  # [s] of a timeout with a meaning
 
 
-@modifier("as_long_as")
-class AsLongAs(Modifier):
-    """Fail as soon as the condition does not hold; what runs is halted.
+class Cutting(Modifier):
+    """A modifier that may end its node in a failure."""
 
-    Example:
-        do:
-          go_to: corner_1
-          as_long_as: $battery > 20 %
-    """
+    __slots__ = ()
+    may_skip = False
+    serves = Serves.ALL
+
+    def changed(self, inner: Outcomes) -> Outcomes:
+        """Return that it may also fail."""
+        return inner.both(ALWAYS_FAILS)
+
+
+class AsLongAsTask(Decorator):
+    """Asks at each tick."""
 
     __slots__ = ("watched",)
 
-    def __init__(self, site: Site, options: Expression, inner: Task) -> None:
-        super().__init__(site, options, inner)
-        self.watched = Watched.of(options)
-
-    @staticmethod
-    def read(reader: NodeReader, key: str) -> Expression:
-        """Read a condition."""
-        return reader.condition(key)
+    def __init__(self, site: Site, options: AsLongAs, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.watched = Watched.of(options.value)
 
     def begin(self) -> int:
         """Ask for the first time."""
@@ -47,7 +51,7 @@ class AsLongAs(Modifier):
     def proceed(self) -> int:
         """Ask, then go on."""
         if not holds(self.watched.condition, self.scope):
-            self.engine.halt(self, f"not as long as {self.watched.condition.text}")
+            self.cut(f"not as long as {self.watched.condition.text}")
             return FAILURE
         status = self.advance(self.inner)
         if status == RUNNING:
@@ -55,29 +59,37 @@ class AsLongAs(Modifier):
         return status
 
 
-@modifier("timeout")
-class Timeout(Modifier):
-    """Fail when the node takes longer, all its attempts together; a result of the same instant is in time.
+@modifier("as_long_as", AsLongAsTask)
+@dataclass(frozen=True, slots=True)
+class AsLongAs(Cutting):
+    """Fail as soon as the condition does not hold; what runs is halted.
 
     Example:
         do:
           go_to: corner_1
-          timeout: 30 s
+          as_long_as: $battery > 20 %
     """
 
-    __slots__ = ("allowed", "deadline", "duration")
-    saved = ("allowed", "deadline")
+    value: Expression = field()
 
-    def __init__(self, site: Site, options: Expression, inner: Task) -> None:
-        super().__init__(site, options, inner)
-        self.duration = options
+    @classmethod
+    def read(cls, reader: Reader, key: str) -> Self:
+        """Read a condition."""
+        return cls(reader.condition(key))
+
+
+class TimeoutTask(Decorator):
+    """Has a deadline."""
+
+    __slots__ = ("allowed", "deadline", "duration")
+    saved = fresh = ("allowed", "deadline")
+    times = ("deadline",)
+
+    def __init__(self, site: Site, options: Timeout, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.duration = options.value
         self.allowed = 0.0  # [s]
         self.deadline = 0.0
-
-    @staticmethod
-    def read(reader: NodeReader, key: str) -> Expression:
-        """Read a duration."""
-        return reader.duration(key)
 
     def begin(self) -> int:
         """Set the deadline."""
@@ -90,60 +102,56 @@ class Timeout(Modifier):
         status = self.advance(self.inner)
         if status != RUNNING or not self.engine.is_due(self.deadline):
             return status
-        self.engine.halt(self, f"timeout of {format_quantity(self.allowed, TIME)}")
+        self.cut(f"timeout of {format_quantity(self.allowed, TIME)}")
         return FAILURE
 
 
+@modifier("timeout", TimeoutTask)
 @dataclass(frozen=True, slots=True)
-class Tries:
-    """How often a node is tried at most (None: for ever), how long each try may take, the pause between two."""
-
-    most: Expression | None
-    timeout: Expression | None = None
-    pause: Expression | None = None
-
-
-@modifier("attempts")
-class Attempts(Modifier):
-    """Try again after a failure, at the next tick or after a pause.
+class Timeout(Cutting):
+    """Fail when the node takes longer, all its attempts together; a result of the same instant is in time.
 
     Example:
         do:
           go_to: corner_1
-          attempts: 3
-          attempt_timeout: 20 s
-          attempt_pause: 2 s
+          timeout: 30 s
     """
+
+    value: Expression = field()
+
+    @classmethod
+    def read(cls, reader: Reader, key: str) -> Self:
+        """Read a duration."""
+        return cls(reader.duration(key))
+
+    @property
+    def limit(self) -> Expression | None:
+        """Return the duration."""
+        return self.value
+
+    @property
+    def numbers(self) -> tuple[Counted, ...]:
+        """Return the duration."""
+        return (Counted("a timeout", self.value, SHORTEST),)
+
+
+class AttemptsTask(Decorator):
+    """Starts what is inside again after a failure."""
 
     __slots__ = ("deadline", "is_between", "left", "tries")
     saved = ("deadline", "is_between", "left")
-    keys = {
-        "attempt_timeout": "How long each attempt may take.",
-        "attempt_pause": "The time between an attempt that failed and the next one.",
-    }
+    times = fresh = ("deadline",)
 
-    def __init__(self, site: Site, options: Tries, inner: Task) -> None:
-        super().__init__(site, options, inner)
+    def __init__(self, site: Site, options: Attempts, inner: Task) -> None:
+        super().__init__(site, inner)
         self.tries = options
         self.left = math.inf
         self.deadline = 0.0  # of this attempt, or of the pause [s]
         self.is_between = False
 
-    @staticmethod
-    def read(reader: NodeReader, key: str) -> Tries:
-        """Read a count or `forever`, and what belongs to it."""
-        timeout, pause = (
-            reader.duration(one) if reader.has(one) else None for one in ("attempt_timeout", "attempt_pause")
-        )
-        if not reader.has(key):
-            one = "attempt_timeout" if timeout else "attempt_pause"
-            reader.add(codes.MISSING.at(reader.key_span(one), f"'{one}' needs 'attempts': how often it is tried"))
-            return Tries(None, timeout, pause)
-        return Tries(reader.count_or_forever(key), timeout, pause)
-
     def begin(self) -> int:
         """Try for the first time."""
-        self.left = math.inf if self.tries.most is None else self.count_of(self.tries.most, "'attempts'")
+        self.left = math.inf if self.tries.value is None else self.count_of(self.tries.value, "'attempts'")
         self._begin_attempt()
         return self.proceed()
 
@@ -155,7 +163,7 @@ class Attempts(Modifier):
             self._begin_attempt()
         status = self.advance(self.inner)
         if status == RUNNING and self.tries.timeout and self.engine.is_due(self.deadline):
-            self.engine.halt(self, "timeout of an attempt")
+            self.cut("timeout of an attempt")
             status = FAILURE
         if status != FAILURE:
             return status
@@ -174,3 +182,68 @@ class Attempts(Modifier):
 
     def _seconds(self, expression: Expression | None, what: str) -> float:
         return 0.0 if expression is None else self.number_of(expression, what)
+
+
+@modifier(
+    "attempts",
+    AttemptsTask,
+    {
+        "attempt_timeout": "How long each attempt may take.",
+        "attempt_pause": "The time between an attempt that failed and the next one.",
+    },
+)
+@dataclass(frozen=True, slots=True)
+class Attempts(Modifier):
+    """Try again after a failure, at the next tick or after a pause.
+
+    Example:
+        do:
+          go_to: corner_1
+          attempts: 3
+          attempt_timeout: 20 s
+          attempt_pause: 2 s
+    """
+
+    value: Expression | None = field()  # how often at most; None: for ever
+    timeout: Expression | None = None  # of each
+    pause: Expression | None = None  # between two
+
+    may_skip = False
+    repeats = True
+
+    @classmethod
+    def read(cls, reader: Reader, key: str) -> Self:
+        """Read a count or `forever`, and what belongs to it."""
+        timeout, pause = (
+            reader.duration(one) if reader.has(one) else None for one in ("attempt_timeout", "attempt_pause")
+        )
+        if not reader.has(key):
+            one = "attempt_timeout" if timeout else "attempt_pause"
+            reader.add(codes.MISSING.at(reader.key_span(one), f"'{one}' needs 'attempts': how often it is tried"))
+            return cls(None, timeout, pause)
+        return cls(reader.count_or_forever(key), timeout, pause)
+
+    def changed(self, inner: Outcomes) -> Outcomes:
+        """Return that what is tried for ever ends in success, unless an attempt is cut short."""
+        return inner.of(SUCCEEDS) if self.value is None and not self.timeout else inner
+
+    @property
+    def serves(self) -> Serves:
+        """Return those that may fail; an attempt that may be cut short always may."""
+        return Serves.ALL if self.timeout else Serves.FAILING
+
+    @property
+    def said(self) -> str:
+        """Return its numbers."""
+        return ", ".join(one.text for one in (self.value, self.timeout, self.pause) if one)
+
+    @property
+    def endless(self) -> Advice | None:
+        """Say what attempts for ever need."""
+        advice = Advice("what is tried for ever never waits", "give it a number of attempts, or an 'attempt_pause'")
+        return advice if self.value is None and not takes_time(self.pause) else None
+
+    @property
+    def numbers(self) -> tuple[Counted, ...]:
+        """Return the number of attempts."""
+        return (Counted("'attempts'", self.value, 1),)

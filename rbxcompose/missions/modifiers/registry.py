@@ -3,37 +3,27 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 from collections.abc import Callable, Mapping
 from functools import cache
-from typing import TYPE_CHECKING, ClassVar, TypeVar
+from types import MappingProxyType
+from typing import TypeVar
 
+from rbxcompose.missions.modifier import Modifier
 from rbxcompose.missions.task import Site, Task
-
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
 
 # From the outside in, whatever the order in the text: a rule of the language.
 MODULES = ("entering", "starting", "results", "hooks", "limits", "saving")
 
 
-class Modifier(Task):
-    """A task around another one of the same node; what happens to the inner one happens to it.
-
-    `keys` are all that it reads: its own, which comes first, and those that only make sense with it.
-    """
+class Decorator(Task):
+    """A task around another one of the same node; what happens to the inner one happens to it."""
 
     __slots__ = ("inner",)
-    keys: ClassVar[Mapping[str, str]] = {}  # keys beside its own, each with what it is for
-    only_states: ClassVar[bool] = False  # it belongs to states of machines
 
-    def __init__(self, site: Site, options: object, inner: Task) -> None:
+    def __init__(self, site: Site, inner: Task) -> None:
         super().__init__(site)
         self.inner = inner
-
-    @staticmethod
-    def read(reader: NodeReader, key: str) -> object:
-        """Read the modifier's value, which becomes the `options` of its task."""
-        raise NotImplementedError
 
     def suspend(self, anew: bool) -> bool:
         """Begin anew together with a leaf that begins anew."""
@@ -47,18 +37,45 @@ class Modifier(Task):
         return self.advance(self.inner)
 
 
+M = TypeVar("M", bound=Modifier)
 MODIFIERS: dict[str, type[Modifier]] = {}
-M = TypeVar("M", bound=type[Modifier])
+_DECORATORS: dict[type[Modifier], Callable[[Modifier, Site, Task], Task]] = {}
 
 
-def modifier(name: str) -> Callable[[M], M]:
-    """Register a modifier under its key, inside of those of its module that were registered before."""
+def modifier(
+    name: str,
+    task: Callable[[Site, M, Task], Task],
+    keys: Mapping[str, str] = MappingProxyType({}),
+    *,
+    only_states: bool = False,
+) -> Callable[[type[M]], type[M]]:
+    """Register a modifier under its key, inside of those of its module that were registered before.
 
-    def register(cls: M) -> M:
-        MODIFIERS[name] = cls
+    `keys` are those that it reads beside its own, each with what it is for.
+
+    Raises:
+        TypeError: if the modifier leaves something unanswered that every modifier answers.
+    """
+
+    def register(cls: type[M]) -> type[M]:
+        if inspect.isabstract(cls):
+            raise TypeError(f"the modifier '{name}' does not answer {', '.join(sorted(cls.__abstractmethods__))}")
+
+        def make(options: Modifier, site: Site, inner: Task) -> Task:
+            if not isinstance(options, cls):
+                raise TypeError(f"'{site.node.path}' has no '{name}'")
+            return task(site, options, inner)
+
+        cls.name, cls.keys, cls.only_states = name, keys, only_states
+        MODIFIERS[name], _DECORATORS[cls] = cls, make
         return cls
 
     return register
+
+
+def decorator_of(options: Modifier, site: Site, inner: Task) -> Task:
+    """Return the task that carries out a modifier of a node, around another one."""
+    return _DECORATORS[type(options)](options, site, inner)
 
 
 @cache

@@ -2,34 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import ClassVar, Self
 
-from rbxcompose.missions.modifiers.registry import Modifier, modifier
+from rbxcompose.missions.answers import Serves
+from rbxcompose.missions.modifier import Modifier
+from rbxcompose.missions.modifiers.registry import Decorator, modifier
+from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, FAILS, SUCCEEDS, Outcomes
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.statuses import FAILURE, SUCCESS
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
 
-
-class Turning(Modifier):
+class TurningTask(Decorator):
     """Gives another result for some; the outcome's own name is then gone."""
 
     __slots__ = ("turned",)
 
-    def __init__(self, site: Site, options: bool, inner: Task) -> None:
-        super().__init__(site, options, inner)
-        self.turned = self.turns() if options else {}
-
-    @staticmethod
-    def turns() -> dict[int, int]:
-        """Return what becomes of which result."""
-        raise NotImplementedError
-
-    @staticmethod
-    def read(reader: NodeReader, key: str) -> bool:
-        """Read `true` or `false`."""
-        return reader.flag(key)
+    def __init__(self, site: Site, options: Turning, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.turned = options.turns if options.is_on else {}
 
     def begin(self) -> int:
         """Start the task inside."""
@@ -44,7 +36,23 @@ class Turning(Modifier):
         return turned
 
 
-@modifier("optional")
+@dataclass(frozen=True, slots=True)
+class Turning(Modifier):
+    """May be switched off."""
+
+    is_on: bool
+
+    may_skip = False
+    value = None
+    turns: ClassVar[dict[int, int]]  # what becomes of which result
+
+    @classmethod
+    def read(cls, reader: Reader, key: str) -> Self:
+        """Read `true` or `false`."""
+        return cls(reader.flag(key))
+
+
+@modifier("optional", TurningTask)
 class Optional(Turning):
     """Count a failure as success.
 
@@ -56,14 +64,26 @@ class Optional(Turning):
     """
 
     __slots__ = ()
+    turns = {FAILURE: SUCCESS}
 
-    @staticmethod
-    def turns() -> dict[int, int]:
+    def changed(self, inner: Outcomes) -> Outcomes:
         """Return that a failure is a success."""
-        return {FAILURE: SUCCESS}
+        if not self.is_on or not inner.counting_as(FAILS):
+            return inner
+        return inner.of(SUCCEEDS).both(ALWAYS_SUCCEEDS)
+
+    @property
+    def serves(self) -> Serves:
+        """Return those that may fail."""
+        return Serves.FAILING if self.is_on else Serves.ALL
+
+    @property
+    def forgives(self) -> bool:
+        """Tell that it may: one that could not be read is not held against its node."""
+        return True
 
 
-@modifier("invert")
+@modifier("invert", TurningTask)
 class Invert(Turning):
     """Turn success into failure, and failure into success.
 
@@ -75,8 +95,9 @@ class Invert(Turning):
     """
 
     __slots__ = ()
+    turns = {FAILURE: SUCCESS, SUCCESS: FAILURE}
+    serves = Serves.ALL
 
-    @staticmethod
-    def turns() -> dict[int, int]:
+    def changed(self, inner: Outcomes) -> Outcomes:
         """Return that each is the other."""
-        return {FAILURE: SUCCESS, SUCCESS: FAILURE}
+        return Outcomes(inner.counting_as(FAILS), inner.counting_as(SUCCEEDS)) if self.is_on else inner

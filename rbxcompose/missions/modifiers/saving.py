@@ -2,21 +2,41 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Self
 
 from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions.modifiers.registry import Modifier, modifier
+from rbxcompose.missions.modifiers.families import Plain
+from rbxcompose.missions.modifiers.registry import Decorator, modifier
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.statuses import RUNNING
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
 
-SAVED = ("call", "use", "for")  # kinds that have something to keep, beside skills
+class SaveTask(Decorator):
+    """Keeps the result at the end."""
+
+    __slots__ = ("name",)
+
+    def __init__(self, site: Site, options: Save, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.name = options.kept_as.text
+
+    def begin(self) -> int:
+        """Start the task inside."""
+        return self.proceed()
+
+    def proceed(self) -> int:
+        """Go on, and keep the result at the end."""
+        status = self.advance(self.inner)
+        if status != RUNNING and self.name:
+            self.run.data[self.name] = self.inner.result()
+        return status
 
 
-@modifier("save")
-class Save(Modifier):
+@modifier("save", SaveTask)
+@dataclass(frozen=True, slots=True)
+class Save(Plain):
     """Keep what a skill or a `call` answered, the outputs of a `use`, or `{done, failed}` of a `for`.
 
     It is kept also after a failure.
@@ -33,24 +53,21 @@ class Save(Modifier):
           - log: $tour.failed could not be reached
     """
 
-    __slots__ = ("name",)
+    kept_as: Scalar
 
-    def __init__(self, site: Site, options: Scalar, inner: Task) -> None:
-        super().__init__(site, options, inner)
-        self.name = options.text
+    value = None
 
-    @staticmethod
-    def read(reader: NodeReader, key: str) -> Scalar:
+    @classmethod
+    def read(cls, reader: Reader, key: str) -> Self:
         """Read the name."""
-        return reader.name(key, "a name for the result")
+        return cls(reader.name(key, "a name for the result"))
 
-    def begin(self) -> int:
-        """Start the task inside."""
-        return self.proceed()
+    @property
+    def saved(self) -> Scalar | None:
+        """Return the name."""
+        return self.kept_as if self.kept_as.text else None
 
-    def proceed(self) -> int:
-        """Go on, and keep the result at the end."""
-        status = self.advance(self.inner)
-        if status != RUNNING and self.name:
-            self.run.data[self.name] = self.inner.result()
-        return status
+    @property
+    def said(self) -> str:
+        """Return the name."""
+        return self.kept_as.text

@@ -2,34 +2,63 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import ClassVar, Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.missions.modifiers.registry import Modifier, modifier
+from rbxcompose.missions.answers import Serves
+from rbxcompose.missions.modifiers.families import Skipping
+from rbxcompose.missions.modifiers.registry import Decorator, modifier
+from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.statuses import RUNNING, SKIPPED
 from rbxcompose.missions.task import Site, Task
 
-if TYPE_CHECKING:
-    from rbxcompose.missions.node_reader import NodeReader
 
-
-class Conditional(Modifier):
-    """Reads a condition, which is asked once, before the node starts."""
+class ConditionalTask(Decorator):
+    """Asks a condition once, before the node starts."""
 
     __slots__ = ("condition",)
+    skips_if: ClassVar[bool]
 
-    def __init__(self, site: Site, options: Expression, inner: Task) -> None:
-        super().__init__(site, options, inner)
-        self.condition = options
+    def __init__(self, site: Site, options: Conditional, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.condition = options.value
 
-    @staticmethod
-    def read(reader: NodeReader, key: str) -> Expression:
+    def begin(self) -> int:
+        """Ask the condition once."""
+        return SKIPPED if holds(self.condition, self.scope) == self.skips_if else self.advance(self.inner)
+
+
+class OnlyIfTask(ConditionalTask):
+    """Goes on if it holds."""
+
+    __slots__ = ()
+    skips_if = False
+
+
+class SkipIfTask(ConditionalTask):
+    """Goes on if it does not hold."""
+
+    __slots__ = ()
+    skips_if = True
+
+
+@dataclass(frozen=True, slots=True)
+class Conditional(Skipping):
+    """Has a condition."""
+
+    value: Expression = field()
+
+    serves = Serves.ALL
+
+    @classmethod
+    def read(cls, reader: Reader, key: str) -> Self:
         """Read a condition."""
-        return reader.condition(key)
+        return cls(reader.condition(key))
 
 
-@modifier("only_if")
+@modifier("only_if", OnlyIfTask)
 class OnlyIf(Conditional):
     """Start only if the condition holds, else be skipped.
 
@@ -41,12 +70,8 @@ class OnlyIf(Conditional):
 
     __slots__ = ()
 
-    def begin(self) -> int:
-        """Ask the condition once."""
-        return self.advance(self.inner) if holds(self.condition, self.scope) else SKIPPED
 
-
-@modifier("skip_if")
+@modifier("skip_if", SkipIfTask)
 class SkipIf(Conditional):
     """Be skipped if the condition holds.
 
@@ -58,19 +83,16 @@ class SkipIf(Conditional):
 
     __slots__ = ()
 
-    def begin(self) -> int:
-        """Ask the condition once."""
-        return SKIPPED if holds(self.condition, self.scope) else self.advance(self.inner)
 
-
-class Counting(Modifier):
+class CountingTask(Decorator):
     """Knows when its node ended within this run of the mission; a halt is no end."""
 
     __slots__ = ("ended_at", "ended_in")
     saved = ("ended_at", "ended_in")
+    times = ("ended_at",)
 
-    def __init__(self, site: Site, options: object, inner: Task) -> None:
-        super().__init__(site, options, inner)
+    def __init__(self, site: Site, inner: Task) -> None:
+        super().__init__(site, inner)
         self.ended_at = 0.0  # [s] of robot time without pauses
         self.ended_in = 0  # the run of the mission, counted from 1
 
@@ -87,8 +109,23 @@ class Counting(Modifier):
         return status
 
 
-@modifier("once")
-class Once(Counting):
+class OnceTask(CountingTask):
+    """Skips its node once that has ended."""
+
+    __slots__ = ("is_on",)
+
+    def __init__(self, site: Site, options: Once, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.is_on = options.is_on
+
+    def begin(self) -> int:
+        """Start if it has not ended yet."""
+        return SKIPPED if self.is_on and self.has_ended else self.proceed()
+
+
+@modifier("once", OnceTask)
+@dataclass(frozen=True, slots=True)
+class Once(Skipping):
     """Be done once within a run of the mission, whether it succeeds or fails; then be skipped.
 
     Example:
@@ -100,24 +137,42 @@ class Once(Counting):
             - go_to: corner_1
     """
 
-    __slots__ = ("is_on",)
+    is_on: bool
 
-    def __init__(self, site: Site, options: bool, inner: Task) -> None:
-        super().__init__(site, options, inner)
-        self.is_on = options
+    value = None
 
-    @staticmethod
-    def read(reader: NodeReader, key: str) -> bool:
+    @classmethod
+    def read(cls, reader: Reader, key: str) -> Self:
         """Read `true` or `false`."""
-        return reader.flag(key)
+        return cls(reader.flag(key))
+
+    @property
+    def serves(self) -> Serves:
+        """Return those that come again."""
+        return Serves.REPEATED if self.is_on else Serves.ALL
+
+
+class CooldownTask(CountingTask):
+    """Skips its node for a time after that has ended."""
+
+    __slots__ = ("duration",)
+
+    def __init__(self, site: Site, options: Cooldown, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.duration = options.value
 
     def begin(self) -> int:
-        """Start if it has not ended yet."""
-        return SKIPPED if self.is_on and self.has_ended else self.proceed()
+        """Start if that time has gone by, or if it has not ended yet."""
+        is_cooling = self.has_ended and not self.engine.has_gone_by(self._seconds(), self.ended_at)
+        return SKIPPED if is_cooling else self.proceed()
+
+    def _seconds(self) -> float:
+        return self.number_of(self.duration, "'cooldown'")
 
 
-@modifier("cooldown")
-class Cooldown(Counting):
+@modifier("cooldown", CooldownTask)
+@dataclass(frozen=True, slots=True)
+class Cooldown(Skipping):
     """Be skipped for a time after it has ended; the time of interrupts counts, that of pauses does not.
 
     Example:
@@ -129,21 +184,11 @@ class Cooldown(Counting):
             - go_to: corner_1
     """
 
-    __slots__ = ("duration",)
+    value: Expression = field()
 
-    def __init__(self, site: Site, options: Expression, inner: Task) -> None:
-        super().__init__(site, options, inner)
-        self.duration = options
+    serves = Serves.REPEATED
 
-    @staticmethod
-    def read(reader: NodeReader, key: str) -> Expression:
+    @classmethod
+    def read(cls, reader: Reader, key: str) -> Self:
         """Read a duration."""
-        return reader.duration(key)
-
-    def begin(self) -> int:
-        """Start if that time has gone by, or if it has not ended yet."""
-        is_cooling = self.has_ended and not self.engine.has_gone_by(self._seconds(), self.ended_at)
-        return SKIPPED if is_cooling else self.proceed()
-
-    def _seconds(self) -> float:
-        return self.number_of(self.duration, "'cooldown'")
+        return cls(reader.duration(key))

@@ -1,0 +1,42 @@
+"""What stands in a node as it was written: expressions with their types, what is set, what is given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.types import Type
+from rbxcompose.findings import Span
+from rbxcompose.manifest.tree import Node as Located
+from rbxcompose.manifest.tree import Scalar
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """An expression of a node, the type that its value must have, and the scalar that it stands in.
+
+    One that is assigned must have the type of its datum.
+    """
+
+    expression: Expression
+    wanted: Type
+    scalar: Scalar
+    is_assigned: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """A name that is set, its place, and the expression for its new value."""
+
+    name: str
+    span: Span
+    asked: Asked
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """An argument of a skill or a mission as written; what it means depends on that. The main one has no name."""
+
+    name: str
+    value: Located
+    span: Span

@@ -1,0 +1,151 @@
+"""A skill of the robot: its arguments are computed, the world is asked, and the result comes later."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Self
+
+from rbxcompose.expressions.values import Value
+from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.tree import Node as Located
+from rbxcompose.manifest.tree import Scalar, Sequence
+from rbxcompose.missions.asked import Argument
+from rbxcompose.missions.events import Reported, SkillEnded, SkillStarted
+from rbxcompose.missions.families import LeafStep
+from rbxcompose.missions.leaf import Leaf
+from rbxcompose.missions.moments import NO_EFFECTS
+from rbxcompose.missions.outcomes import ANY, FAILS, SUCCEEDS, Outcomes
+from rbxcompose.missions.possible import Possibility, ended
+from rbxcompose.missions.program import Endings, Node, RobotNames
+from rbxcompose.missions.reader import Reader
+from rbxcompose.missions.registry import SKILL, kind
+from rbxcompose.missions.results import Result
+from rbxcompose.missions.statuses import FAILURE, NAMES, RUNNING, SUCCESS
+from rbxcompose.missions.task import Site
+from rbxcompose.missions.written import Getter, getter
+
+
+class SkillTask(Leaf):
+    """A leaf that asks a skill of the robot."""
+
+    __slots__ = ("arguments", "getters", "skill", "started")
+    saved = (*Leaf.saved, "arguments", "started")
+    fresh = ("arguments",)
+    told = ("started",)
+
+    def __init__(self, site: Site, step: AskedSkill) -> None:
+        super().__init__(site)
+        self.skill = site.engine.robot.skills[step.skill]
+        names = [(argument.name or self.skill.main, argument.value) for argument in step.arguments]
+        self.getters: Mapping[str, Getter] = {name: getter(value, self.skill.arguments[name]) for name, value in names}
+        self.arguments: dict[str, Value] = {}
+        self.started = 0.0  # [s] of robot time
+
+    def begin(self) -> int:
+        """Compute the arguments and ask."""
+        self.arguments = {name: get(self) for name, get in self.getters.items()}
+        return self.ask()
+
+    def ask(self) -> int:
+        """Start the skill; it is asked again after a pause."""
+        self.started, self.status = self.engine.now, RUNNING
+        self.engine.say(SkillStarted(self.number, self.skill.name, self.arguments))
+        self.is_asked = True
+        try:
+            self.engine.world.start(self.number, self.skill.name, self.arguments)
+        except Exception:
+            self.is_asked = False
+            raise
+        return RUNNING
+
+    def ended(self, result: Result) -> None:
+        """Take the result from the world."""
+        super().ended(result)
+        message = self.engine.reasons[self.number] if self.status == FAILURE else result.message
+        self.say_ended(self.outcome or NAMES[self.status], message)
+
+    def judged(self, result: Result) -> tuple[int, str, str]:
+        """Return what the outcome counts as; one that the skill did not declare is a failure."""
+        outcome = result.outcome
+        if outcome in ("", SUCCEEDS, FAILS):
+            return super().judged(result)
+        if outcome not in self.skill.outcomes:
+            message = f"the skill '{self.skill.name}' ended with an outcome that it does not declare: '{outcome}'"
+            self.engine.say(Reported(self.path, message))
+            return FAILURE, "", message
+        status = SUCCESS if self.skill.outcomes[outcome] == SUCCEEDS else FAILURE
+        return status, outcome, result.message or outcome
+
+    def suspend(self, anew: bool) -> bool:
+        """Hold the skill if it can pause and is to go on, else stop it."""
+        if self.is_asked and self.skill.pausable and not self._begins_anew():
+            if not self.is_held:
+                self.is_held = True
+                self.engine.world.pause(self.number)
+            return False
+        return super().suspend(anew)
+
+    def _begins_anew(self) -> bool:
+        nodes = self.engine.program.nodes
+        return any(one.number <= self.number < nodes[one.number].end for one in self.engine.restarting)
+
+    def stop(self) -> None:
+        """Stop what the world is at."""
+        if self.is_asked:
+            self.say_ended("halted", self.engine.because)
+        super().stop()
+
+    def say_ended(self, result: str, message: str) -> None:
+        """Say how it ended, and how long it took."""
+        self.engine.say(SkillEnded(self.number, self.skill.name, result, self.engine.now - self.started, message))
+
+
+@kind(SKILL, SkillTask, is_inner=True)
+@dataclass(frozen=True, slots=True)
+class AskedSkill(LeafStep):
+    """A skill by its name, with its arguments."""
+
+    skill: str = field()
+    arguments: tuple[Argument, ...] = field()
+
+    waits = True
+    has_result = True
+    lasts = None
+    only_asks = False
+    effects = NO_EFFECTS
+
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
+        """Read the arguments."""
+        return cls(reader.key, reader.arguments())
+
+    @property
+    def word(self) -> str:
+        """Return the name of the skill."""
+        return self.skill
+
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return what the robot declares."""
+        skill = endings.robot.skills.get(self.skill)
+        return Outcomes(named=skill.outcomes) if skill else ANY
+
+    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+        """Yield its outcomes."""
+        if self.skill in robot.skills:
+            for outcome in (SUCCEEDS, FAILS, *robot.skills[self.skill].outcomes):
+                yield Possibility(node.span, f"{node.path}: {outcome}", ended(node.number, outcome))
+
+    def text(self, node: Node) -> str:
+        """Return its arguments."""
+        return ", ".join(f"{one.name} {_written(one.value)}".strip() for one in self.arguments)
+
+
+def _written(value: Located) -> str:
+    match value:
+        case Scalar():
+            return value.text
+        case Sequence():
+            return ", ".join(map(_written, value.items))
+        case Tree():
+            return ", ".join(f"{key} {_written(entry.value)}" for key, entry in value.entries.items())

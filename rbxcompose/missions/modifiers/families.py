@@ -1,0 +1,30 @@
+"""What modifiers of a family have in common, so that each answers only for itself."""
+
+from __future__ import annotations
+
+from rbxcompose.missions.answers import Serves
+from rbxcompose.missions.modifier import Modifier
+from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, Outcomes
+
+
+class Plain(Modifier):
+    """A modifier that changes nothing about how its node may end, and never keeps it from starting."""
+
+    __slots__ = ()
+    may_skip = False
+    serves = Serves.ALL
+
+    def changed(self, inner: Outcomes) -> Outcomes:
+        """Return what is inside."""
+        return inner
+
+
+class Skipping(Modifier):
+    """A modifier that may keep its node from starting: it is skipped then, which fails nothing."""
+
+    __slots__ = ()
+    may_skip = True
+
+    def changed(self, inner: Outcomes) -> Outcomes:
+        """Return that it may also be skipped."""
+        return inner.both(ALWAYS_SUCCEEDS)

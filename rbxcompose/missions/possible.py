@@ -1,0 +1,43 @@
+"""What a mission may do, so that tests can say which of it they saw: each has a key, under which a run tells it."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import NamedTuple, TypeAlias
+
+from rbxcompose.findings import Span
+
+Key: TypeAlias = tuple[Hashable, ...]
+
+
+class Possibility(NamedTuple):
+    """Something that a node may do: its place, in words, and its key."""
+
+    span: Span
+    text: str
+    key: Key
+
+
+def started(number: int) -> Key:
+    """Return the key of the start of a node."""
+    return ("node", number)
+
+
+def skipped(number: int) -> Key:
+    """Return the key of a node that ends skipped."""
+    return ("skipped", number)
+
+
+def ended(leaf: int, outcome: str) -> Key:
+    """Return the key of a skill that ends with an outcome."""
+    return ("skill", leaf, outcome)
+
+
+def led(machine: int, state: str, to: str, outcome: str = "") -> Key:
+    """Return the key of a transition; without an outcome it is that on any."""
+    return ("transition", machine, state, to, *([outcome] if outcome else []))
+
+
+def cut(interrupt: str) -> Key:
+    """Return the key of an interrupt that acts."""
+    return ("interrupt", interrupt)

@@ -1,0 +1,211 @@
+"""A kind of node is one declaration: all that a mission's nodes can do follows from it, and nothing is left behind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Self
+
+import pytest
+
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.types import COUNT
+from rbxcompose.findings import Report
+from rbxcompose.missions import registry
+from rbxcompose.missions.answers import Advice, Counted, Flow
+from rbxcompose.missions.checking import check_program
+from rbxcompose.missions.families import Deed, Loop
+from rbxcompose.missions.linking import link
+from rbxcompose.missions.look import Look
+from rbxcompose.missions.outcomes import ANY, SUCCEEDS, Outcomes
+from rbxcompose.missions.picture import picture_of
+from rbxcompose.missions.possible import Possibility, started
+from rbxcompose.missions.program import Endings, Node, RobotNames
+from rbxcompose.missions.reader import Reader
+from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.registry import kind, kinds
+from rbxcompose.missions.snapshot import restore, save
+from rbxcompose.missions.statuses import FAILURE, RUNNING, SUCCESS
+from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.world import Settings
+from rbxcompose.schema.asking import kind_schema
+from rbxcompose.seeing.mission_html import mission_html
+from rbxcompose.seeing.mission_text import mission_text
+from rbxcompose.trials.coverage import Coverage, Seen
+from rbxcompose.trials.exploring import Limits, explore
+from tests.missions.simulated import ROBOT, Simulated, program_of, tree
+
+TEXT = "do: {persist: 2, gap: 1 s, do: {go_to: dock}, timeout: 1 min}"
+
+
+class PersistTask(Task):
+    """Tries until the body succeeds."""
+
+    __slots__ = ("body", "due", "gap", "left", "most")
+    saved = ("due", "left")
+    times = fresh = ("due",)
+
+    def __init__(self, site: Site, step: Persist) -> None:
+        super().__init__(site)
+        self.body, self.most, self.gap = site.children[0], step.most, step.gap
+        self.left, self.due = 0, 0.0
+
+    def begin(self) -> int:
+        self.left, self.due = self.count_of(self.most, "'persist'"), self.engine.time
+        return self.proceed()
+
+    def proceed(self) -> int:
+        if not self.engine.is_due(self.due):
+            return RUNNING
+        status = self.advance(self.body)
+        if status != FAILURE:
+            return status
+        self.left -= 1
+        if self.left < 1:
+            return FAILURE
+        self.due = self.engine.time + self.number_of(self.gap, "'gap'")
+        self.engine.is_due(self.due)
+        return RUNNING
+
+
+@dataclass(frozen=True, slots=True)
+class Persist(Loop):
+    """Do the body until it has succeeded once."""
+
+    most: Expression
+    gap: Expression
+
+    waits = True
+    flow = Flow.ONE_OF
+    look = Look("∞")
+
+    @classmethod
+    def read(cls, reader: Reader) -> Self:
+        most = reader.expression(reader.key, COUNT, "a number")
+        reader.child("do")
+        return cls(most, reader.duration("gap"))
+
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        return endings.of(node.children[0]) if node.children else ANY
+
+    def endless(self, ends: Outcomes) -> Advice | None:
+        return None
+
+    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+        yield Possibility(node.span, f"{node.path}: body", started(node.children[0]))
+
+    @property
+    def numbers(self) -> tuple[Counted, ...]:
+        return Counted("'persist'", self.most, 1), Counted("'gap'", self.gap, 0)
+
+
+def declare() -> None:
+    kind("persist", PersistTask, {"do": "What is done.", "gap": "Time between two tries."})(Persist)
+
+
+@pytest.fixture(autouse=True)
+def persist() -> Iterator[None]:
+    """Register the kind for one test."""
+    before = dict(kinds())
+    declare()
+    yield
+    registry.forget("persist")
+    assert kinds() == before
+
+
+def findings(text: str) -> list[str]:
+    report = Report()
+    program = read_program(tree(text), report, ROBOT.skills)
+    if program:
+        report.extend(check_program(program, ROBOT))
+    return [finding.message for finding in report]
+
+
+def test_it_is_read_with_its_options_and_those_of_any_node() -> None:
+    assert findings(TEXT) == []
+    assert [node.path for node in program_of(TEXT).nodes] == ["do.persist", "do.persist.go_to"]
+    assert findings("do: {persist: 2, gab: 1 s, do: a}") == [
+        "'gap' needs a duration, such as '5 s'",
+        "unknown key 'gab' beside 'persist'",
+    ]
+
+
+def test_checks_ask_it() -> None:
+    assert findings("do: {persist: 0, gap: 1 s, do: a}") == ["'persist' must be above zero to have a meaning"]
+    assert findings("do: {persist: 2, gap: 1 s, do: {wait: 1 s}, optional: true}") == [
+        "'optional' changes nothing here: 'persist' cannot fail"
+    ]
+    assert findings("do: {persist: 2, gap: 1 s, do: {go_to: dock, once: true}}") == []  # it comes again
+    assert findings("do: {persist: 2, gap: 1 s, do: a, save: x}") == ["'persist' has no result to keep"]
+
+
+def test_it_runs_is_saved_and_is_restored() -> None:
+    simulated = Simulated(program_of(TEXT), fails={"go_to": frozenset({1})})
+    simulated.advance(1.5)
+    saved = save(simulated.engine)
+    restore(simulated.engine, saved)
+    assert save(simulated.engine) == saved
+    assert simulated.advance(10) == SUCCEEDS
+    assert simulated.now == 3.0
+    assert Simulated(program_of(TEXT), fails={"go_to": frozenset({1, 2})}).advance(10) == "failure"
+
+
+def test_coverage_counts_its_ways() -> None:
+    seen, coverage = Seen(), Coverage()
+    simulated = Simulated(program_of(TEXT), settings=Settings(observer=seen))
+    simulated.advance(10)
+    for _, event in simulated.events:
+        seen.hear(event)
+    coverage.add(link(simulated.program, {}), ROBOT, seen.keys)
+    assert "do.persist: body" in {way.text for way in coverage.taken}
+    assert {way.text for way in coverage.missing} == {"do.persist.go_to: failure"}
+
+
+def test_it_is_drawn() -> None:
+    picture = picture_of(program_of(TEXT), ROBOT)
+    assert mission_text(picture).splitlines()[1:] == ["persist 2, 1 s  (timeout 1 min)", "  go_to dock"]
+    assert '<i class="sign">∞</i>' in mission_html(picture)
+
+
+def test_it_is_explored() -> None:
+    explored = explore(program_of(TEXT), ROBOT, {}, Limits())
+    assert set(explored.ends) == {"success", "failure"}
+    assert explored.found == []
+    assert not explored.is_cut
+
+
+def test_it_has_a_schema() -> None:
+    made, needed = kind_schema(kinds()["persist"])
+    assert needed == ["do", "gap", "persist"]
+    assert made["persist"]["description"] == "Do the body until it has succeeded once."
+    assert made["gap"]["description"] == "Time between two tries."
+
+
+class SilentTask(Task):
+    """Does nothing."""
+
+    def __init__(self, site: Site, step: Silent) -> None:
+        super().__init__(site)
+
+    def begin(self) -> int:
+        return SUCCESS
+
+
+class Silent(Deed):
+    """Answers nothing but what its family does."""
+
+    __slots__ = ()
+
+
+def test_a_kind_that_leaves_something_unanswered_is_refused_and_a_type_error() -> None:
+    with pytest.raises(TypeError, match="the kind 'silent' does not answer effects, may_end, read"):
+        kind("silent", SilentTask)(Silent)  # type: ignore[type-abstract]
+    with pytest.raises(TypeError, match="abstract"):
+        Silent()  # type: ignore[abstract]
+    assert "silent" not in kinds()
+
+
+def test_nothing_of_it_is_left() -> None:
+    registry.forget("persist")
+    assert findings("do: {persist: dock}") == ["mission '' uses a skill that nobody provides: 'persist'"]
+    declare()
