@@ -20,7 +20,7 @@ from rbxcompose.manifest.first_line import KEY, first_line
 from rbxcompose.manifest.repairs import changed, repaired
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import dimension_at, keys_at
-from rbxcompose.manifest.tree import Mapping, Node, Path, Scalar, Sequence, at, key_span, value_span
+from rbxcompose.manifest.tree import BROKEN, Mapping, Node, Path, Scalar, Sequence, at, key_span, value_span
 from rbxcompose.plain import plain
 from rbxcompose.units import Quantity, UnitError, format_quantity
 
@@ -141,9 +141,6 @@ components:
 ```
 """,
 )
-
-BROKEN = object()
-"""What `Scalar.filled` holds if filling it in failed: that was said, and nothing more is said of the value."""
 
 T = TypeVar("T")
 KEYS = "keys that it takes"

@@ -8,28 +8,23 @@ from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Entry, Scalar
 from rbxcompose.manifest.tree import Mapping as Tree
 from rbxcompose.missions import codes
+from rbxcompose.missions.grammar import Takes, is_told
 from rbxcompose.missions.history import WithHistory
-from rbxcompose.missions.machines import ENDS, MachineOptions, Next, StateOptions
+from rbxcompose.missions.machines import ENDS, MACHINE_KEYS, MachineOptions, Next, StateOptions
 from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.state_names import with_names
 from rbxcompose.missions.statuses import FAILURE, NAMES, SUCCESS
 from rbxcompose.missions.value_reader import WORDS
 
-MACHINE_KEYS = ("start", "states", "ends", "history")
 BODIES = ("do", "machine")
 STATE_KEYS = (*BODIES, "on_enter", "on_exit", "next")
-ASKING = ("if", "then", "else", "when", "check", "choose", "cases")  # that ask, where `next` only leads
 RESULTS = (NAMES[SUCCESS], NAMES[FAILURE])
 
 
 def read_machine(reader: NodeReader) -> MachineOptions:
     """Read the map below `machine`: the first state, the states, ends and history."""
-    value = reader.map_of(reader.key, "'start' and 'states' below it")
+    value = reader.map_of(reader.key, "'start' and 'states' below it", Takes.MACHINE)
     if value is None:
         return MachineOptions()
-    value, misnamed = with_names(value)
-    for finding in misnamed:
-        reader.add(finding)
     inner = reader.inside(value, MACHINE_KEYS, "a machine")
     states = value.get("states")
     names: tuple[str, ...] = ()
@@ -93,9 +88,11 @@ def read_state(reader: NodeReader) -> StateOptions:
 
 
 def _next(reader: NodeReader) -> Next | None:
-    value = reader.mapping.get("next")
+    value = reader.take("next", Takes.NEXT)
     if value is None:
         return None
+    if is_told(value):
+        return Next(dict(zip(RESULTS, ENDS, strict=True)))  # so that nothing else is said of where it leads
     if isinstance(value, Scalar) and value.text:
         return Next({"": value.text}, {"": value.span})
     if not isinstance(value, Tree) or not value.entries:
@@ -106,14 +103,6 @@ def _next(reader: NodeReader) -> Next | None:
             )
         )
         return Next()
-    if asking := next((entry.key for word, entry in value.entries.items() if word in ASKING), None):
-        help_text = (
-            "let a 'check' be the last step of this state, and write below 'next' where 'success' and 'failure' lead"
-        )
-        reader.add(
-            codes.WRONG_SHAPE.at(asking.span, f"'next' cannot ask: there is no '{asking.text}' in it", help=help_text)
-        )
-        return Next(dict(zip(RESULTS, ENDS, strict=True)))  # so that nothing else is said of where it leads
     to: dict[str, str] = {}
     spans: dict[str, Span] = {}
     for outcome, entry in value.entries.items():

@@ -27,6 +27,7 @@ BASE = {
     "restarts",
     "rules",
     "scheduler",
+    "slips",
 }
 CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}
 MAY_IMPORT: dict[str, set[str]] = {
