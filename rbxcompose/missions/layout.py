@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from functools import cache
 
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import Entry, Node
 from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.missions.grammar import Slot, Takes, Words
+from rbxcompose.missions.grammar import BELOW, Slot, Takes, Words
 from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
 from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.registry import kinds
@@ -68,7 +68,7 @@ def kind_slots() -> Mapping[str, Mapping[str, Slot]]:
 @cache
 def modifier_slots() -> Mapping[str, Slot]:
     """Return what the keys of all modifiers take, those of states among them."""
-    found: dict[str, Slot] = {}
+    found: dict[str, Slot] = {"name": Slot(Takes.OTHER)}
     for name, cls in modifiers().items():
         asking = _Asking(name)
         cls.read(asking, name)
@@ -76,7 +76,19 @@ def modifier_slots() -> Mapping[str, Slot]:
     return found
 
 
-def words(skills: Collection[str] = ()) -> Words:
+@cache
+def words(skills: frozenset[str] = frozenset()) -> Words:
     """Return the words that mean something in the missions of a robot with these skills."""
-    of_steps = {key: modifier_slots()[key] for key in modifier_keys()}
-    return Words(kind_slots(), {"name": Slot(Takes.OTHER), **of_steps}, skills)
+    return Words(kind_slots(), {key: modifier_slots()[key] for key in ("name", *modifier_keys())}, skills)
+
+
+@cache
+def step_slots(kind: str) -> Mapping[str, Slot]:
+    """Return what the keys of a step of a kind take, with its modifiers; of a skill, if it is of none."""
+    return {**words().modifiers, **kind_slots().get(kind, {})}
+
+
+@cache
+def state_slots() -> Mapping[str, Slot]:
+    """Return what the keys of a state take, with its modifiers."""
+    return {**modifier_slots(), **BELOW[Takes.STATE]}

@@ -9,7 +9,7 @@ from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Key, Node, Scalar, with_children
 from rbxcompose.manifest.tree import Mapping as Tree
 from rbxcompose.missions.grammar import BELOW, EACH, LEVELS, Place, Slot, Takes, Words, is_empty, long_form
-from rbxcompose.missions.layout import modifier_slots, words
+from rbxcompose.missions.layout import state_slots, step_slots, words
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import repaired
 
@@ -24,7 +24,7 @@ class Repairs:
     @classmethod
     def of(cls, report: Report, skills: Collection[str]) -> Repairs:
         """Return what repairs a mission of a robot with these skills, as far as they are known."""
-        return cls(report, words(skills))
+        return cls(report, words(frozenset(skills)))
 
     def mission(self, root: Tree) -> Tree:
         """Return the tree of a mission without slips."""
@@ -46,15 +46,17 @@ class Repairs:
 
         def below(name: Key, child: Node) -> Node:
             inner = slots.get(str(name)) or slots.get(EACH)
+            if inner is None or inner.takes is Takes.OTHER:
+                return child
             behind = node.entries[str(name)].key if isinstance(node, Tree) else key
-            return self._node(inner, behind, child, inside) if inner else child
+            return self._node(inner, behind, child, inside)
 
         return with_children(node, below) if slots else node
 
     def _below(self, takes: Takes, node: Node) -> Mapping[str, Slot]:
         """Return what stands below a node, by key."""
         if takes is Takes.STATE:
-            return {**modifier_slots(), **BELOW[takes]}
+            return state_slots()
         if takes is Takes.STEP and isinstance(node, Tree):
-            return {**self.words.modifiers, **self.words.kinds.get(self.words.kind_of(node), {})}
+            return step_slots(self.words.kind_of(node))
         return BELOW.get(takes, {})

@@ -19,7 +19,7 @@ _DASH = "- "
 @slip(Takes.STEP, after=(tight_dashes, misspelt_kind, keys_outside_their_machine), before=(unknown_settings,))
 def second_step(place: Place, node: Node) -> Repair[Node] | None:
     """Recognise keys that are steps of their own; only the first one is read here."""
-    if not isinstance(node, Mapping):
+    if not isinstance(node, Mapping) or len(place.words.own(node)) < 2:
         return None
     kind = place.words.kind_of(node)
     slots = place.words.kinds.get(kind, {})

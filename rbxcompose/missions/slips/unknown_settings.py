@@ -38,7 +38,8 @@ def unknown_settings(place: Place, node: Node) -> Repair[Node] | None:
     unknown = unknown_in(node, place.words) if isinstance(node, Tree) else set()
     if not unknown or not isinstance(node, Tree):
         return None
-    findings = tuple(_finding(node, key, place.words) for key in node.entries if key in unknown)
+    kind = place.words.kind_of(node)
+    findings = tuple(_finding(node, kind, key, place.words) for key in node.entries if key in unknown)
     left = Tree({key: entry for key, entry in node.entries.items() if key not in unknown}, node.span)
     return Repair(left if place.words.own(left) else without_word(left, place.words), findings)
 
@@ -68,9 +69,8 @@ def _is_only_option(key: str, words: Words) -> bool:
     return words.is_option(key) and key not in words.kinds
 
 
-def _finding(step: Tree, key: str, words: Words) -> Finding:
+def _finding(step: Tree, kind: str, key: str, words: Words) -> Finding:
     """Return the finding about a key that is no setting, with the one that was meant."""
-    kind = words.kind_of(step)
     beside = f"'{kind}'" if kind else "a skill"
     span, message = step.entries[key].key.span, f"unknown key '{key}' beside {beside}"
     if not kind and words.is_option(key):
