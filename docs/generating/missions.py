@@ -14,6 +14,7 @@ from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions.asked import Asked, Assignment
 from rbxcompose.missions.goals import skill_of, topic_skill
+from rbxcompose.missions.grammar import Takes
 from rbxcompose.missions.messages import Message
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.moments import Moments
@@ -45,7 +46,7 @@ class Told(Asking):
         super().__init__(key)
         self.words: dict[str, str] = {}
 
-    def scalar(self, key: str, what: str) -> Scalar | None:
+    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Scalar | None:
         """Note a word."""
         self.words[key] = what
         return super().scalar(key, what)
@@ -60,7 +61,7 @@ class Told(Asking):
         self.words[key] = " or ".join(["a whole number", *map(code, words)])
         return super().count_or(key, words)
 
-    def map_of(self, key: str, what: str) -> None:
+    def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> None:
         """Note a map."""
         self.words[key] = what
         super().map_of(key, what)

@@ -8,8 +8,7 @@ from rbxcompose.lsp.definition import word_at
 from rbxcompose.lsp.document import Document, Spot
 from rbxcompose.lsp.names import PLACE, SKILL, below_profile, named_by_value
 from rbxcompose.lsp.variables import fills, variables
-from rbxcompose.manifest.tree import Path, Scalar, at
-from rbxcompose.manifest.validate import BROKEN
+from rbxcompose.manifest.tree import BROKEN, Path, Scalar, at
 from rbxcompose.model.robot import Robot
 from rbxcompose.units import Quantity, format_quantity
 

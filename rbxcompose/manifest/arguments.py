@@ -11,9 +11,8 @@ from rbxcompose.config import Config, Secret
 from rbxcompose.expressions.types import TYPES, Type, TypeKind, choice_of
 from rbxcompose.findings import Report
 from rbxcompose.manifest.scalars import describe
-from rbxcompose.manifest.tree import Mapping, Node, Path, Scalar, Sequence, key_span
+from rbxcompose.manifest.tree import BROKEN, Mapping, Node, Path, Scalar, Sequence, key_span
 from rbxcompose.manifest.validate import (
-    BROKEN,
     MISSING_KEY,
     NOT_A_CHOICE,
     OUT_OF_RANGE,

@@ -7,8 +7,7 @@ import re
 from rbxcompose.findings import Fix, replacement
 from rbxcompose.manifest.tree import Node, Scalar
 
-ITEM = r"[A-Za-z0-9_.$+-]+(?: [A-Za-z0-9_.%/]+)?"  # a word, a name, a number with its unit
-_ITEMS = re.compile(rf"\s*{ITEM}\s*(?:,\s*{ITEM}\s*)*,?\s*")
+_ITEM = re.compile(r"\s*+([A-Za-z0-9_.$+-]++(?: [A-Za-z0-9_.%/]++)?)\s*+")  # a word, a name, a number with its unit
 
 
 def without_brackets(node: Node | None) -> list[tuple[str, int]]:
@@ -19,16 +18,18 @@ def without_brackets(node: Node | None) -> list[tuple[str, int]]:
     if not isinstance(node, Scalar) or not node.plain or node.filled is not None or not node.text:
         return []
     start, end = (1, -1) if node.text[0] == "(" and node.text[-1] == ")" else (0, None)
-    inner = node.text[start:end]
-    if not _ITEMS.fullmatch(inner):
-        return []
-    return [(found.group(), start + found.start()) for found in re.finditer(ITEM, inner)]
+    pieces = node.text[start:end].split(",")
+    found = []
+    for piece in pieces[:-1] if len(pieces) > 1 and not pieces[-1].strip() else pieces:
+        item = _ITEM.fullmatch(piece)
+        if item is None:
+            return []
+        found.append((item[1], start + item.start(1)))
+        start += len(piece) + 1
+    return found
 
 
-def bracketed(node: Node | None) -> tuple[str, Fix | None]:
-    """Return the help for a text that lacks the brackets of a list, and its fix; nothing for any other node."""
-    items = [text for text, _ in without_brackets(node)]
-    if not items or not isinstance(node, Scalar):
-        return "", None
-    meant = f"[{', '.join(items)}]"
+def bracketed(node: Scalar) -> tuple[str, Fix]:
+    """Return the help for a text that lacks the brackets of a list, and its fix."""
+    meant = f"[{', '.join(text for text, _ in without_brackets(node))}]"
     return f"a list has brackets: write '{meant}'", replacement(node.span, node.text, meant)

@@ -15,8 +15,7 @@ from rbxcompose.manifest.files import project_of
 from rbxcompose.manifest.library import PREFIX, library_root
 from rbxcompose.manifest.models import RobotManifest
 from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, Sequence
-from rbxcompose.manifest.validate import BROKEN
+from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar, Sequence
 from rbxcompose.units import UNITS, Dimension, Quantity, UnitError, format_quantity, to_si
 
 Note = Callable[[Path, Node], str]

@@ -23,8 +23,8 @@ from rbxcompose.manifest.names import Names, NameTypes, NameValues
 from rbxcompose.manifest.parts import part_span
 from rbxcompose.manifest.scalars import describe
 from rbxcompose.manifest.secrets import NoSecretError
-from rbxcompose.manifest.tree import Entry, Node, Scalar, Sequence, size
-from rbxcompose.manifest.validate import BROKEN, to_plain
+from rbxcompose.manifest.tree import BROKEN, Entry, Node, Scalar, Sequence, size
+from rbxcompose.manifest.validate import to_plain
 from rbxcompose.plain import plain
 from rbxcompose.units import NUMBER, QUOTIENT, Quantity
 

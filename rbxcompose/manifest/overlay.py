@@ -12,9 +12,8 @@ from operator import is_
 from rbxcompose.findings import Related, Report, Span, correction, kind, suggest
 from rbxcompose.manifest.history import History, Step
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar
+from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar
 from rbxcompose.manifest.tree import Sequence as NodeSequence
-from rbxcompose.manifest.validate import BROKEN
 from rbxcompose.manifest.walk import REMOVE
 
 NOTHING_TO_CHANGE = kind(

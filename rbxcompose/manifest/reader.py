@@ -12,8 +12,8 @@ from rbxcompose.findings import Edit, Finding, Fix, Span, kind
 from rbxcompose.manifest.composing import TOO_LARGE, compose
 from rbxcompose.manifest.limits import ALL_BYTES, FILE_BYTES, FILES
 from rbxcompose.manifest.tree import Node
+from rbxcompose.manifest.trouble import NOT_YAML
 from rbxcompose.manifest.walk import CHARACTER, Walk
-from rbxcompose.manifest.yaml_errors import NOT_YAML
 from rbxcompose.plain import FORBIDDEN, code_point
 
 NOT_UTF8 = kind(

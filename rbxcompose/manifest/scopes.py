@@ -13,8 +13,8 @@ from rbxcompose.manifest.include import Instance
 from rbxcompose.manifest.layers import Composed, only
 from rbxcompose.manifest.names import Names, Typed, with_arguments
 from rbxcompose.manifest.sections import named_entries
-from rbxcompose.manifest.tree import Mapping
-from rbxcompose.manifest.validate import BROKEN, UNKNOWN_KEY
+from rbxcompose.manifest.tree import BROKEN, Mapping
+from rbxcompose.manifest.validate import UNKNOWN_KEY
 
 NO_VALUE = kind(
     "RBX1206",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from rbxcompose.findings import Span
 
 NODE_BYTES = 40  # that a node counts beside its text
+BROKEN = object()
+"""What `Scalar.filled` holds of a value of which all was said: filling it in has failed, or it was a slip."""
 
 Key = str | int
 Path = tuple[Key, ...]  # from the root of a file: ("components", "base", "max_speed") or ("do", 0, "go_to")
@@ -79,6 +81,18 @@ def children(node: Node) -> Iterator[tuple[Key, Node]]:
             yield from enumerate(items)
         case _:
             return
+
+
+def with_children(node: Node, change: Callable[[Key, Node], Node]) -> Node:
+    """Return a node with what `change` makes of each node directly below it; the same one if nothing changes."""
+    changed = {key: new for key, below in children(node) if (new := change(key, below)) is not below}
+    match node:
+        case Mapping(entries=entries) if changed:
+            new_ones = {name: Entry(one.key, changed.get(name, one.value)) for name, one in entries.items()}
+            return Mapping(new_ones, node.span, node.tag)
+        case Sequence(items=items) if changed:
+            return Sequence(tuple(changed.get(index, one) for index, one in enumerate(items)), node.span, node.tag)
+    return node
 
 
 def size(node: Node) -> int:

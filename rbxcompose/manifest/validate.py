@@ -15,12 +15,11 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from rbxcompose.findings import SIMILAR, Finding, Report, Span, correction, kind
-from rbxcompose.manifest.brackets import bracketed, without_brackets
-from rbxcompose.manifest.first_line import KEY, first_line
 from rbxcompose.manifest.repairs import changed, repaired
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import dimension_at, keys_at
-from rbxcompose.manifest.tree import Mapping, Node, Path, Scalar, Sequence, at, key_span, value_span
+from rbxcompose.manifest.slips import Refused, value_slip
+from rbxcompose.manifest.tree import BROKEN, Mapping, Node, Path, Scalar, Sequence, at, key_span, value_span
 from rbxcompose.plain import plain
 from rbxcompose.units import Quantity, UnitError, format_quantity
 
@@ -142,9 +141,6 @@ components:
 """,
 )
 
-BROKEN = object()
-"""What `Scalar.filled` holds if filling it in failed: that was said, and nothing more is said of the value."""
-
 T = TypeVar("T")
 KEYS = "keys that it takes"
 _SINGULAR = {"components": "component", "muxes": "mux", "places": "place", "args": "argument", "missions": "mission"}
@@ -225,7 +221,7 @@ def _findings(
     for loc, error in located:
         if loc not in said and not is_broken(at(node, loc)):
             said.add(loc)
-            yield _finding(model, node, path, loc, error)
+            yield _slip(model, node, path, loc, error) or _finding(model, node, path, loc, error)
 
 
 def _locate(node: Node, error: ErrorDetails) -> Path:
@@ -276,8 +272,7 @@ def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails)
     match error["type"]:
         case "missing":
             message = f"{where((*path, *loc[:-1]))} needs the key '{name}'"
-            help_text, fix = first_line(node) if (*path, *loc) == (KEY,) else ("", None)
-            return MISSING_KEY.at(key_span(node, loc[:-1]), message, help=help_text, fix=fix)
+            return MISSING_KEY.at(key_span(node, loc[:-1]), message)
         case "literal_error" | "enum":
             choices = re.findall(r"'([^']*)'|(\d+)", str(context.get("expected", "")))
             return not_a_choice(span, name, value, ["".join(choice) for choice in choices])
@@ -296,9 +291,7 @@ def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails)
             bound = format_quantity(context[key], dimension) if dimension else context[key]
             return OUT_OF_RANGE.at(span, f"'{name}' must be {words} {bound}")
         case kind_of_error if kind_of_error in _EXPECTED:
-            help_text, fix = bracketed(value) if kind_of_error in _LISTS and _is_list(model, node, loc) else ("", None)
-            message = f"'{name}' must be {_EXPECTED[kind_of_error]}"
-            return WRONG_TYPE.at(span, message, label=label_of(value), help=help_text, fix=fix)
+            return WRONG_TYPE.at(span, f"'{name}' must be {_EXPECTED[kind_of_error]}", label=label_of(value))
     if "valid" in context:  # a validator of ours, which tells what there is
         message = f"'{name}': {error['msg']}"
         return NOT_A_CHOICE.misspelt(span, message, context["name"], context["valid"], context["what"])
@@ -345,17 +338,32 @@ def unit_finding(error: UnitError, node: Node, name: str) -> Finding:
     return WRONG_TYPE.at(node.span, f"'{name}' {error.message}", label=label, help="" if is_word else error.help)
 
 
-def _is_list(model: Any, node: Node, loc: Path) -> bool:
-    """Tell whether the items that a text seems to hold are what the list at `loc` takes."""
-    items = [plain_value(Scalar(text, node.span)) for text, _ in without_brackets(at(node, loc))]
+def _slip(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails) -> Finding | None:
+    """Return the finding about a slip, if the model has nothing against what it stands for."""
+    refused_at = loc[:-1] if error["type"] == "missing" else loc
+    written = at(node, refused_at)
+    if written is None:
+        return None
+    for slip in value_slip.at(error["type"]):
+        repair = slip(Refused((*path, *loc), _finding(model, node, path, loc, error)), written)
+        if repair and _takes(model, _with(to_plain(node), refused_at, to_plain(repair.node)), loc):
+            return repair.findings[0]
+    return None
+
+
+def _with(data: object, path: Path, value: object) -> object:
+    return changed(data, path, lambda _: value)
+
+
+def _takes(model: Any, data: object, loc: Path) -> bool:
+    """Tell whether a model has nothing against what stands at `loc`."""
     try:
-        _adapter(model).validate_python(changed(to_plain(node), loc, lambda _: items))
+        _adapter(model).validate_python(data)
     except ValidationError as error:
-        return bool(items) and not any(one["loc"][: len(loc)] == loc for one in error.errors(include_url=False))
-    return bool(items)
+        return not any(one["loc"][: len(loc)] == loc for one in error.errors(include_url=False))
+    return True
 
 
-_LISTS = ("list_type", "tuple_type")
 _BOUNDS = {
     "greater_than": ("greater than", "gt"),
     "greater_than_equal": ("at least", "ge"),

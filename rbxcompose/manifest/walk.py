@@ -17,7 +17,7 @@ from rbxcompose.manifest.composing import TOO_LARGE
 from rbxcompose.manifest.limits import ALIAS_NODES, DEPTH, KEY, TEXT
 from rbxcompose.manifest.scalars import number_trouble
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
-from rbxcompose.manifest.yaml_errors import QUOTE_HELP, QUOTES_NEEDED
+from rbxcompose.manifest.trouble import QUOTE_HELP, QUOTES_NEEDED
 from rbxcompose.plain import FORBIDDEN, code_point, plain
 
 TWICE = kind(

@@ -10,7 +10,7 @@ from rbxcompose.expressions.values import NotArrived, Value
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions import codes
 from rbxcompose.missions.asked import Asked
-from rbxcompose.missions.reader import Reader
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.scopes import Inner, MissionScope
 from rbxcompose.missions.statuses import FAILURE, NAMES, SKIPPED, SUCCESS
 
@@ -89,7 +89,7 @@ class BranchScope(Inner):
         return self._ended[name] if name in self._ended else self.outer.variable(name)
 
 
-def read_outcomes(reader: Reader, branches: tuple[str, ...]) -> tuple[Outcome, ...]:
+def read_outcomes(reader: NodeReader, branches: tuple[str, ...]) -> tuple[Outcome, ...]:
     """Read the outcomes of a parallel with these branches; `otherwise` comes last and must be there."""
     if not reader.has("outcomes"):
         return ()

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.places import DEEP, HISTORIES, NO_HISTORY
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.task import Task
 
 HISTORY = "Where it starts again after it was halted: `last` at the child it was in, `deep` also inside that child."
 
 
-def read_history(reader: Reader) -> str:
+def read_history(reader: NodeReader) -> str:
     """Read the option; `none` if it is not there."""
     return reader.choice("history", HISTORIES)
 

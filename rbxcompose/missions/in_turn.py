@@ -9,9 +9,9 @@ from typing import ClassVar, Self
 from rbxcompose.missions.answers import Skipped
 from rbxcompose.missions.families import Straight
 from rbxcompose.missions.history import HISTORY, WithHistory, read_history
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, FAILS, NEVER, Outcomes
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.statuses import FAILURE, IDLE, RUNNING, SKIPPED
 from rbxcompose.missions.task import Site
 from rbxcompose.missions.watching import Watched
@@ -37,7 +37,7 @@ class InTurn(Straight):
     decides: ClassVar[str]
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the list and its options."""
         reader.steps()
         reactive = reader.flag("reactive") if reader.has("reactive") else False

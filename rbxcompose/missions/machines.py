@@ -11,6 +11,7 @@ from rbxcompose.missions.statuses import FAILURE, NAMES, SUCCESS
 FINISHED, FAILED = "finished", "failed"
 ENDS: Mapping[str, str] = {FINISHED: NAMES[SUCCESS], FAILED: NAMES[FAILURE]}  # those that always exist
 STATE = "state"
+MACHINE_KEYS = ("start", "states", "ends", "history")
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ from rbxcompose.expressions.tree import Expression
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions.answers import Advice, Counted, Serves
 from rbxcompose.missions.moments import Moments
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import Outcomes
-from rbxcompose.missions.reader import Reader
 
 
 class Modifier(ABC):
@@ -24,7 +24,7 @@ class Modifier(ABC):
 
     @classmethod
     @abstractmethod
-    def read(cls, reader: Reader, key: str) -> Self:
+    def read(cls, reader: NodeReader, key: str) -> Self:
         """Read the modifier's value."""
 
     @abstractmethod

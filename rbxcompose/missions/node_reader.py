@@ -8,26 +8,18 @@ from dataclasses import replace
 from rbxcompose.expressions.text import Template, parse_template
 from rbxcompose.expressions.tree import Expression, ExpressionError
 from rbxcompose.expressions.types import UNKNOWN
-from rbxcompose.findings import Span, replacement
-from rbxcompose.manifest.brackets import bracketed, without_brackets
+from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
-from rbxcompose.missions.adrift import among_branches
 from rbxcompose.missions.asked import Argument, Asked, Assignment
-from rbxcompose.missions.assigning import EXAMPLE, read_line
-from rbxcompose.missions.dashes import needs_dashes, steps_of
-from rbxcompose.missions.hook_slips import is_step, step_in_hook, without_dashes
+from rbxcompose.missions.grammar import Takes, is_told
 from rbxcompose.missions.messages import Message, Shape, Written
-from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.moments import DEEDS, LEVELS, OPTIONS, Deeds, Moments
-from rbxcompose.missions.naming import NAME, no_name
-from rbxcompose.missions.reader import Reader
-from rbxcompose.missions.registry import kinds
-from rbxcompose.missions.spans import expression_of, inner_span
-from rbxcompose.missions.value_reader import Nodes, read_expression
+from rbxcompose.missions.spans import expression_of
+from rbxcompose.missions.value_reader import Nodes, ValueReader, read_expression
 
 
-class NodeReader(Reader):
+class NodeReader(ValueReader):
     """One mapping of a mission, being read, with the nodes below it."""
 
     def __init__(self, mapping: Mapping, key: str, number: int, nodes: Nodes) -> None:
@@ -36,12 +28,13 @@ class NodeReader(Reader):
         self.children: list[int] = []
         self.item = ""
 
-    def map_of(self, key: str, what: str) -> Mapping | None:
+    def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Mapping | None:
         """Return an option that must be a map with entries; None, and a finding, if it is not."""
-        value = self.mapping.get(key)
+        value = self.take(key, takes)
         if isinstance(value, Mapping) and value.entries:
             return value
-        self.add(codes.WRONG_SHAPE.at(self.key_span(key), f"'{key}' needs {what}"))
+        if not is_told(value):
+            self.add(codes.WRONG_SHAPE.at(self.key_span(key), f"'{key}' needs {what}"))
         return None
 
     def inside(self, mapping: Mapping, keys: Iterable[str], what: str) -> NodeReader:
@@ -67,11 +60,10 @@ class NodeReader(Reader):
 
     def branches(self) -> tuple[str, ...]:
         """Read the branches of a parallel: a list, or a map, of which the names are returned."""
-        value = self.mapping.get(self.key)
+        value = self.take(self.key, Takes.BRANCHES)
         if not isinstance(value, Mapping):
-            self.steps()
+            self._list(value)
             return ()
-        value = self._without_settings(value)
         if not value.entries:
             self.add(codes.MISSING.at(value.span, f"'{self.key}' needs at least one branch"))
         for name, entry in value.entries.items():
@@ -79,21 +71,9 @@ class NodeReader(Reader):
             self.child_node(entry.value, name)
         return tuple(value.entries)
 
-    def _without_settings(self, branches: Mapping) -> Mapping:
-        """Return the branches without what belongs beside them; that is told, and read there."""
-        own = self.mapping.entries[self.key]
-        options = kinds()[self.key].options if self.key in kinds() else ()
-        found, findings = among_branches(branches, own.key, options, modifier_keys())
-        if not found:
-            return branches
-        for finding in findings:
-            self.add(finding)
-        self.mapping = replace(self.mapping, entries={**found, **self.mapping.entries})
-        return replace(branches, entries={name: one for name, one in branches.entries.items() if name not in found})
-
     def cases(self, key: str) -> tuple[Asked, ...]:
         """Read a map from values to nodes, and return the values in the order of the children."""
-        value = self.map_of(key, "values below it, each with what is done then")
+        value = self.map_of(key, "values below it, each with what is done then", Takes.CASES)
         if value is None:
             return ()
         read = []
@@ -124,7 +104,8 @@ class NodeReader(Reader):
         return Moments({key: self._deeds(key) for key in keys if self.has(key)})
 
     def _deeds(self, key: str) -> Deeds:
-        value = self._small(key)
+        what = "something small to do: 'set', 'log' or 'publish' below it, without a dash"
+        value = self.map_of(key, what, Takes.HOOK)
         if value is None:
             return Deeds()
         inner = self.inside(value, (*DEEDS, *OPTIONS), f"'{key}'")
@@ -139,28 +120,6 @@ class NodeReader(Reader):
         )
         self.asked.extend(inner.asked)
         return deeds
-
-    def _small(self, key: str) -> Mapping | None:
-        """Return what stands below a hook, without what cannot: lists are taken apart, steps are told."""
-        value, finding = self.mapping.get(key), None
-        if isinstance(value, Sequence):
-            value, finding = without_dashes(key, value)
-        if (
-            finding
-            and isinstance(value, Mapping)
-            and not all(is_step(name, self.nodes.skills) for name in value.entries)
-        ):
-            self.add(finding)
-        word = value.text.partition(" ")[0] if isinstance(value, Scalar) and value.plain else ""
-        if isinstance(value, Scalar) and is_step(word, self.nodes.skills):
-            self.add(step_in_hook(key, replace(value, text=word)))
-            return None
-        if not isinstance(value, Mapping):
-            return self.map_of(key, "something small to do: 'set', 'log' or 'publish' below it, without a dash")
-        steps = [name for name in value.entries if is_step(name, self.nodes.skills)]
-        for name in steps:
-            self.add(step_in_hook(key, value.entries[name].key))
-        return replace(value, entries={name: one for name, one in value.entries.items() if name not in steps})
 
     def _shape(self, node: Node) -> Shape:
         match node:
@@ -183,7 +142,7 @@ class NodeReader(Reader):
 
     def child(self, key: str) -> None:
         """Read the node under a key, which must be there."""
-        value = self.mapping.get(key)
+        value = self.take(key, Takes.STEP)
         if value is None or (isinstance(value, Scalar) and value.plain and not value.text):
             span = self.key_span(key) if value else self.span
             self.nodes.add(codes.MISSING.at(span, f"'{self.key}' needs '{key}': what is to be done"))
@@ -192,45 +151,24 @@ class NodeReader(Reader):
 
     def steps(self) -> None:
         """Read the list that is the kind's value."""
-        value = self.mapping.get(self.key)
-        if isinstance(value, Sequence) and value.items:
-            for index, item in enumerate(value.items):
-                self.children.append(self.nodes.child(item, str(index), self.number))
-        elif isinstance(value, Sequence):
-            self.nodes.add(codes.MISSING.at(value.span, f"'{self.key}' needs at least one step"))
-        else:
-            self._undashed(value)
+        self._list(self.take(self.key, Takes.STEPS))
 
-    def _undashed(self, value: Node | None) -> None:
-        """Tell that steps have no dashes, and read them all the same."""
-        settings = {*modifier_keys(), "name", *(option for kind in kinds().values() for option in kind.options)}
-        key = Scalar(self.key, self.span)
-        self.add(needs_dashes(key, value, settings, self.nodes.skills))
-        for index, step in enumerate(steps_of(value, settings) if isinstance(value, Mapping) and value.entries else ()):
-            self.child_node(step, str(index))
+    def _list(self, value: Node | None) -> None:
+        items = value.items if isinstance(value, Sequence) else ()
+        for index, item in enumerate(items):
+            self.child_node(item, str(index))
+        if value and not items and not is_told(value):
+            self.add(codes.MISSING.at(value.span, f"'{self.key}' needs at least one step"))
 
     def item_name(self) -> None:
         """Read the name that the nodes below give to a loop's item."""
-        scalar = self.scalar(self.key, "a name for the item")
-        if scalar and not NAME.fullmatch(scalar.text):
-            bare = scalar.text[1:] if scalar.text.startswith("$") and NAME.fullmatch(scalar.text[1:]) else ""
-            finding = no_name(scalar)
-            if bare:
-                fix = replacement(scalar.span, scalar.text, bare)
-                finding = replace(finding, help=f"write '{bare}' without '$'", fix=fix)
-            self.add(finding)
-            self.item = scalar.text[1:] if NAME.fullmatch(scalar.text[1:]) else ""
-        elif scalar:
+        scalar = self.scalar(self.key, "a name for the item", Takes.ITEM_NAME)
+        if scalar and self.check_name(scalar):
             self.item = scalar.text
 
     def items(self, key: str) -> Expression | tuple[Expression, ...]:
         """Read a list that is written out, or an expression that gives one (of a map: its keys)."""
-        value = self.mapping.get(key)
-        if isinstance(value, Scalar) and len(found := without_brackets(value)) > 1:
-            help_text, fix = bracketed(value)
-            self.add(codes.WRONG_SHAPE.at(value.span, f"'{key}' needs a list", help=help_text, fix=fix))
-            pieces = [Scalar(text, inner_span(value, start, start + len(text))) for text, start in found]
-            value = Sequence(tuple(pieces), value.span)
+        value = self.take(key, Takes.ITEMS)
         if not isinstance(value, Sequence):
             expression = self.expression(key, UNKNOWN, "a list")
             self.nodes.loop(self.item, expression)
@@ -245,15 +183,12 @@ class NodeReader(Reader):
 
     def assignments(self, key: str) -> tuple[Assignment, ...]:
         """Read a map from names of data to expressions."""
-        value = self.mapping.get(key)
-        if isinstance(value, Scalar):
-            value, finding = read_line(Scalar(key, self.key_span(key)), value)
-            self.add(finding)
-            if value is None:
-                return ()
+        value = self.take(key, Takes.ASSIGNMENTS)
+        if is_told(value):
+            return ()
         if not isinstance(value, Mapping) or not value.entries:
             message = f"'{key}' needs names and their values"
-            help_text = f"write {EXAMPLE} on the line below '{key}:', further right and without a dash"
+            help_text = f"write 'name: value' on the line below '{key}:', further right and without a dash"
             self.nodes.add(codes.WRONG_SHAPE.at(self.key_span(key), message, help=help_text))
             return ()
         inner = NodeReader(value, key, self.number, self.nodes)

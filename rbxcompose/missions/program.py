@@ -23,10 +23,10 @@ from rbxcompose.missions.look import Look
 from rbxcompose.missions.machines import Next, States
 from rbxcompose.missions.modifier import Modifier
 from rbxcompose.missions.moments import Effects
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import Outcomes
 from rbxcompose.missions.places import NO_HISTORY
 from rbxcompose.missions.possible import Possibility
-from rbxcompose.missions.reader import Reader
 
 ROOT = 0  # number of the node under `do`
 RATE = 20.0  # [Hz] of conditions that nothing announces
@@ -122,7 +122,7 @@ class Step(ABC):
 
     @classmethod
     @abstractmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the kind's value and options."""
 
     @abstractmethod

@@ -8,10 +8,10 @@ from dataclasses import replace
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Finding, Related, Report, Span
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
 from rbxcompose.missions import codes, program
-from rbxcompose.missions.adrift import settled
 from rbxcompose.missions.asked import Asked
+from rbxcompose.missions.grammar import LEVELS, Takes, long_form
 from rbxcompose.missions.header import read_data, read_inputs, read_rate
 from rbxcompose.missions.held import ITEM, Pattern, matching, pattern_of, with_held
 from rbxcompose.missions.keys import find_key
@@ -21,15 +21,12 @@ from rbxcompose.missions.naming import NAME, NAME_HELP, no_name
 from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.program import AFTERWARDS, RESTART, Interrupt, Program, Target
 from rbxcompose.missions.registry import SKILL, Kind, all_kinds, kinds
-from rbxcompose.missions.restart_slips import restart_in_line
-from rbxcompose.missions.spans import inner_span
-from rbxcompose.missions.state_reading import MACHINE_KEYS, STATE_KEYS, as_state
+from rbxcompose.missions.repair import Repairs
+from rbxcompose.missions.state_reading import STATE_KEYS, as_state
 
 BODIES = ("do", "machine")
 KEYS = ("rbx", "kind", "name", "about", "inputs", "data", "outputs", "interrupts", "rate", *BODIES)
 INTERRUPT_KEYS = ("when", "do", "afterwards")
-LEVELS = 40  # of nodes within nodes
-LIST = "sequence"  # what a list is
 
 
 def read_program(root: Mapping, report: Report, skills: Collection[str] = ()) -> Program | None:
@@ -38,14 +35,15 @@ def read_program(root: Mapping, report: Report, skills: Collection[str] = ()) ->
     What could not be read is left out of the program, so that the rest can be checked; it may run only if the report
     has no errors.
     """
-    whole, root = root, settled(root, KEYS, MACHINE_KEYS, report)
+    repairs = Repairs.of(report, skills)
+    whole, root = root, repairs.mission(root)
     for name, entry in root.entries.items():
         if name not in KEYS:
             message = f"unknown key '{name}' in a mission"
             report.add(
                 codes.UNKNOWN_KEY.misspelt(entry.key.span, message, name, KEYS, "keys of a mission", taken=root.entries)
             )
-    reader = _Reader(report, root, skills)
+    reader = _Reader(report, root, repairs)
     inputs, data = read_inputs(root.get("inputs"), report), read_data(root.get("data"), report)
     body = _body(root, report)
     if body is None:
@@ -88,23 +86,12 @@ def _text(root: Mapping, key: str) -> str:
     return value.text if isinstance(value, Scalar) else ""
 
 
-def _as_mapping(node: Node) -> Mapping:
-    """Return the long form of a node: a list is a sequence, a word is a skill without arguments."""
-    match node:
-        case Mapping():
-            return node
-        case Sequence(span=span):
-            return Mapping({LIST: Entry(Scalar(LIST, span), node)}, span)
-        case Scalar(text=text, span=span):
-            return Mapping({text: Entry(node, Scalar("", span))}, span)
-
-
 class _Reader:
     """Numbers the nodes in the order of the text, and keeps where it is."""
 
-    def __init__(self, report: Report, root: Mapping, skills: Collection[str]) -> None:
+    def __init__(self, report: Report, root: Mapping, repairs: Repairs) -> None:
         self.report = report
-        self.skills = skills
+        self.repairs = repairs
         data = root.get("data")
         self.data = {name: entry.value for name, entry in data.entries.items()} if isinstance(data, Mapping) else {}
         self.patterns: dict[str, Pattern] = {}  # where in the data the items of loops stand
@@ -121,13 +108,13 @@ class _Reader:
         """Read a node and all below it, and return its number."""
         number = len(self.nodes)
         self.nodes.append(None)
-        mapping = _as_mapping(node)
+        mapping = long_form(node)
         if len(self.paths) == LEVELS:
             self.add(codes.TOO_DEEP.at(node.span, f"more than {LEVELS} levels of steps"))
             mapping = Mapping(span=node.span)
             key, kind = "", None
         else:
-            key, kind = find_key(mapping, self, self.skills)
+            key, kind = find_key(mapping, self)
         name = self.name_of(mapping)
         self.paths.append(self.path_of(step, name or (kind.name if kind else key), bool(name)))
         self.nodes[number] = self.read(NodeReader(mapping, key, number, self), kind, parent, name)
@@ -165,7 +152,7 @@ class _Reader:
         numbers = []
         for key, node in found:
             self.found[key] = node
-            number = self.child(node, ".".join(key), parent)
+            number = self.child(self.repairs.step(node, len(self.paths)), ".".join(key), parent)
             read = self.nodes[number]
             if read:
                 self.nodes[number] = replace(read, held=key)
@@ -282,11 +269,7 @@ class _Reader:
 
     def afterwards(self, reader: NodeReader) -> tuple[str, Scalar | None]:
         """Read what comes after a reaction: a word, or `restart` with the name of what begins anew."""
-        value = reader.mapping.get("afterwards")
-        if isinstance(value, Scalar) and (finding := restart_in_line(reader.mapping.entries["afterwards"].key, value)):
-            self.add(finding)
-            name = value.text.split()[-1]
-            return RESTART, Scalar(name, inner_span(value, len(value.text) - len(name), len(value.text)))
+        value = reader.take("afterwards", Takes.AFTERWARDS)
         if not isinstance(value, Mapping):
             return reader.choice("afterwards", AFTERWARDS), None
         inner = reader.inside(value, (RESTART,), "'afterwards'")

@@ -8,29 +8,24 @@ from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Entry, Scalar
 from rbxcompose.manifest.tree import Mapping as Tree
 from rbxcompose.missions import codes
+from rbxcompose.missions.grammar import Takes, is_told
 from rbxcompose.missions.history import read_history
-from rbxcompose.missions.machines import ENDS, Next, States
+from rbxcompose.missions.machines import ENDS, MACHINE_KEYS, Next, States
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.places import NO_HISTORY
-from rbxcompose.missions.reader import Reader
-from rbxcompose.missions.state_names import with_names
 from rbxcompose.missions.statuses import FAILURE, NAMES, SUCCESS
 from rbxcompose.missions.value_reader import WORDS
 
-MACHINE_KEYS = ("start", "states", "ends", "history")
 BODIES = ("do", "machine")
 STATE_KEYS = (*BODIES, "on_enter", "on_exit", "next")
-ASKING = ("if", "then", "else", "when", "check", "choose", "cases")  # that ask, where `next` only leads
 RESULTS = (NAMES[SUCCESS], NAMES[FAILURE])
 
 
-def read_machine(reader: Reader) -> tuple[States, str]:
+def read_machine(reader: NodeReader) -> tuple[States, str]:
     """Read the map below `machine`: the first state, the states and ends; and the history."""
-    value = reader.map_of(reader.key, "'start' and 'states' below it")
+    value = reader.map_of(reader.key, "'start' and 'states' below it", Takes.MACHINE)
     if value is None:
         return States(), NO_HISTORY
-    value, misnamed = with_names(value)
-    for finding in misnamed:
-        reader.add(finding)
     inner = reader.inside(value, MACHINE_KEYS, "a machine")
     states = value.get("states")
     names: tuple[str, ...] = ()
@@ -53,7 +48,7 @@ def read_machine(reader: Reader) -> tuple[States, str]:
     return States(start.text if start else "", names, ends, start.span if start else None), history
 
 
-def _ends(inner: Reader, states: tuple[str, ...]) -> Mapping[str, str]:
+def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:
     """Read the ends with what each counts as; `finished` and `failed` are always there."""
     value = inner.mapping.get("ends")
     if value is None:
@@ -78,7 +73,7 @@ def _ends(inner: Reader, states: tuple[str, ...]) -> Mapping[str, str]:
     return read
 
 
-def read_state(reader: Reader) -> Next | None:
+def read_state(reader: NodeReader) -> Next | None:
     """Read the body of a state and where it leads to."""
     bodies = [key for key in BODIES if reader.has(key)]
     if len(bodies) == len(BODIES):
@@ -93,10 +88,12 @@ def read_state(reader: Reader) -> Next | None:
     return _next(reader)
 
 
-def _next(reader: Reader) -> Next | None:
-    value = reader.mapping.get("next")
+def _next(reader: NodeReader) -> Next | None:
+    value = reader.take("next", Takes.NEXT)
     if value is None:
         return None
+    if is_told(value):
+        return Next(dict(zip(RESULTS, ENDS, strict=True)))  # so that nothing else is said of where it leads
     if isinstance(value, Scalar) and value.text:
         return Next({"": value.text}, {"": value.span})
     if not isinstance(value, Tree) or not value.entries:
@@ -107,14 +104,6 @@ def _next(reader: Reader) -> Next | None:
             )
         )
         return Next()
-    if asking := next((entry.key for word, entry in value.entries.items() if word in ASKING), None):
-        help_text = (
-            "let a 'check' be the last step of this state, and write below 'next' where 'success' and 'failure' lead"
-        )
-        reader.add(
-            codes.WRONG_SHAPE.at(asking.span, f"'next' cannot ask: there is no '{asking.text}' in it", help=help_text)
-        )
-        return Next(dict(zip(RESULTS, ENDS, strict=True)))  # so that nothing else is said of where it leads
     to: dict[str, str] = {}
     spans: dict[str, Span] = {}
     for outcome, entry in value.entries.items():

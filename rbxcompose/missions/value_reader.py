@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import replace
 from typing import Protocol
 
 from rbxcompose.expressions.text import Slot, Template, parse_template
@@ -14,8 +12,8 @@ from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
 from rbxcompose.missions.asked import Asked
+from rbxcompose.missions.grammar import Takes, is_told
 from rbxcompose.missions.naming import NAME, no_name
-from rbxcompose.missions.other_words import ENDLESS, FLAGS, digits_of, in_digits, not_our_word
 from rbxcompose.missions.spans import expression_of, inner_span
 from rbxcompose.units import NUMBER, TIME
 
@@ -28,9 +26,6 @@ UNREADABLE = Expression("", Number(0, 0, 0.0, NUMBER))
 
 class Nodes(Protocol):
     """Who reads the nodes below, and keeps the findings."""
-
-    skills: Collection[str]
-    """Those of the robot, as far as they are known."""
 
     def child(self, node: Node, step: str, parent: int) -> int:
         """Read a node below `parent` and return its number; `step` is the next part of its path."""
@@ -86,9 +81,15 @@ class ValueReader:
         entry = self.mapping.entries.get(key)
         return entry.key.span if entry else self.mapping.span
 
-    def scalar(self, key: str, what: str) -> Scalar | None:
+    def take(self, key: str, takes: Takes = Takes.OTHER, choices: tuple[str, ...] = ()) -> Node | None:
+        """Return the value of a key, at which the grammar takes this, or one of some words."""
+        return self.mapping.get(key)
+
+    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Scalar | None:
         """Return an option that must be one word, number or text; None, and a finding, if it is not."""
-        value = self.mapping.get(key)
+        value = self.take(key, takes)
+        if is_told(value):
+            return None
         if isinstance(value, Scalar) and (value.text or not value.plain):
             return value
         if value is None or isinstance(value, Scalar):
@@ -119,23 +120,17 @@ class ValueReader:
 
     def count_or(self, key: str, words: tuple[str, ...]) -> Expression | str:
         """Read a whole number, or one of some words."""
-        value = self.mapping.get(key)
+        value = self.take(key, Takes.COUNT, words)
         if isinstance(value, Scalar) and value.text in words:
             return value.text
-        if isinstance(value, Scalar) and ENDLESS.get(value.text) in words:
-            self.add(not_our_word(value, f"'{key}' cannot be '{value.text}'", ENDLESS))
-            return FOREVER
-        if isinstance(value, Scalar) and (digits := digits_of(value)):
-            self.add(in_digits(value, key, digits))
-            return self._asked(replace(value, text=digits), COUNT)
         return self.expression(key, COUNT, f"a number or {' or '.join(repr(word) for word in words)}")
 
     def flag(self, key: str) -> bool:
         """Read `true` or `false`."""
-        scalar = self.scalar(key, "'true' or 'false'")
+        scalar = self.scalar(key, "'true' or 'false'", Takes.FLAG)
         value = scalar and (plain_value(scalar) if scalar.filled is None else scalar.filled)
         if scalar and not isinstance(value, bool):
-            self.add(not_our_word(scalar, f"'{key}' must be true or false", FLAGS))
+            self.add(codes.NOT_A_CHOICE.at(scalar.span, f"'{key}' must be true or false"))
         return value is True
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:

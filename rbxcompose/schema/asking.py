@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 
 from rbxcompose.expressions.text import Template
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import COUNT, FLAG, UNKNOWN, Type, TypeKind
-from rbxcompose.findings import Finding
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.manifest.tree import Entry, Mapping, Scalar
 from rbxcompose.missions.asked import Asked, Assignment
+from rbxcompose.missions.grammar import Takes
+from rbxcompose.missions.layout import Nobody
 from rbxcompose.missions.messages import Message
 from rbxcompose.missions.modifier import Modifier
 from rbxcompose.missions.modifiers.registry import modifiers
@@ -37,36 +38,12 @@ MAPS: dict[str, Schema] = {  # by the key that takes the map
 }
 
 
-class _Nobody:
-    """Takes what a reader would hand on: there is nothing to be read."""
-
-    skills: Collection[str] = ()
-
-    def child(self, node: Node, step: str, parent: int) -> int:
-        """Give every node the same number."""
-        return 0
-
-    def state(self, name: str, entry: Entry, parent: int) -> int:
-        """Give every node the same number."""
-        return 0
-
-    def loop(self, item: str, expression: Expression) -> None:
-        """Note nothing."""
-
-    def held(self, expression: Expression, parent: int) -> list[int]:
-        """Find nothing."""
-        return []
-
-    def add(self, finding: Finding) -> None:
-        """Drop it: an empty mapping lacks everything."""
-
-
 class Asking(NodeReader):
     """A reader that has every key, and keeps for each the schema of what it is asked for."""
 
     def __init__(self, key: str) -> None:
         word = Scalar(key, Mapping().span)
-        super().__init__(Mapping({key: Entry(word, word)}), key, 0, _Nobody())
+        super().__init__(Mapping({key: Entry(word, word)}), key, 0, Nobody())
         self.schemas: dict[str, Schema] = {}
         self.optional: set[str] = set()
 
@@ -75,7 +52,7 @@ class Asking(NodeReader):
         self.optional.add(key)
         return True
 
-    def scalar(self, key: str, what: str) -> Scalar | None:
+    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Scalar | None:
         """Note a word."""
         self.schemas[key] = {"type": "string", "minLength": 1}
         return None
@@ -93,7 +70,7 @@ class Asking(NodeReader):
         self.schemas[key] = {**count, "pattern": pattern, "examples": [3, *words]}
         return words[0]
 
-    def map_of(self, key: str, what: str) -> Mapping | None:
+    def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Mapping | None:
         """Note a map."""
         self.schemas[key] = MAPS.get(key, {"type": "object", "minProperties": 1})
         return None

@@ -12,6 +12,7 @@ from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.manifest.models import Header
 from rbxcompose.missions.goals import skill_of, topic_skill
 from rbxcompose.missions.history import HISTORY
+from rbxcompose.missions.machines import MACHINE_KEYS
 from rbxcompose.missions.modifiers.entering import ON_ENTER
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.moments import DEEDS
@@ -19,7 +20,7 @@ from rbxcompose.missions.places import HISTORIES
 from rbxcompose.missions.program import AFTERWARDS, RESTART, Skill
 from rbxcompose.missions.reading import INTERRUPT_KEYS, KEYS
 from rbxcompose.missions.registry import kinds
-from rbxcompose.missions.state_reading import MACHINE_KEYS, RESULTS
+from rbxcompose.missions.state_reading import RESULTS
 from rbxcompose.schema.asking import (
     EXPRESSION,
     ITEM_NAME,

@@ -12,8 +12,7 @@ from rbxcompose.manifest.history import ROBOT_LAYER
 from rbxcompose.manifest.models import RobotManifest
 from rbxcompose.manifest.overlay import SET
 from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import Mapping, Node, Path, Scalar, Sequence
-from rbxcompose.manifest.validate import BROKEN
+from rbxcompose.manifest.tree import BROKEN, Mapping, Node, Path, Scalar, Sequence
 from rbxcompose.plain import plain
 from rbxcompose.units import Quantity
 

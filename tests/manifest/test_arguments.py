@@ -7,8 +7,8 @@ import pytest
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.arguments import read_argument
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping
-from rbxcompose.manifest.validate import BROKEN, to_plain
+from rbxcompose.manifest.tree import BROKEN, Mapping
+from rbxcompose.manifest.validate import to_plain
 from rbxcompose.units import SPEED, Quantity
 
 

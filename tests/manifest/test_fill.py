@@ -9,8 +9,8 @@ from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.names import Names, Typed, names_of, with_arguments
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping, Scalar
-from rbxcompose.manifest.validate import BROKEN, to_plain
+from rbxcompose.manifest.tree import BROKEN, Mapping, Scalar
+from rbxcompose.manifest.validate import to_plain
 from rbxcompose.units import LENGTH, SPEED, Quantity
 
 

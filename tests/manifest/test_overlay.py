@@ -12,8 +12,8 @@ from rbxcompose.findings import Report, Span
 from rbxcompose.manifest.history import History, Step
 from rbxcompose.manifest.overlay import compose, read_sets, settled
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, at, children, value_span
-from rbxcompose.manifest.validate import BROKEN, to_plain
+from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar, at, children, value_span
+from rbxcompose.manifest.validate import to_plain
 
 HERE = Span("f", 1, 1, 1, 2)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -135,3 +136,26 @@ def test_the_first_line_is_written_where_it_is_missing(above: str, tmp_path: Pat
 def test_the_first_line_has_no_place_within_brackets(tmp_path: Path) -> None:
     report = check_text("{kind: Robot, name: one}\n", tmp_path).compilation.report
     assert [one.fix for one in report if "'rbx'" in one.message] == [None]
+
+
+MANY = 60_000
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"a: b: c{' ' * MANY}d # e",
+        f"a: {'b: ' * (MANY // 3)}",
+        f"{' ' * MANY}a: b: c",
+        f"a b{' ' * MANY}:c\n  d: e\n",
+        f"{'- ' * 60}a: b{' ' * MANY}: c\n",
+        f"words: a{' ' * MANY}!",
+        f"words: {'a, ' * (MANY // 3)}!",
+        f"words: {'a ' * (MANY // 2)}",
+    ],
+    ids=[str(number) for number in range(8)],
+)
+def test_a_long_text_that_is_nearly_a_slip_takes_no_longer_than_its_length(text: str) -> None:
+    begun = time.process_time()
+    told(text)
+    assert time.process_time() - begun < 1  # quadratic patterns take minutes

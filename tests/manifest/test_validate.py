@@ -10,8 +10,8 @@ from pydantic import Field
 from rbxcompose.config import Angle, Config, Length, Name, Place, PlaceName, Ratio, Speed
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping
-from rbxcompose.manifest.validate import BROKEN, validate
+from rbxcompose.manifest.tree import BROKEN, Mapping
+from rbxcompose.manifest.validate import validate
 
 
 class Inner(Config):

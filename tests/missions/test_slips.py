@@ -9,10 +9,11 @@ from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping
 from rbxcompose.missions.checking import check_program
-from rbxcompose.missions.other_words import ENDLESS, FLAGS, SETTINGS
 from rbxcompose.missions.reading import read_program
 from rbxcompose.missions.registry import kinds
-from rbxcompose.missions.strays import STEPS
+from rbxcompose.missions.slips.count_in_words import ENDLESS
+from rbxcompose.missions.slips.foreign_flag import FLAGS
+from rbxcompose.missions.slips.unknown_settings import FOREIGN, STEPS
 from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
 from tests.missions.simulated import ROBOT
@@ -111,7 +112,7 @@ def test_a_skill_of_the_robot_is_a_step_whatever_its_value_looks_like() -> None:
 
 def test_words_of_others_are_none_of_ours_and_stand_for_one_of_ours() -> None:
     settings = {*kinds()["if"].options, *ROBOT.skills, *STEPS}
-    for word, ours in SETTINGS.items():
+    for word, ours in FOREIGN.items():
         text = f"do:\n  - if: $door\n    then: a\n    {word}: $door\n"
         helps = [one.help for one in report_of(text) if one.code == "RBX4101"]
         assert word not in settings

@@ -17,11 +17,11 @@ from rbxcompose.missions.checking import check_program
 from rbxcompose.missions.families import Deed, Loop
 from rbxcompose.missions.linking import link
 from rbxcompose.missions.look import Look
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ANY, SUCCEEDS, Outcomes
 from rbxcompose.missions.picture import picture_of
 from rbxcompose.missions.possible import Possibility, started
 from rbxcompose.missions.program import Endings, Node, RobotNames
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.reading import read_program
 from rbxcompose.missions.registry import kind, kinds
 from rbxcompose.missions.snapshot import restore, save
@@ -80,7 +80,7 @@ class Persist(Loop):
     look = Look("∞")
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         most = reader.expression(reader.key, COUNT, "a number")
         reader.child("do")
         return cls(most, reader.duration("gap"))

@@ -30,6 +30,7 @@ GROUND = {
     "robot_events": "",
     "rules": "findings",
     "scheduler": "",
+    "slips": "findings plugins",
     "typed_json": "",
     "units": "findings",
 }

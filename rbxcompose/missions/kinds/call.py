@@ -9,9 +9,9 @@ from rbxcompose.missions.families import LeafStep
 from rbxcompose.missions.leaf import Leaf
 from rbxcompose.missions.messages import Message
 from rbxcompose.missions.moments import Effects
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ANY, Outcomes
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.sending import fields_of
 from rbxcompose.missions.statuses import RUNNING
@@ -66,7 +66,7 @@ class Call(LeafStep):
     only_asks = False
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the service and `request`."""
         return cls(reader.message(reader.key, "request"))
 

@@ -9,9 +9,9 @@ from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.families import LeafStep
 from rbxcompose.missions.moments import NO_EFFECTS
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ANY, Outcomes
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE, SUCCESS
 from rbxcompose.missions.task import Site, Task
@@ -51,7 +51,7 @@ class Check(LeafStep):
     effects = NO_EFFECTS
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the condition."""
         return cls(reader.condition(reader.key))
 

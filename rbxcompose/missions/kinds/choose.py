@@ -10,9 +10,9 @@ from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.expressions.values import is_same
 from rbxcompose.missions.branches import Choice
 from rbxcompose.missions.families import Choosing
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import SKIPPED
 from rbxcompose.missions.task import Site, Task
@@ -71,7 +71,7 @@ class Choose(Choosing):
     choice: Choice = field()  # `else` is the child behind those of its cases
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the value, `cases` and `else`."""
         asked = reader.expression(reader.key, UNKNOWN, "a value, such as '$room'")
         cases = reader.cases("cases")

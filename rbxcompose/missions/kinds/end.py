@@ -8,9 +8,9 @@ from typing import Self
 from rbxcompose.expressions.text import Template
 from rbxcompose.missions.families import Deed
 from rbxcompose.missions.moments import NO_EFFECTS
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import FAILS, NEVER, SUCCEEDS, Outcomes
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE, RUNNING, SUCCESS
 from rbxcompose.missions.task import Site, Task
@@ -59,7 +59,7 @@ class End(Deed):
     effects = NO_EFFECTS
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the result and `message`."""
         result = reader.choice(reader.key, (SUCCEEDS, FAILS))
         return cls(result, reader.template("message") if reader.has("message") else None)

@@ -18,10 +18,10 @@ from rbxcompose.missions.facts import constants_of
 from rbxcompose.missions.families import Loop
 from rbxcompose.missions.look import Look
 from rbxcompose.missions.moments import NO_EFFECTS, Effects
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ANY as ANYHOW
 from rbxcompose.missions.outcomes import Outcomes
 from rbxcompose.missions.program import NOTHING, Endings, Node, Program, Target
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.results import NodeFailed
 from rbxcompose.missions.scopes import ItemScope
@@ -181,7 +181,7 @@ class For(Loop):
     look = Look("↻")
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the item's name, `in`, `do` and what results mean."""
         reader.item_name()
         items = reader.items("in")

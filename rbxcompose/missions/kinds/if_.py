@@ -9,9 +9,9 @@ from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.facts import is_simple
 from rbxcompose.missions.families import Choosing
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import SKIPPED
 from rbxcompose.missions.task import Site, Task
@@ -60,7 +60,7 @@ class If(Choosing):
     ways = ("then", "else")
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the condition, `then` and `else`."""
         condition = reader.condition(reader.key)
         reader.child("then")

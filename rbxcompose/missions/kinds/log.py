@@ -10,9 +10,9 @@ from rbxcompose.missions.events import Logged
 from rbxcompose.missions.facts import is_sure
 from rbxcompose.missions.families import Deed
 from rbxcompose.missions.moments import LEVELS, NO_EFFECTS
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import SUCCESS
 from rbxcompose.missions.task import Site, Task
@@ -50,7 +50,7 @@ class Log(Deed):
     effects = NO_EFFECTS
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the text and `level`."""
         return cls(reader.template(reader.key), reader.choice("level", LEVELS))
 

@@ -13,10 +13,10 @@ from rbxcompose.missions.families import Loop, Straight
 from rbxcompose.missions.history import WithHistory
 from rbxcompose.missions.look import Form, Look
 from rbxcompose.missions.machines import ENDS, FAILED, FINISHED, STATE, Next, States
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ANY, Outcomes
 from rbxcompose.missions.possible import Possibility, led
 from rbxcompose.missions.program import Endings, Node, RobotNames
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.results import NodeFailed
 from rbxcompose.missions.state_reading import read_machine, read_state
@@ -116,7 +116,7 @@ class Machine(Loop):
     look = Look("◉", Form.MACHINE)
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the states and what stands beside them."""
         return cls(*read_machine(reader))
 
@@ -176,7 +176,7 @@ class State(Straight):
     look = Look(form=Form.STATE)
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the body and where it leads to."""
         return cls(read_state(reader))
 

@@ -11,9 +11,9 @@ from rbxcompose.missions.answers import Flow, Skipped
 from rbxcompose.missions.branches import ALL, ANY, Branches, BranchScope, Ended, read_outcomes
 from rbxcompose.missions.families import Straight
 from rbxcompose.missions.look import Form, Look
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import FAILS, SUCCEEDS, Outcomes, either
 from rbxcompose.missions.program import Endings, Node, Target
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.results import NodeFailed
 from rbxcompose.missions.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
@@ -170,7 +170,7 @@ class Parallel(Straight):
     look = Look("⇉", Form.BESIDE, has_roles=True)
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the branches, and what decides."""
         names = reader.branches()
         ends_with = reader.branch("ends_with", names) if reader.has("ends_with") else ""

@@ -8,9 +8,9 @@ from typing import Self
 from rbxcompose.missions.families import Deed
 from rbxcompose.missions.messages import Message
 from rbxcompose.missions.moments import Effects
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ANY, Outcomes
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.sending import publish
 from rbxcompose.missions.statuses import SUCCESS
@@ -48,7 +48,7 @@ class Publish(Deed):
     message: Message
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the topic and `message`."""
         return cls(reader.message(reader.key, "message"))
 

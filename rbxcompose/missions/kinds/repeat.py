@@ -12,9 +12,9 @@ from rbxcompose.missions.answers import Advice, Counted, Flow
 from rbxcompose.missions.facts import is_simple, takes_time
 from rbxcompose.missions.families import Loop
 from rbxcompose.missions.look import Look
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ANY, Outcomes
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
 from rbxcompose.missions.task import Site, Task
@@ -109,7 +109,7 @@ class Repeat(Loop):
     look = Look("↻")
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the number of rounds, `do`, `until` and `every`."""
         rounds = reader.count_or_forever(reader.key)
         reader.child("do")

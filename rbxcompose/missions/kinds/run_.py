@@ -12,9 +12,9 @@ from rbxcompose.missions.answers import Flow, Skipped
 from rbxcompose.missions.families import Straight
 from rbxcompose.missions.held import HeldNode
 from rbxcompose.missions.look import PLAIN
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ALWAYS_FAILS, ANY, Outcomes, either
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.results import NodeFailed
 from rbxcompose.missions.task import Site, Task
@@ -72,7 +72,7 @@ class Run(Straight):
     look = PLAIN
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the expression; the nodes that it may give are read from the data."""
         expression = reader.expression(reader.key, UNKNOWN, "data that hold a node, such as '$chore'")
         reader.held(expression)

@@ -9,9 +9,9 @@ from rbxcompose.missions.asked import Assignment
 from rbxcompose.missions.facts import is_sure
 from rbxcompose.missions.families import Deed
 from rbxcompose.missions.moments import Effects
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.sending import assign
 from rbxcompose.missions.statuses import SUCCESS
@@ -51,7 +51,7 @@ class Set(Deed):
     assignments: tuple[Assignment, ...]
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the map from names to expressions."""
         return cls(reader.assignments(reader.key))
 

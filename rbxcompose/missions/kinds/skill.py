@@ -15,10 +15,10 @@ from rbxcompose.missions.events import Reported, SkillEnded, SkillStarted
 from rbxcompose.missions.families import LeafStep
 from rbxcompose.missions.leaf import Leaf
 from rbxcompose.missions.moments import NO_EFFECTS
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ANY, FAILS, SUCCEEDS, Outcomes
 from rbxcompose.missions.possible import Possibility, ended
 from rbxcompose.missions.program import Endings, Node, RobotNames
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import SKILL, kind
 from rbxcompose.missions.results import Result
 from rbxcompose.missions.statuses import FAILURE, NAMES, RUNNING, SUCCESS
@@ -116,7 +116,7 @@ class AskedSkill(LeafStep):
     effects = NO_EFFECTS
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the arguments."""
         return cls(reader.key, reader.arguments())
 

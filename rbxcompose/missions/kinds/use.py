@@ -13,10 +13,10 @@ from rbxcompose.missions.asked import Argument
 from rbxcompose.missions.families import Straight
 from rbxcompose.missions.history import HISTORY, WithHistory, read_history
 from rbxcompose.missions.look import Look
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import Outcomes
 from rbxcompose.missions.places import LAST
 from rbxcompose.missions.program import Endings, Node, Target
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import FAILURE, RUNNING
 from rbxcompose.missions.task import Site
@@ -129,7 +129,7 @@ class Use(Straight):
     look = Look("↗")
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the name of the mission, `with` and `history`."""
         name = reader.scalar(reader.key, "the name of a mission") or Scalar("", reader.span)
         given = reader.map_of("with", "a map from inputs to values") if reader.has("with") else None

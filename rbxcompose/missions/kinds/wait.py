@@ -9,9 +9,9 @@ from rbxcompose.expressions.tree import Expression, Number
 from rbxcompose.missions.answers import Counted
 from rbxcompose.missions.families import LeafStep
 from rbxcompose.missions.moments import NO_EFFECTS
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import RUNNING, SUCCESS
 from rbxcompose.missions.task import Site, Task
@@ -57,7 +57,7 @@ class Wait(LeafStep):
     effects = NO_EFFECTS
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the duration."""
         return cls(reader.duration(reader.key))
 

@@ -10,9 +10,9 @@ from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.facts import is_simple
 from rbxcompose.missions.families import LeafStep
 from rbxcompose.missions.moments import NO_EFFECTS
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
 from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.registry import kind
 from rbxcompose.missions.statuses import IDLE, RUNNING, SUCCESS
 from rbxcompose.missions.task import Site, Task
@@ -66,7 +66,7 @@ class WaitFor(LeafStep):
     effects = NO_EFFECTS
 
     @classmethod
-    def read(cls, reader: Reader) -> Self:
+    def read(cls, reader: NodeReader) -> Self:
         """Read the condition."""
         return cls(reader.condition(reader.key))
 

@@ -8,7 +8,7 @@ from typing import Self
 from rbxcompose.missions.modifiers.families import Plain
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
 from rbxcompose.missions.moments import Moments
-from rbxcompose.missions.reader import Reader
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.sending import act, act_safely
 from rbxcompose.missions.statuses import RUNNING
 from rbxcompose.missions.task import Site, Task
@@ -81,6 +81,6 @@ class Entering(Plain):
     value = None
 
     @classmethod
-    def read(cls, reader: Reader, key: str) -> Self:
+    def read(cls, reader: NodeReader, key: str) -> Self:
         """Read what is there of the two."""
         return cls(reader.moments((key, *cls.keys)))

@@ -9,7 +9,7 @@ from typing import Self
 from rbxcompose.missions.modifiers.families import Plain
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
 from rbxcompose.missions.moments import Moments
-from rbxcompose.missions.reader import Reader
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.sending import act, act_safely
 from rbxcompose.missions.statuses import FAILURE, SUCCESS
 from rbxcompose.missions.task import Site, Task
@@ -84,6 +84,6 @@ class Hooks(Plain):
     value = None
 
     @classmethod
-    def read(cls, reader: Reader, key: str) -> Self:
+    def read(cls, reader: NodeReader, key: str) -> Self:
         """Read the hooks that are there."""
         return cls(reader.moments((key, *cls.keys)))

@@ -13,8 +13,8 @@ from rbxcompose.missions.answers import Advice, Counted, Serves
 from rbxcompose.missions.facts import takes_time
 from rbxcompose.missions.modifier import Modifier
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ALWAYS_FAILS, SUCCEEDS, Outcomes
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.statuses import FAILURE, RUNNING
 from rbxcompose.missions.task import Site, Task
 from rbxcompose.missions.watching import Watched
@@ -73,7 +73,7 @@ class AsLongAs(Cutting):
     value: Expression = field()
 
     @classmethod
-    def read(cls, reader: Reader, key: str) -> Self:
+    def read(cls, reader: NodeReader, key: str) -> Self:
         """Read a condition."""
         return cls(reader.condition(key))
 
@@ -120,7 +120,7 @@ class Timeout(Cutting):
     value: Expression = field()
 
     @classmethod
-    def read(cls, reader: Reader, key: str) -> Self:
+    def read(cls, reader: NodeReader, key: str) -> Self:
         """Read a duration."""
         return cls(reader.duration(key))
 
@@ -212,7 +212,7 @@ class Attempts(Modifier):
     repeats = True
 
     @classmethod
-    def read(cls, reader: Reader, key: str) -> Self:
+    def read(cls, reader: NodeReader, key: str) -> Self:
         """Read a count or `forever`, and what belongs to it."""
         timeout, pause = (
             reader.duration(one) if reader.has(one) else None for one in ("attempt_timeout", "attempt_pause")

@@ -8,8 +8,8 @@ from typing import ClassVar, Self
 from rbxcompose.missions.answers import Serves
 from rbxcompose.missions.modifier import Modifier
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, FAILS, SUCCEEDS, Outcomes
-from rbxcompose.missions.reader import Reader
 from rbxcompose.missions.statuses import FAILURE, SUCCESS
 from rbxcompose.missions.task import Site, Task
 
@@ -47,7 +47,7 @@ class Turning(Modifier):
     turns: ClassVar[dict[int, int]]  # what becomes of which result
 
     @classmethod
-    def read(cls, reader: Reader, key: str) -> Self:
+    def read(cls, reader: NodeReader, key: str) -> Self:
         """Read `true` or `false`."""
         return cls(reader.flag(key))
 

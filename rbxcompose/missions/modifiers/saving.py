@@ -8,7 +8,7 @@ from typing import Self
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.missions.modifiers.families import Plain
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.reader import Reader
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.statuses import RUNNING
 from rbxcompose.missions.task import Site, Task
 
@@ -58,7 +58,7 @@ class Save(Plain):
     value = None
 
     @classmethod
-    def read(cls, reader: Reader, key: str) -> Self:
+    def read(cls, reader: NodeReader, key: str) -> Self:
         """Read the name."""
         return cls(reader.name(key, "a name for the result"))
 

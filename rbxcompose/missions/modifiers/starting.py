@@ -10,7 +10,7 @@ from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.answers import Serves
 from rbxcompose.missions.modifiers.families import Skipping
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.reader import Reader
+from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.statuses import RUNNING, SKIPPED
 from rbxcompose.missions.task import Site, Task
 
@@ -53,7 +53,7 @@ class Conditional(Skipping):
     serves = Serves.ALL
 
     @classmethod
-    def read(cls, reader: Reader, key: str) -> Self:
+    def read(cls, reader: NodeReader, key: str) -> Self:
         """Read a condition."""
         return cls(reader.condition(key))
 
@@ -142,7 +142,7 @@ class Once(Skipping):
     value = None
 
     @classmethod
-    def read(cls, reader: Reader, key: str) -> Self:
+    def read(cls, reader: NodeReader, key: str) -> Self:
         """Read `true` or `false`."""
         return cls(reader.flag(key))
 
@@ -189,6 +189,6 @@ class Cooldown(Skipping):
     serves = Serves.REPEATED
 
     @classmethod
-    def read(cls, reader: Reader, key: str) -> Self:
+    def read(cls, reader: NodeReader, key: str) -> Self:
         """Read a duration."""
         return cls(reader.duration(key))

@@ -1,39 +1,44 @@
-"""States whose names are none: each is read under the name that was meant, so that it is told once and nothing else."""
+"""States whose names are none: each is read under the name that was meant, wherever its machine names it."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
 from rbxcompose.findings import Edit, Finding, Fix, nearest
-from rbxcompose.manifest.tree import Entry, Node, Scalar
+from rbxcompose.manifest.tree import Entry, Key, Node, Scalar, with_children
 from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.missions.grammar import Place, Takes
 from rbxcompose.missions.machines import ENDS
 from rbxcompose.missions.naming import NAME, cure, no_name
+from rbxcompose.missions.slips import slip
+from rbxcompose.slips import Repair
 
 
-def with_names(machine: Tree) -> tuple[Tree, list[Finding]]:
-    """Return the map below `machine` with names for all states, and the findings about those that had none."""
-    states = machine.get("states")
+@slip(Takes.MACHINE)
+def misnamed_states(place: Place, node: Node) -> Repair[Node] | None:
+    """Recognise states with names such as `go home`."""
+    states = node.get("states") if isinstance(node, Tree) else None
     wrong = [name for name in states.entries if not NAME.fullmatch(name)] if isinstance(states, Tree) else []
-    if not isinstance(states, Tree) or not wrong:
-        return machine, []
+    if not isinstance(states, Tree) or not isinstance(node, Tree) or not wrong:
+        return None
     cures = {name: cure(name) for name in wrong}
-    meant = {name: new for name, new in cures.items() if new and _is_free(new, states.entries, cures)}
-    findings = []
-    for name in wrong:
-        key = states.entries[name].key
-        places = [key.span, *(one.span for one in _ways(machine, states) if one.text == name)]
-        edits = tuple(Edit(place, name, meant[name]) for place in places) if name in meant else ()
-        fix = Fix(edits, True, f"'{name}' -> '{meant[name]}'") if edits else None
-        findings.append(no_name(key, fix))
-    ends = machine.get("ends")
+    counts = Counter(cures.values())
+    taken = {*states.entries, *ENDS}
+    meant = {name: new for name, new in cures.items() if new and new not in taken and counts[new] == 1}
+    places: dict[str, list[Scalar]] = {name: [states.entries[name].key] for name in wrong}
+    for way in _ways(node, states):
+        places.get(way.text, []).append(way)
+    ends = node.get("ends")
     known = {*states.entries, *ENDS, *(ends.entries if isinstance(ends, Tree) else ())}
-    return _renamed(machine, states, _Meant(meant, known)), findings
+    findings = tuple(_no_name(name, places[name], meant.get(name, "")) for name in wrong)
+    return Repair(_renamed(node, states, _Meant(meant, known)), findings)
 
 
-def _is_free(name: str, states: Collection[str], cures: Mapping[str, str]) -> bool:
-    return name not in states and name not in ENDS and list(cures.values()).count(name) == 1
+def _no_name(name: str, places: list[Scalar], meant: str) -> Finding:
+    edits = tuple(Edit(one.span, name, meant) for one in places)
+    return no_name(places[0], Fix(edits, True, f"'{name}' -> '{meant}'") if meant else None)
 
 
 class _Meant:
@@ -65,13 +70,13 @@ def _renamed(machine: Tree, states: Tree, meant: _Meant) -> Tree:
 
 def _leading(state: Node, meant: _Meant) -> Node:
     """Return a state whose `next` leads to states by their names."""
-    if not isinstance(state, Tree) or "next" not in state:
-        return state
-    entry = state.entries["next"]
-    to = entry.value
-    if isinstance(to, Tree):
-        to = replace(to, entries={key: Entry(one.key, meant.of(one.value)) for key, one in to.entries.items()})
-    return replace(state, entries={**state.entries, "next": Entry(entry.key, meant.of(to))})
+
+    def leads(key: Key, to: Node) -> Node:
+        if key != "next":
+            return to
+        return with_children(to, lambda _, one: meant.of(one)) if isinstance(to, Tree) else meant.of(to)
+
+    return with_children(state, leads) if isinstance(state, Tree) else state
 
 
 def _ways(machine: Tree, states: Tree) -> Iterator[Scalar]:

@@ -1,0 +1,36 @@
+"""The slips of manifests, one file each: in their text, and in values that a model refuses.
+
+Under `@value_slip(ERRORS)` stands a function of a `Refused` and the node there, which returns the node that was meant.
+It counts only if the model takes that.
+
+Under `@text_slip(WORDS)` stands a function of a `Trouble`. It has another shape, since it cannot repair anything: the
+parser has given up, and nobody knows what else stands in a text that it cannot read. Both return None for no slip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from rbxcompose.findings import Finding
+from rbxcompose.manifest.tree import Node, Path
+from rbxcompose.manifest.trouble import Trouble
+from rbxcompose.slips import Repair, Slips
+
+# What the parser says, in its words.
+COLON = "mapping values are not allowed"
+NO_COLON = "could not find expected ':'"
+NO_DASH = "did not find expected '-' indicator"
+NO_KEY = "did not find expected key"
+ANY = ""
+
+
+class Refused(NamedTuple):
+    """A place at which a model objects: its path in the file, and what is said if that is no slip."""
+
+    path: Path
+    finding: Finding
+
+
+text_slip: Slips[Callable[[Trouble], Finding | None]] = Slips(__name__)
+value_slip: Slips[Callable[[Refused, Node], Repair[Node] | None]] = Slips(__name__)

@@ -1,0 +1,21 @@
+"""A list that was written without its brackets: `match: battery, charger`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rbxcompose.manifest.brackets import bracketed, without_brackets
+from rbxcompose.manifest.slips import Refused, value_slip
+from rbxcompose.manifest.tree import Node, Scalar, Sequence
+from rbxcompose.slips import Repair
+
+
+@value_slip("list_type", "tuple_type")
+def list_without_brackets(place: Refused, node: Node) -> Repair[Node] | None:
+    """Recognise one item or several where a list belongs."""
+    found = without_brackets(node)
+    if not found or not isinstance(node, Scalar):
+        return None
+    help_text, fix = bracketed(node)
+    items = tuple(Scalar(text, node.span) for text, _ in found)
+    return Repair(Sequence(items, node.span), (replace(place.finding, help=help_text, fix=fix),))

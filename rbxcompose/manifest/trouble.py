@@ -1,0 +1,142 @@
+"""One error of the YAML parser with the text around it: what those who explain it look at."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import yaml
+
+from rbxcompose.findings import Fix, Span, kind, replacement
+
+QUOTES_NEEDED = kind(
+    "RBX1101",
+    """Text that needs quotes
+
+Some characters mean something to YAML: a colon with a space behind it, ` #`, and a quote, `>`, `|`, `@`, `%`, `*`, `&`
+or `!` at the beginning; inside `{}` and `[]` also commas and brackets. Text that holds one of them stands in quotes.
+
+Bad:
+```yaml
+about: Note: drives slowly
+```
+Good:
+```yaml
+about: "Note: drives slowly"
+```
+""",
+    is_fixable=True,
+)
+NOT_YAML = kind(
+    "RBX1102",
+    """Not valid YAML
+
+The file cannot be read from the marked place on. Usually a bracket, a quote, a colon or the indentation is wrong there
+or just above.
+
+Bad:
+```yaml
+match: [battery, charger
+```
+Good:
+```yaml
+match: [battery, charger]
+```
+""",
+    is_fixable=True,
+)
+QUOTE_HELP = "put quotes round this"
+
+_BEHIND_KEY = re.compile(r"\s*+(- +)*+[^\s:][^:]*+: +")
+_DASHES = re.compile(r" *+(- ++)*")
+
+
+class Trouble:
+    """An error, where it is, and the lines of the text; lines and columns count from 0, spans from 1."""
+
+    def __init__(self, error: yaml.MarkedYAMLError, text: str, file: str) -> None:
+        self.problem = error.problem or ""
+        self.context = error.context or ""
+        self.file = file
+        self.lines = text.split("\n")
+        mark = error.problem_mark or error.context_mark
+        self.line = mark.line if mark else 0
+        self.column = mark.column if mark else 0
+        self.start = error.context_mark
+
+    @property
+    def line_text(self) -> str:
+        """The line of the error."""
+        return self.lines[self.line] if self.line < len(self.lines) else ""
+
+    @property
+    def before(self) -> str:
+        """The line of the error up to the error."""
+        return self.line_text[: self.column]
+
+    @property
+    def here(self) -> Span:
+        """The place of the error."""
+        return self.span(self.line, self.column, self.column + 1)
+
+    @property
+    def opening(self) -> Span:
+        """The place where what the parser was reading began."""
+        return self.span(self.start.line, self.start.column, self.start.column + 1) if self.start else self.here
+
+    @property
+    def value_column(self) -> int:
+        """Where the value begins, behind whose key the error stands; 0 if it stands behind none."""
+        key = _BEHIND_KEY.match(self.before)
+        return key.end() if key and key.end() < len(self.before) else 0
+
+    @property
+    def is_behind_quote(self) -> bool:
+        """Whether a quote was closed right before the error."""
+        return self.before.rstrip().endswith(("'", '"'))
+
+    def span(self, line: int, start: int, end: int) -> Span:
+        """Return the place of some columns of a line."""
+        return Span(self.file, line + 1, start + 1, line + 1, end + 1)
+
+    def to_line_end(self, column: int) -> Span:
+        """Return the place from a column of the error's line to the end of that line."""
+        return self.span(self.line, column, max(len(self.line_text.rstrip()), column + 1))
+
+    def above(self, line: int) -> Iterator[int]:
+        """Yield the lines above one that hold something, the nearest first."""
+        return (one for one in range(line - 1, -1, -1) if is_written(self.lines[one]))
+
+    def next_line(self, line: int) -> str:
+        """Return the next line that holds something, empty if there is none."""
+        return next((one for one in self.lines[line + 1 :] if is_written(one)), "")
+
+    def quoting(self, span: Span) -> Fix | None:
+        """Return the fix that puts quotes round a text that goes to the end of its line, if that is all of it."""
+        written = self.line_text[span.column - 1 : span.end_column - 1]
+        meant = written
+        if written[:1] == written[-1:] == "'":
+            if written.count("'") != 3:
+                return None  # which of the quotes belong to the text?
+            meant = written[1:-1]
+        is_simple = '"' not in meant and "\\" not in meant
+        quoted = f'"{meant}"' if is_simple else "'" + meant.replace("'", "''") + "'"
+        below = next((line for line in self.lines[self.line + 1 :] if line.strip()), "")
+        goes_on = indent(below) > indent(self.line_text)  # so that the next line may belong to the same text
+        return replacement(span, written, quoted) if written and " #" not in written and not goes_on else None
+
+
+def indent(line: str) -> int:
+    """Return the column in which a line begins."""
+    return len(line) - len(line.lstrip(" "))
+
+
+def behind_dashes(line: str) -> int:
+    """Return the column in which a line begins behind its dashes."""
+    found = _DASHES.match(line)
+    return found.end() if found else 0
+
+
+def is_written(line: str) -> bool:
+    """Tell whether a line holds more than a comment."""
+    return bool(line.strip()) and not line.lstrip().startswith("#")

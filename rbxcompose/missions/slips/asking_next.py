@@ -1,0 +1,24 @@
+"""A condition below `next`, which only leads on."""
+
+from __future__ import annotations
+
+from rbxcompose.manifest.tree import Mapping, Node
+from rbxcompose.missions import codes
+from rbxcompose.missions.grammar import Place, Takes, told
+from rbxcompose.missions.slips import slip
+from rbxcompose.slips import Repair
+
+_ASKING = ("if", "then", "else", "when", "check", "choose", "cases")
+
+
+@slip(Takes.NEXT)
+def asking_next(place: Place, node: Node) -> Repair[Node] | None:
+    """Recognise words that ask."""
+    asking = [entry.key for word, entry in node.entries.items() if word in _ASKING] if isinstance(node, Mapping) else []
+    if not asking:
+        return None
+    help_text = (
+        "let a 'check' be the last step of this state, and write below 'next' where 'success' and 'failure' lead"
+    )
+    message = f"'next' cannot ask: there is no '{asking[0].text}' in it"
+    return Repair(told(node.span), (codes.WRONG_SHAPE.at(asking[0].span, message, help=help_text),))

@@ -1,0 +1,45 @@
+"""A number in words, one with a word behind it, and another word for `forever`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+
+from rbxcompose.findings import replacement
+from rbxcompose.manifest.tree import Node, Scalar
+from rbxcompose.missions import codes
+from rbxcompose.missions.grammar import Place, Takes
+from rbxcompose.missions.slips import slip
+from rbxcompose.slips import Repair
+
+ENDLESS: Mapping[str, str] = dict.fromkeys(("always", "endless", "endlessly", "infinite", "unlimited"), "forever")
+_NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+NUMBERS: Mapping[str, str] = {
+    **{word: str(number) for number, word in enumerate(_NUMBERS, start=1)},
+    "once": "1",
+    "twice": "2",
+}
+_TIMES = re.compile(r"(?P<digits>\d+)\s*(times?|x|rounds?|attempts?|tries)")
+
+
+@slip(Takes.COUNT)
+def count_in_words(place: Place, node: Node) -> Repair[Node] | None:
+    """Recognise what people say for a number, and for no end where that may stand."""
+    if not isinstance(node, Scalar) or node.text in place.choices:
+        return None
+    key, forever = place.key.text, ENDLESS.get(node.text, "")
+    if forever in place.choices:
+        meant, told = forever, codes.NOT_A_CHOICE.at(node.span, f"'{key}' cannot be '{node.text}'")
+    elif meant := _digits(node):
+        told = codes.WRONG_TYPE.at(node.span, f"'{key}' takes a number in digits and nothing else")
+    else:
+        return None
+    fix = replacement(node.span, node.text, meant)
+    return Repair(replace(node, text=meant), (replace(told, help=f"write '{meant}'", fix=fix),))
+
+
+def _digits(node: Scalar) -> str:
+    text = node.text.lower() if node.plain else ""
+    found = _TIMES.fullmatch(text)
+    return found["digits"] if found else NUMBERS.get(text, "")

@@ -1,0 +1,25 @@
+"""`yes`, `no`, `on` and `off`, which are texts here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rbxcompose.findings import replacement
+from rbxcompose.manifest.tree import Node, Scalar
+from rbxcompose.missions import codes
+from rbxcompose.missions.grammar import Place, Takes
+from rbxcompose.missions.slips import slip
+from rbxcompose.slips import Repair
+
+FLAGS: Mapping[str, str] = {"no": "false", "off": "false", "on": "true", "yes": "true"}
+
+
+@slip(Takes.FLAG)
+def foreign_flag(place: Place, node: Node) -> Repair[Node] | None:
+    """Recognise other words for true and false."""
+    meant = FLAGS.get(node.text.lower(), "") if isinstance(node, Scalar) and node.filled is None else ""
+    if not meant or not isinstance(node, Scalar):
+        return None
+    message, fix = f"'{place.key.text}' must be true or false", replacement(node.span, node.text, meant)
+    finding = codes.NOT_A_CHOICE.at(node.span, message, help=f"write '{meant}'", fix=fix)
+    return Repair(Scalar(meant, node.span), (finding,))

@@ -1,0 +1,64 @@
+"""Keys of a machine that stand beside it, or at the very left: `ends` in the column of `machine`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.manifest.tree import Entry, Mapping, Node, children, with_children
+from rbxcompose.missions import codes
+from rbxcompose.missions.grammar import Place, Takes
+from rbxcompose.missions.machines import MACHINE_KEYS
+from rbxcompose.missions.slips import slip
+from rbxcompose.slips import Repair
+
+MACHINE = "machine"
+
+
+@slip(Takes.MISSION, Takes.STEP, Takes.STATE)
+def keys_outside_their_machine(place: Place, node: Node) -> Repair[Node] | None:
+    """Recognise keys beside their machine, and those of any machine at the very left of a mission.
+
+    The latter go to the machine that they may belong to, if there is one only.
+    """
+    if not isinstance(node, Mapping) or not any(key in node for key in MACHINE_KEYS):
+        return None
+    own, is_mission = _machine_of(node), place.takes is Takes.MISSION
+    pairs = list(_machines(node)) if is_mission else []
+    strays = [key for key in MACHINE_KEYS if key in node and ((own and key not in own) or pairs)]
+    if not strays:
+        return None
+    added: dict[int, dict[str, Entry]] = {}  # by the identity of the machine
+    for key in strays:
+        homes = [machine for holder, machine in pairs if key not in machine and key not in holder]
+        home = own if own and key not in own else homes[0] if len(homes) == 1 else None
+        added.setdefault(id(home), {})[key] = node.entries[key]
+    help_text = f"move it right, below '{MACHINE}:', into the column of 'states'"
+    findings = (
+        codes.WRONG_SHAPE.at(node.entries[key].key.span, f"'{key}' belongs to the machine", help=help_text)
+        for key in strays
+    )
+    left = {key: entry for key, entry in node.entries.items() if key not in strays}
+    return Repair(_with(Mapping(left, node.span), added), tuple(findings))
+
+
+def _machine_of(node: Node) -> Mapping | None:
+    """Return the machine that stands in a map; only one with states is taken for one."""
+    machine = node.get(MACHINE) if isinstance(node, Mapping) else None
+    return machine if isinstance(machine, Mapping) and "states" in machine else None
+
+
+def _machines(root: Mapping) -> Iterator[tuple[Mapping, Mapping]]:
+    """Yield all maps with a machine, and their machine."""
+    waiting: list[Node] = [root]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, Mapping) and (machine := _machine_of(node)):
+            yield node, machine
+        waiting += (below for _, below in children(node))
+
+
+def _with(node: Node, added: dict[int, dict[str, Entry]]) -> Node:
+    """Return a tree in which each machine has what is added to it."""
+    new = with_children(node, lambda _, below: _with(below, added))
+    more = added.get(id(node), {})
+    return Mapping({**new.entries, **more}, new.span, new.tag) if more and isinstance(new, Mapping) else new

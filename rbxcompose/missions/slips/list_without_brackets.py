@@ -1,0 +1,23 @@
+"""A list to go through that was written without its brackets: `in: dock, kitchen`."""
+
+from __future__ import annotations
+
+from rbxcompose.manifest.brackets import bracketed, without_brackets
+from rbxcompose.manifest.tree import Node, Scalar, Sequence
+from rbxcompose.missions import codes
+from rbxcompose.missions.grammar import Place, Takes
+from rbxcompose.missions.slips import slip
+from rbxcompose.missions.spans import inner_span
+from rbxcompose.slips import Repair
+
+
+@slip(Takes.ITEMS)
+def list_without_brackets(place: Place, node: Node) -> Repair[Node] | None:
+    """Recognise several items; a single one may be a name of data."""
+    found = without_brackets(node)
+    if len(found) < 2 or not isinstance(node, Scalar):
+        return None
+    help_text, fix = bracketed(node)
+    items = tuple(Scalar(text, inner_span(node, start, start + len(text))) for text, start in found)
+    finding = codes.WRONG_SHAPE.at(node.span, f"'{place.key.text}' needs a list", help=help_text, fix=fix)
+    return Repair(Sequence(items, node.span), (finding,))

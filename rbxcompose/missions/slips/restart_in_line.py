@@ -1,0 +1,42 @@
+"""`restart` with its name in the line of `afterwards`."""
+
+from __future__ import annotations
+
+import re
+
+from rbxcompose.findings import Edit, Fix
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.missions import codes
+from rbxcompose.missions.grammar import Place, Takes
+from rbxcompose.missions.program import RESTART
+from rbxcompose.missions.slips import slip
+from rbxcompose.missions.spans import inner_span
+from rbxcompose.slips import Repair
+
+_IN_LINE = re.compile(rf"{RESTART}:?\s+(?P<name>[a-z][a-z0-9_]*)")
+_DEEPER = "  "
+
+
+@slip(Takes.AFTERWARDS)
+def restart_in_line(place: Place, node: Node) -> Repair[Node] | None:
+    """Recognise `restart NAME` and `restart: NAME`."""
+    found = _IN_LINE.fullmatch(node.text) if isinstance(node, Scalar) and node.plain else None
+    if not found or not isinstance(node, Scalar):
+        return None
+    meant = f"{RESTART}: {found['name']}"
+    message = f"'{RESTART}' and what begins anew stand on a line of their own"
+    help_text = f"write '{meant}' on the line below '{place.key.text}:', further right"
+    fix = _on_a_line_below(place.key, node, meant)
+    key = Scalar(RESTART, inner_span(node, 0, len(RESTART)))
+    name = Scalar(found["name"], inner_span(node, found.start("name"), len(node.text)))
+    finding = codes.WRONG_SHAPE.at(node.span, message, help=help_text, fix=fix)
+    return Repair(Mapping({RESTART: Entry(key, name)}, node.span), (finding,))
+
+
+def _on_a_line_below(key: Scalar, value: Scalar, meant: str) -> Fix:
+    """Return the fix, which applies to a key with nothing before it on its line: within `{}` lines mean nothing."""
+    span, indent = key.span, " " * (key.span.column - 1)
+    before = span._replace(column=1, end_line=span.line, end_column=span.column)
+    place = value.span._replace(line=span.line, column=span.column)
+    edit = Edit(place, f"{key.text}: {value.text}", f"{key.text}:\n{indent}{_DEEPER}{meant}")
+    return Fix((Edit(before, indent, indent), edit), True, f"'{value.text}' -> '{meant}'")

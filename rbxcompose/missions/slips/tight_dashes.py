@@ -1,0 +1,39 @@
+"""Dashes without a space behind them: `-go_to: dock`."""
+
+from __future__ import annotations
+
+import re
+
+from rbxcompose.findings import Edit, Fix
+from rbxcompose.manifest.tree import Mapping, Node, Scalar
+from rbxcompose.missions import codes
+from rbxcompose.missions.grammar import Place, Takes, without_word
+from rbxcompose.missions.slips import slip
+from rbxcompose.slips import Repair
+
+_TIGHT = re.compile(r"-(?=[a-z][a-z0-9_]*$)")
+_INDENT = "  "
+
+
+@slip(Takes.STEP)
+def tight_dashes(place: Place, node: Node) -> Repair[Node] | None:
+    """Recognise keys that begin with a dash."""
+    entries = node.entries if isinstance(node, Mapping) else {}
+    tight = [entry.key for key, entry in entries.items() if _TIGHT.match(key)]
+    if not tight or not isinstance(node, Mapping):
+        return None
+    is_list = len(tight) == len(entries)  # else something stands there that is no item of a list
+    message = "a space is missing behind this dash"
+    findings = (
+        codes.WRONG_SHAPE.at(key.span, message, help=f"write '- {key.text[1:]}'", fix=_spaced(key) if is_list else None)
+        for key in tight
+    )
+    return Repair(without_word(node, place.words), tuple(findings))
+
+
+def _spaced(key: Scalar) -> Fix:
+    """Return the fix that puts a space behind a dash; it applies to a line of its own only."""
+    span = key.span
+    before = span._replace(column=span.column - len(_INDENT), end_line=span.line, end_column=span.column)
+    meant = f"- {key.text[1:]}"
+    return Fix((Edit(before, _INDENT, _INDENT), Edit(span, key.text, meant)), True, f"'{key.text}' -> '{meant}'")

@@ -1,0 +1,93 @@
+"""Slips: beginners' mistakes that are recognised, told with their cure, and read as what was meant.
+
+What compilers call error productions: each is one file, beside the grammar instead of in it. A slip of a tree sees a
+node at a place of its grammar and returns a `Repair`: what there is to say, and the node to go on with. So the reader
+behind them meets no slip, and is the grammar. A family of slips is a package of files and one `Slips` as decorator.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from graphlib import TopologicalSorter
+from typing import Any, Generic, TypeVar
+
+from rbxcompose.findings import Finding, Report
+
+Find = TypeVar("Find", bound=Callable[..., Any])
+Place = TypeVar("Place")
+Node = TypeVar("Node")
+
+
+@dataclass(frozen=True, slots=True)
+class Repair(Generic[Node]):
+    """The node to go on with in the place of one with a slip, and what is said of the slip."""
+
+    node: Node
+    findings: tuple[Finding, ...]
+
+
+class Slips(Generic[Find]):
+    """The slips of one language, by the places of its grammar: the files of a package, declared by this decorator."""
+
+    def __init__(self, package: str) -> None:
+        self._package = package
+        self._places: dict[Find, tuple[str, ...]] = {}
+        self._earlier: dict[Find, set[Find]] = {}
+
+    def __call__(self, *places: str, after: Iterable[Find] = (), before: Iterable[Find] = ()) -> Callable[[Find], Find]:
+        """Declare what recognises a slip at some places; it looks at a node `after` some others and `before` some."""
+
+        def declare(find: Find) -> Find:
+            self._places[find] = places
+            self._earlier.setdefault(find, set()).update(after)
+            for later in before:
+                self._earlier.setdefault(later, set()).add(find)
+            return find
+
+        return declare
+
+    def at(self, place: str) -> list[Find]:
+        """Return the slips of a place in their order: by name, as far as none was declared."""
+        return self._by_place.get(place, [])
+
+    @cached_property
+    def _by_place(self) -> dict[str, list[Find]]:
+        for module in pkgutil.iter_modules(importlib.import_module(self._package).__path__):
+            importlib.import_module(f"{self._package}.{module.name}")
+        order: TopologicalSorter[Find] = TopologicalSorter()
+        for find in sorted(self._places, key=_name):
+            order.add(find, *sorted(self._earlier[find], key=_name))
+        found: dict[str, list[Find]] = {}
+        for find in order.static_order():
+            for place in self._places[find]:
+                found.setdefault(place, []).append(find)
+        return found
+
+
+def _name(find: Callable[..., Any]) -> str:
+    return find.__name__
+
+
+def repaired(
+    slips: Iterable[Callable[[Place, Node], Repair[Node] | None]], place: Place, node: Node, report: Report
+) -> Node:
+    """Return a node without slips, and report each of them.
+
+    As soon as one has repaired the node, the others look again; each repairs it once at most, so that this ends.
+    """
+    waiting = list(slips)
+    index = 0
+    while index < len(waiting):
+        repair = waiting[index](place, node)
+        if repair is None:
+            index += 1
+            continue
+        report.extend(repair.findings)
+        node = repair.node
+        del waiting[index]
+        index = 0
+    return node
