@@ -89,7 +89,7 @@ def linked(kind: Kind) -> str:
 
 def few_words(kind: Kind) -> str:
     """Return what the first line of a kind's file says of it."""
-    return (inspect.getdoc(inspect.getmodule(kind.task)) or "").partition(": ")[2].partition("\n")[0].rstrip(".")
+    return (inspect.getdoc(inspect.getmodule(kind)) or "").partition(": ")[2].partition("\n")[0].rstrip(".")
 
 
 TABLES: Mapping[str, Callable[[], str]] = {

@@ -6,56 +6,21 @@ help. Only the verb that is asked for is imported, and nothing that help can do 
 
 from __future__ import annotations
 
-import importlib
 import os
 import signal
 import sys
-from typing import TYPE_CHECKING, NoReturn, Protocol, cast
+from typing import TYPE_CHECKING, NoReturn
 
 import rbxcompose
 from rbxcompose import cli
+from rbxcompose.cli.verbs import load, parser_of, verbs
 
 if TYPE_CHECKING:
-    import argparse
     from collections.abc import Sequence
     from types import FrameType
 
 USAGE, INTERRUPTED = 2, 130
 _ABOUT = "Docker Compose for robots: YAML in, a checked and running robot out."
-
-
-class Verb(Protocol):
-    """What a verb's module holds."""
-
-    __doc__: str | None
-
-    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Declare options and arguments."""
-        ...
-
-    def run(self, arguments: argparse.Namespace) -> int:
-        """Do it and return the exit code."""
-        ...
-
-
-def verbs() -> list[str]:
-    """Return the names of all verbs, sorted."""
-    names = (name.removesuffix(".py") for name in os.listdir(cli.__path__[0]) if name.endswith(".py"))
-    return sorted(name for name in names if name not in ("__init__", "main"))
-
-
-def load(verb: str) -> Verb:
-    """Import a verb."""
-    return cast(Verb, importlib.import_module(f"{cli.__name__}.{verb}"))
-
-
-def parser_of(name: str, verb: Verb) -> argparse.ArgumentParser:
-    """Return the parser of a verb."""
-    from rbxcompose.cli.output.console import Parser  # help can do without
-
-    parser = Parser(f"rbxcompose {name}", description=verb.__doc__ or "", allow_abbrev=False)
-    verb.add_arguments(parser)
-    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

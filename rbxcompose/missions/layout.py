@@ -12,7 +12,7 @@ from rbxcompose.manifest.tree import Mapping as Tree
 from rbxcompose.missions.grammar import BELOW, Slot, Takes, Words
 from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
 from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.registry import Kind, kinds
 
 
 class Nobody:
@@ -54,19 +54,34 @@ class _Asking(NodeReader):
         return None
 
 
+def words(skills: frozenset[str] = frozenset()) -> Words:
+    """Return the words that mean something in the missions of a robot with these skills."""
+    return _words(_known(), skills)
+
+
+def step_slots(kind: str) -> Mapping[str, Slot]:
+    """Return what the keys of a step of a kind take, with its modifiers; of a skill, if it is of none."""
+    return _step_slots(_known(), kind)
+
+
+def _known() -> tuple[Kind, ...]:
+    """Return the kinds there are now: tests add some and take them out again."""
+    return tuple(kinds().values())
+
+
 @cache
-def kind_slots() -> Mapping[str, Mapping[str, Slot]]:
+def _kind_slots(known: tuple[Kind, ...]) -> Mapping[str, Mapping[str, Slot]]:
     """Return what the keys of each kind of step take, its word among them."""
     found = {}
-    for name, kind in kinds().items():
-        asking = _Asking(name)
+    for kind in known:
+        asking = _Asking(kind.name)
         kind.read(asking)
-        found[name] = {key: asking.slots.get(key, Slot(Takes.OTHER)) for key in (name, *kind.options)}
+        found[kind.name] = {key: asking.slots.get(key, Slot(Takes.OTHER)) for key in (kind.name, *kind.options)}
     return found
 
 
 @cache
-def modifier_slots() -> Mapping[str, Slot]:
+def _modifier_slots() -> Mapping[str, Slot]:
     """Return what the keys of all modifiers take, those of states among them."""
     found: dict[str, Slot] = {"name": Slot(Takes.OTHER)}
     for name, cls in modifiers().items():
@@ -77,18 +92,16 @@ def modifier_slots() -> Mapping[str, Slot]:
 
 
 @cache
-def words(skills: frozenset[str] = frozenset()) -> Words:
-    """Return the words that mean something in the missions of a robot with these skills."""
-    return Words(kind_slots(), {key: modifier_slots()[key] for key in ("name", *modifier_keys())}, skills)
+def _words(known: tuple[Kind, ...], skills: frozenset[str]) -> Words:
+    return Words(_kind_slots(known), {key: _modifier_slots()[key] for key in ("name", *modifier_keys())}, skills)
 
 
 @cache
-def step_slots(kind: str) -> Mapping[str, Slot]:
-    """Return what the keys of a step of a kind take, with its modifiers; of a skill, if it is of none."""
-    return {**words().modifiers, **kind_slots().get(kind, {})}
+def _step_slots(known: tuple[Kind, ...], kind: str) -> Mapping[str, Slot]:
+    return {**_words(known, frozenset()).modifiers, **_kind_slots(known).get(kind, {})}
 
 
 @cache
 def state_slots() -> Mapping[str, Slot]:
     """Return what the keys of a state take, with its modifiers."""
-    return {**modifier_slots(), **BELOW[Takes.STATE]}
+    return {**_modifier_slots(), **BELOW[Takes.STATE]}

@@ -7,14 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, overload
+from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, overload
 
 from rbxcompose.msgs.types import Action, Message, Service
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import ActionCaller, ActionServer, Caller, Latest, Look, Sender
-
-if TYPE_CHECKING:
-    from rbxcompose.sdk.component import Component
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)
@@ -22,6 +19,12 @@ R = TypeVar("R", bound=Message)
 G = TypeVar("G", bound=Message)
 F = TypeVar("F", bound=Message)
 B = TypeVar("B")  # what the port is on a component
+
+
+class HasPorts(Protocol):
+    """A component, as its ports see it."""
+
+    bound: dict[str, Any]  # what each port is on it, by name
 
 
 class Port(Generic[B]):
@@ -40,11 +43,11 @@ class Port(Generic[B]):
     @overload
     def __get__(self, component: None, owner: type) -> Self: ...
     @overload
-    def __get__(self, component: Component[Any], owner: type) -> B: ...
-    def __get__(self, component: Component[Any] | None, owner: type) -> Self | B:
+    def __get__(self, component: HasPorts, owner: type) -> B: ...
+    def __get__(self, component: HasPorts | None, owner: type) -> Self | B:
         return self if component is None else self.of(component)
 
-    def of(self, component: Component[Any]) -> B:
+    def of(self, component: HasPorts) -> B:
         """Return what this port is on `component` (for ports that depend on its configuration)."""
         bound: B = component.bound[self.name]
         return bound

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.cli import main as command
+from rbxcompose.cli import verbs
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.log import start_new
@@ -50,7 +51,7 @@ def test_without_a_command_it_shows_its_usage(capsys: pytest.CaptureFixture[str]
 def test_the_help_has_one_line_for_each_verb(capsys: pytest.CaptureFixture[str]) -> None:
     command.main(["--help"])
     shown = {line.split()[0] for line in capsys.readouterr().out.splitlines() if line.startswith("  ")}
-    assert shown == set(command.verbs())
+    assert shown == set(verbs.verbs())
     assert {"up", "down", "ps", "logs", "stop", "release", "mission"} <= shown
 
 
@@ -202,13 +203,13 @@ def test_a_reader_that_goes_away_is_no_error_of_ours() -> None:
 
 @pytest.mark.parametrize("verb", ["ps", "stop", "down", "logs", "mission"])
 def test_a_command_to_a_running_robot_imports_nothing_heavy(verb: str) -> None:
-    script = f"import sys; import rbxcompose.cli.main as m; m.load({verb!r}); print(*sys.modules)"
+    script = f"import sys; import rbxcompose.cli.verbs as m; m.load({verb!r}); print(*sys.modules)"
     found = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
     assert not {"pydantic", "numpy", "zenoh", "yaml", "rosbags"} & set(found.stdout.split())
 
 
 def test_each_verb_says_what_it_does_in_one_line() -> None:
-    for verb in command.verbs():
+    for verb in verbs.verbs():
         text = (ROOT / "rbxcompose" / "cli" / f"{verb}.py").read_text(encoding="utf-8")
         first = (ast.get_docstring(ast.parse(text)) or "").splitlines()[0]
         assert first.endswith(".")

@@ -13,6 +13,7 @@ import pytest
 
 from rbxcompose.bus.graph import Graph, Name
 from rbxcompose.cli import main as command
+from rbxcompose.cli import verbs
 from rbxcompose.cli.bus.place import BusPlace
 from rbxcompose.cli.completion import SCRIPTS
 from rbxcompose.cli.completions.candidates import candidates, for_shell
@@ -34,7 +35,7 @@ def fitting(*words: str) -> list[str]:
 
 def test_verbs_are_completed() -> None:
     assert fitting("to") == ["top", "topic"]
-    assert fitting("") == command.verbs()
+    assert fitting("") == verbs.verbs()
     assert fitting("--") == ["--help", "--version"]
     assert fitting("nonsense", "") == []
 
@@ -63,7 +64,7 @@ def test_words_options_and_values_are_completed_where_they_may_stand(
     assert fitting(*words) == expected
 
 
-@pytest.mark.parametrize("verb", command.verbs())
+@pytest.mark.parametrize("verb", verbs.verbs())
 def test_every_verb_can_be_completed(verb: str) -> None:
     assert "--help" in fitting(verb, "--")
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.cli import main as command
+from rbxcompose.cli import verbs
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.log import start_new
 from tests.conftest import ROOT
@@ -77,7 +78,7 @@ def leaves(parser: argparse.ArgumentParser, words: str) -> Iterator[tuple[str, a
 
 
 def test_each_verb_that_claims_it_is_looked_at_here() -> None:
-    found = [leaf for verb in command.verbs() for leaf in leaves(command.parser_of(verb, command.load(verb)), verb)]
+    found = [leaf for verb in verbs.verbs() for leaf in leaves(verbs.parser_of(verb, verbs.load(verb)), verb)]
     assert {words for words, parser in found if "--json" in parser._option_string_actions} == set(MISTAKES)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli.main import load, verbs
+from rbxcompose.cli.verbs import load, verbs
 from rbxcompose.findings import Severity
 from rbxcompose.missions.registry import forget
 from rbxcompose.msgs.std_msgs import Float32

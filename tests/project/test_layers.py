@@ -30,7 +30,7 @@ GROUND = {
     "robot_events": "",
     "rules": "findings",
     "scheduler": "",
-    "slips": "findings plugins",
+    "slips": "findings",
     "typed_json": "",
     "units": "findings",
 }

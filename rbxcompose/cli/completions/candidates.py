@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from rbxcompose.cli.main import load, parser_of, verbs
+from rbxcompose.cli.verbs import load, parser_of, verbs
 
 _GENERAL = ("--help", "--version")
 _BREAKS = re.compile(r".*[:=]", re.DOTALL)  # bash counts these as ends of words, and replaces only what follows

@@ -6,27 +6,28 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
+from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import admin_key
 from rbxcompose.clock import Clock
 from rbxcompose.config import Config
 from rbxcompose.diagnostics.levels import Level
-from rbxcompose.plan.model import Instance
-from rbxcompose.requests import Command, Query, Refused, as_data
+from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.requests import Command, Query, Refused, Request, as_data
 from rbxcompose.robot_events import RobotEvent
 from rbxcompose.runtime.channel import Repeated
 from rbxcompose.runtime.process_group.binding import bind
+from rbxcompose.runtime.process_group.frames import Frames
 from rbxcompose.runtime.process_group.handover import HandedOver, handed_over
+from rbxcompose.runtime.process_group.statuses import Statuses
 from rbxcompose.runtime.process_group.worker import Worker
+from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Port, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.typed_json import to_data
-
-if TYPE_CHECKING:
-    from rbxcompose.runtime.process_group.host import Host
 
 LONGEST_GOODBYE = 0.3  # [s] to wait for a component's own thread when it is to end
 
@@ -40,10 +41,64 @@ class Lifecycle(StrEnum):
     FAILED = "failed"
 
 
+class ServesParameters(Protocol):
+    """What makes the settings of an instance parameters of ROS 2."""
+
+    def serve(self, hosted: Hosted, /) -> None:
+        """Serve the parameters of an instance."""
+        ...
+
+
+class Home(Protocol):
+    """The host of an instance, as the instance sees it."""
+
+    plan: Plan
+    clock: Clock
+    bus: Bus
+    scheduler: Scheduler
+    statuses: Statuses
+    frames: Frames | None
+    is_stopped: bool
+    is_held: bool
+    is_braking: bool
+    has_started: bool
+    doing: str
+
+    @property
+    def notify(self) -> Callable[[Repeated | RobotEvent], None]:
+        """Return what tells the supervisor."""
+        ...
+
+    @property
+    def parameters(self) -> ServesParameters:
+        """Return what serves parameters."""
+        ...
+
+    def worker(self, name: str) -> Worker | None:
+        """Return a thread for an instance that may block; None if it runs in the scheduler's."""
+        ...
+
+    def ready(self, name: str) -> None:
+        """Hear that an instance is inactive."""
+        ...
+
+    def changed(self, name: str) -> None:
+        """Hear that the state of an instance has changed."""
+        ...
+
+    def log(self, source: str, level: Level, text: str, detail: str = "") -> None:
+        """Write one event of the robot's story."""
+        ...
+
+    def ask(self, instance: str, request: Request[Any]) -> Any:
+        """Have an instance answer a request."""
+        ...
+
+
 class Hosted:
     """An instance and, while it lives, its component. It is the component's context, too."""
 
-    def __init__(self, host: Host, instance: Instance) -> None:
+    def __init__(self, host: Home, instance: Instance) -> None:
         self.host, self.instance = host, instance
         self.clock: Clock = host.clock
         self.state = Lifecycle.UNCONFIGURED

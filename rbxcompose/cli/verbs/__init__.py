@@ -1,0 +1,46 @@
+"""The commands: found by the names of their files, and only imported when asked for."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from typing import TYPE_CHECKING, Protocol, cast
+
+from rbxcompose import cli
+
+if TYPE_CHECKING:  # a command that is not run costs no imports
+    import argparse
+
+
+class Verb(Protocol):
+    """What a verb's module holds."""
+
+    __doc__: str | None
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare options and arguments."""
+        ...
+
+    def run(self, arguments: argparse.Namespace) -> int:
+        """Do it and return the exit code."""
+        ...
+
+
+def verbs() -> list[str]:
+    """Return the names of all verbs, sorted."""
+    names = (name.removesuffix(".py") for name in os.listdir(cli.__path__[0]) if name.endswith(".py"))
+    return sorted(name for name in names if name not in ("__init__", "main"))
+
+
+def load(verb: str) -> Verb:
+    """Import a verb."""
+    return cast(Verb, importlib.import_module(f"{cli.__name__}.{verb}"))
+
+
+def parser_of(name: str, verb: Verb) -> argparse.ArgumentParser:
+    """Return the parser of a verb."""
+    from rbxcompose.cli.output.console import Parser  # help can do without
+
+    parser = Parser(f"rbxcompose {name}", description=verb.__doc__ or "", allow_abbrev=False)
+    verb.add_arguments(parser)
+    return parser
