@@ -23,10 +23,29 @@ BASE = {
     "plain",
     "plugins",
     "qos",
+    "references",
     "replacing",
     "restarts",
     "rules",
     "scheduler",
+}
+# What a section of the manifest is made of; what composes sections stands above them.
+DESCRIBING = {
+    "arguments",
+    "data",
+    "fields",
+    "files",
+    "fill",
+    "limits",
+    "options",
+    "reader",
+    "registry",
+    "renames",
+    "section",
+    "tree",
+    "urdf",
+    "validate",
+    "wanted",
 }
 CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -39,7 +58,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "executive": BASE | CORES | {"executive", "sdk"},
     "components": BASE | CORES | {"executive", "sdk"},
     "bus": BASE | {"bus", "sdk.bound"},
-    "manifest": BASE | {"manifest", "sdk"},
+    "manifest": BASE | {"manifest", "sdk", "sections"},
+    "sections": BASE | {"sections", "sdk", *(f"manifest.{name}" for name in DESCRIBING)},
     "recording": BASE
     | {
         "recording",
@@ -51,13 +71,15 @@ MAY_IMPORT: dict[str, set[str]] = {
         "bus.witness",
     },
     "rendering": BASE | {"rendering"},
-    "model": BASE | CORES | {"model", "manifest", "sdk"},
+    "model": BASE | CORES | {"model", "manifest", "sdk", "sections"},
     "checking": BASE | {"missions", "model"},
     "checks": BASE | CORES | {"checks", "checking", "model", "manifest", "sdk"},
     "plan": BASE | CORES | {"plan", "model", "manifest.shapes", "manifest.tree", "manifest.validate", "sdk"},
     "scaffold": BASE | {"missions", "scaffold", "manifest.files", "sdk"},
-    "seeing": BASE | CORES | {"seeing", "plan", "model", "manifest", "schema", "sdk", "bus.names", "bus.wire"},
-    "schema": BASE | {"missions", "schema", "manifest", "sdk"},
+    "seeing": BASE
+    | CORES
+    | {"seeing", "plan", "model", "manifest", "schema", "sdk", "sections", "bus.names", "bus.wire"},
+    "schema": BASE | {"missions", "schema", "manifest", "sdk", "sections"},
 }
 
 
