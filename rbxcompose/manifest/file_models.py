@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from pydantic import Field, create_model
@@ -19,7 +20,12 @@ FILES = {
 
 def file_model(kind: str) -> type[Header]:
     """Return the keys of a robot's, part's or overlay's file, with anything in each section."""
-    fields: dict[str, Any] = {one.name: (Any, Field(None, description=one.doc)) for one in sections(kind)}
+    return _model(kind, tuple((one.name, one.doc) for one in sections(kind)))
+
+
+@cache
+def _model(kind: str, sections: tuple[tuple[str, str], ...]) -> type[Header]:
+    fields: dict[str, Any] = {name: (Any, Field(None, description=doc)) for name, doc in sections}
     return create_model(f"{kind}File", __base__=Header, __doc__=FILES[kind], **fields)
 
 

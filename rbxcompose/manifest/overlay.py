@@ -12,7 +12,6 @@ from operator import is_
 from rbxcompose.findings import Related, Report, Span, correction, kind, suggest
 from rbxcompose.manifest.history import History, Step
 from rbxcompose.manifest.registry import section_named
-from rbxcompose.manifest.section import ANY
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar
 from rbxcompose.manifest.tree import Sequence as NodeSequence
 from rbxcompose.manifest.validate import BROKEN
@@ -243,12 +242,7 @@ class _Join(_Merge):
 def _is_shared(path: Path) -> bool:
     """Tell whether several parts may add to the map at `path`."""
     section = section_named(path[0])
-    return section is not None and any(_fits(pattern, path[1:]) for pattern in section.shared)
-
-
-def _fits(pattern: tuple[str, ...], path: Path) -> bool:
-    pairs = zip(pattern, path, strict=False)
-    return len(pattern) == len(path) and all(one in (ANY, key) for one, key in pairs)
+    return section is not None and section.is_shared(path[1:])
 
 
 def _settled(node: Node, report: Report) -> Node:

@@ -5,47 +5,52 @@ from __future__ import annotations
 import inspect
 import textwrap
 from collections.abc import Callable, Iterator
+from dataclasses import fields
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from rbxcompose.findings import Finding
-from rbxcompose.manifest.section import Reading, Section
+from rbxcompose.manifest.section import Declaration, Reading, Section
 from rbxcompose.manifest.validate import ENTRY_WORDS
 from rbxcompose.plugins import LEFT_OUT, BrokenPluginError, Plugins
 
 M = TypeVar("M")
 R = TypeVar("R")
+P = ParamSpec("P")
 
 PLUGINS = Plugins("section", "rbxcompose.sections")
 _EXAMPLE = "Example:"
 _SECTIONS: dict[str, Section[Any, Any]] = {}
 
 
-def section(name: str, model: type[M], **declared: Any) -> Callable[[Callable[[Reading[M]], R]], Section[M, R]]:
-    """Declare the section `name` by the function that reads it; `declared` are further fields of `Section`.
+def _decorator(
+    declaration: Callable[P, Declaration[M]],
+) -> Callable[P, Callable[[Callable[[Reading[M]], R]], Section[M, R]]]:
+    """Return the decorator that takes what `declaration` takes."""
 
-    The docstring tells what the section is for; behind `Example:` it shows one.
+    def section(*args: P.args, **keywords: P.kwargs) -> Callable[[Callable[[Reading[M]], R]], Section[M, R]]:
+        return lambda read: _declared(declaration(*args, **keywords), read)
 
-    Raises:
-        ValueError: if the function has no docstring, or another section has this name.
-    """
+    return section
 
-    def declare(read: Callable[[Reading[M]], R]) -> Section[M, R]:
-        about, _, example = (inspect.getdoc(read) or "").partition(_EXAMPLE)
-        if not about:
-            raise ValueError(f"the section '{name}' has no docstring, so nobody would know what it is for")
-        made: Section[M, R] = Section(
-            **{"shared": ((),) if declared.get("names") and "at" not in declared else (), **declared},
-            name=name,
-            model=model,
-            doc=" ".join(about.split()),
-            example=textwrap.dedent(example.lstrip("\n")),
-            read=read,
-        )
-        register(made)
-        return made
 
-    return declare
+section = _decorator(Declaration)
+"""Declare a section by the function that reads it: `@section("places", PlaceModel, names=PLACE)`.
+
+The docstring tells what the section is for; behind `Example:` it shows one. A ValueError is raised if there is no
+docstring, or another section has this name.
+"""
+
+
+def _declared(declaration: Declaration[M], read: Callable[[Reading[M]], R]) -> Section[M, R]:
+    about, _, example = (inspect.getdoc(read) or "").partition(_EXAMPLE)
+    if not about:
+        raise ValueError(f"the section '{declaration.name}' has no docstring, so nobody would know what it is for")
+    traits: dict[str, Any] = {one.name: getattr(declaration, one.name) for one in fields(declaration)}
+    about, example = " ".join(about.split()), textwrap.dedent(example.lstrip("\n"))
+    made: Section[M, R] = Section(**traits, doc=about, example=example, read=read)
+    register(made)
+    return made
 
 
 def register(made: Section[Any, Any]) -> None:
@@ -57,7 +62,9 @@ def register(made: Section[Any, Any]) -> None:
     other = _SECTIONS.get(made.name)
     if other is not None and other.read.__module__ != made.read.__module__:
         raise ValueError(f"two sections are named '{made.name}': {other.read.__module__} and {made.read.__module__}")
-    _SECTIONS[made.name] = made
+    ordered = sorted([*_SECTIONS.values(), made], key=lambda one: (one.order, one.name))
+    _SECTIONS.clear()
+    _SECTIONS.update({one.name: one for one in ordered})
     if made.entry:
         ENTRY_WORDS[made.name] = made.entry
 
@@ -65,8 +72,7 @@ def register(made: Section[Any, Any]) -> None:
 def sections(kind: str = "") -> list[Section[Any, Any]]:
     """Return all sections in their order, or those that a kind of manifest may have."""
     _problems()
-    found = sorted(_SECTIONS.values(), key=lambda one: (one.order, one.name))
-    return [one for one in found if not kind or kind in one.files]
+    return [one for one in _SECTIONS.values() if not kind or kind in one.files]
 
 
 def section_named(name: object) -> Section[Any, Any] | None:
@@ -77,7 +83,7 @@ def section_named(name: object) -> Section[Any, Any] | None:
 
 def naming(kind: str) -> Iterator[Section[Any, Any]]:
     """Yield the sections whose keys are names of a kind."""
-    return (one for one in sections() if kind in one.kinds)
+    return (one for one in sections() if one.has_names_of(kind))
 
 
 def broken_sections() -> list[Finding]:

@@ -118,7 +118,7 @@ class Renaming:
         return replace(node, entries=entries)
 
     def _is_own_topic(self, topic: str) -> bool:
-        return any(topic in self.own[one.name] for one in sections() if one.has_topics)
+        return any(one.has_topics and topic in self.own.get(one.name, ()) for one in sections())
 
     def _new(self, section: Section[Any, Any], name: str) -> str:
         return self.topic(name) if section.has_topics else f"{self.prefix}{name}"

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from collections.abc import Mapping as AnyMapping
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from enum import Enum
+from functools import cache, cached_property
 from pathlib import Path as FilePath
 from types import GenericAlias
 from typing import Annotated, Any, Generic, TypeVar, cast
@@ -21,7 +22,7 @@ from rbxcompose.findings import Report
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.renames import Renames
 from rbxcompose.manifest.shapes import below, kinds_of
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, at
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, at
 from rbxcompose.manifest.validate import WRONG_TYPE, is_valid, label_of, validate
 from rbxcompose.manifest.wanted import WantedComponent, Wiring
 from rbxcompose.references import COMPONENT, Refers
@@ -56,17 +57,27 @@ class Short:
     """What the word is, where only an overlay may be so short."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Section(Generic[M, R]):
-    """A section of the manifest; `M` is the model of an entry (of all, if it has fixed keys), `R` what is read."""
+@cache
+def _short_type(model: Any, key: str) -> Any:
+    return Annotated[(str, *(Refers(kind, is_told=True) for kind in kinds_of(next(below(model, key)))))]
+
+
+@cache  # each type is compiled once
+def _entry_type(model: Any, short: Short) -> Any:
+    word = _short_type(model, short.key)
+    read = BeforeValidator(
+        lambda value: {short.key: value} if isinstance(value, str) else value, json_schema_input_type=model | word
+    )
+    return Annotated[model, read]
+
+
+@dataclass(frozen=True, slots=True)
+class Declaration(Generic[M]):
+    """What a section says of itself; `M` is the model of an entry, or of the whole section if its keys are fixed."""
 
     name: str
     model: type[M]
-    doc: str
-    """What it is for: shown by editors and the reference."""
-    read: Callable[[Reading[M]], R]
-    example: str = ""
-    """YAML for the reference; a test compiles it within the patrol robot."""
+    _: KW_ONLY
     files: tuple[str, ...] = EVERYWHERE
     """Kinds of manifests in which it may stand."""
     order: int = 95
@@ -87,8 +98,10 @@ class Section(Generic[M, R]):
 
     is_composed: bool = True
     """Whether it is part of the composed robot; else composition itself is what reads it."""
-    shared: tuple[tuple[str, ...], ...] = ()
-    """Maps to which several parts may add, as paths below the section, with `ANY` for any key; `()` is the section."""
+    shared: tuple[tuple[str, ...], ...] | None = None
+    """Maps to which several parts may add, as paths below the section, with `ANY` for any key; `()` is the section.
+
+    Without it, they may add to a section whose keys are names."""
     has_topics: bool = False
     """Whether its keys are topics, which get no prefix when a part brings them."""
     clash: Callable[[Sequence[str]], tuple[str, str] | None] = lambda names: None
@@ -106,40 +119,58 @@ class Section(Generic[M, R]):
     """The components that it becomes."""
     connects: Callable[[Contents], AnyMapping[str, AnyMapping[str, str]]] = lambda contents: {}
     """Topics that it gives to the ports of components: component -> port -> topic."""
-    details: Callable[[R], AnyMapping[str, str]] = lambda read: {}
-    """A few words on each of its names, for editors."""
+    details: Callable[[Any], AnyMapping[str, str]] = lambda read: {}
+    """A few words on each of its names, for editors; it is given what was read."""
 
     @property
     def is_map(self) -> bool:
         """Tell whether its keys are names that the user gives."""
         return bool(self.names) and not self.at
 
-    @property
-    def kinds(self) -> frozenset[str]:
-        """Return of what kinds its keys are names; one that runs is a component as well."""
-        return frozenset(filter(None, (self.names, COMPONENT if self.runs else "")))
+    def has_names_of(self, kind: str) -> bool:
+        """Tell whether its keys are names of a kind; what runs is a component as well."""
+        return kind == self.names or (kind == COMPONENT and self.runs)
+
+    def is_shared(self, path: Path) -> bool:
+        """Tell whether several parts may add to the map at a path below it."""
+        patterns = self.shared if self.shared is not None else [()] if self.is_map else []
+        return any(
+            len(pattern) == len(path) and all(one in (ANY, key) for one, key in zip(pattern, path, strict=True))
+            for pattern in patterns
+        )
 
     @property
     def entry_type(self) -> Any:
         """Return what an entry may be: the model, or the word that stands for it."""
-        if self.short is None or self.short.only_over:
-            return self.model
-        key, word = self.short.key, self.short_type
-        read = BeforeValidator(
-            lambda value: {key: value} if isinstance(value, str) else value, json_schema_input_type=self.model | word
-        )
-        return Annotated[self.model, read]
+        model: Any = self.model
+        return _entry_type(model, self.short) if self.short and not self.short.only_over else model
 
     @property
     def short_type(self) -> Any:
         """Return what the word is that stands for an entry."""
-        hint = next(below(self.model, self.short.key)) if self.short else str
-        return Annotated[(str, *(Refers(kind, is_told=True) for kind in kinds_of(hint)))]
+        model: Any = self.model
+        return _short_type(model, self.short.key) if self.short else str
 
     @property
     def type(self) -> Any:
         """Return what stands below its name."""
         return GenericAlias(dict, (Name, self.entry_type)) if self.is_map else self.model
+
+    def names_in(self, root: Mapping) -> Iterable[str]:
+        """Return the names that a tree gives in this section."""
+        named = at(root, (self.name, *self.at)) if self.names else None
+        return named.entries if isinstance(named, Mapping) else ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section(Declaration[M], Generic[M, R]):
+    """A section of the manifest; `R` is what is read from it."""
+
+    doc: str
+    """What it is for: shown by editors and the reference."""
+    example: str
+    """YAML for the reference; a test compiles it within the patrol robot."""
+    read: Callable[[Reading[M]], R]
 
     def described(self, contents: Contents) -> AnyMapping[str, str]:
         """Return the names of what was read, each with a few words; none of a section that composition reads."""
@@ -147,11 +178,6 @@ class Section(Generic[M, R]):
             return {}
         read = contents.of(self)
         return self.details(read) or dict.fromkeys(read if isinstance(read, AnyMapping) else (), self.entry)
-
-    def names_in(self, root: Mapping) -> Iterable[str]:
-        """Return the names that a tree gives in this section."""
-        named = at(root, (self.name, *self.at)) if self.names else None
-        return named.entries if isinstance(named, Mapping) else ()
 
 
 class Contents:
@@ -170,17 +196,19 @@ class Contents:
             self._read[section.name] = section.read(Reading(section, self))
         return cast(R, self._read[section.name])
 
+    @cached_property
     def known(self) -> dict[str, AnyMapping[str, object]]:
         """Return the names of each kind, also those of entries with mistakes: what refers to them is not wrong."""
-        return {kind: _Names(self, kind, self._naming) for kind in {kind for one in self._naming for kind in one.kinds}}
+        kinds = {COMPONENT, *(one.names for one in self._naming)}
+        return {kind: _Names(self, [one for one in self._naming if one.has_names_of(kind)]) for kind in kinds}
 
 
 class _Names(AnyMapping[str, object]):
     """The names of a kind; what one stands for is read when it is asked for."""
 
-    def __init__(self, contents: Contents, kind: str, sections: Iterable[Section[Any, Any]]) -> None:
+    def __init__(self, contents: Contents, sections: Iterable[Section[Any, Any]]) -> None:
         self._contents = contents
-        self._section = {name: one for one in sections if kind in one.kinds for name in one.names_in(contents.root)}
+        self._section = {name: one for one in sections for name in one.names_in(contents.root)}
 
     def __getitem__(self, name: str) -> object:
         read = self._contents.of(self._section[name])
@@ -225,7 +253,7 @@ class Reading(Generic[M]):
     def valid(self, model: type[T], name: str, node: Node) -> T | None:
         """Return an entry as `model`, or None after its findings."""
         path = (self.section.name, *self.section.at, name)
-        return validate(model, node, path, self.report, self.contents.known())
+        return validate(model, node, path, self.report, self.contents.known)
 
     def entries(self) -> dict[str, M]:
         """Return the entries without mistakes, by name."""
@@ -236,7 +264,7 @@ class Reading(Generic[M]):
         """Return a section of fixed keys; None if it is missing or has mistakes."""
         if self.node is None:
             return None
-        return validate(self.section.model, self.node, (self.section.name,), self.report, self.contents.known())
+        return validate(self.section.model, self.node, (self.section.name,), self.report, self.contents.known)
 
 
 def is_empty(node: Node) -> bool:

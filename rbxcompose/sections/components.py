@@ -171,7 +171,7 @@ def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> C
     model = registry.component_type(type_name).config_type()
     keys = [key for key in node.entries if key not in (*OPTIONS, "type")]
     config_node = replace(_part(node, keys), span=entry.key.span)
-    config = validate(model, config_node, path, report, reading.contents.known(), also=[*OPTIONS, "type"])
+    config = validate(model, config_node, path, report, reading.contents.known, also=[*OPTIONS, "type"])
     return ComponentEntry(name, type_name, options, config, entry.key.span)
 
 
