@@ -18,13 +18,14 @@ from rbxcompose.references import COMPONENT, PORT, RUNNING, VALUE
 from rbxcompose.sections.args import args
 from rbxcompose.sections.include import PART_ARGUMENT, include
 from rbxcompose.sections.missions import INPUT
+from rbxcompose.sections.profiles import profiles
 
 SKILL = "skill"
 
 
 def below_profile(path: TreePath) -> TreePath:
     """Return a path as it is in the robot that a profile changes."""
-    return path[2:] if path[:1] == ("profiles",) else path
+    return path[2:] if path[:1] == (profiles.name,) else path
 
 
 def named_by_key(path: TreePath, is_overlay: bool) -> str:

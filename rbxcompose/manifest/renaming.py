@@ -15,7 +15,6 @@ from typing import Any
 from rbxcompose.manifest.registry import naming, section_named, sections
 from rbxcompose.manifest.renames import Topic
 from rbxcompose.manifest.section import Section
-from rbxcompose.manifest.shapes import below, kinds_of
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence, at
 from rbxcompose.references import ANYTHING, COMPONENT, PORT, TOPIC
 
@@ -124,59 +123,21 @@ class Renaming:
         return self.topic(name) if section.has_topics else f"{self.prefix}{name}"
 
     def _section(self, section: Section[Any, Any], node: Node) -> Node:
-        if not section.names:
-            return self._value(node, section.model)
+        node = section.with_references(node, lambda kind, one: self.texts(one, lambda text: self.name(kind, text)))
         if section.at and isinstance(node, Mapping):
-            key = str(section.at[0])
-            entries = {
-                name: one if name == key else self._field(section, name, one) for name, one in node.entries.items()
-            }
-            return _with(replace(node, entries=entries), key, lambda named: self._named(section, named))
-        return self._named(section, node)
-
-    def _field(self, section: Section[Any, Any], name: str, entry: Entry) -> Entry:
-        """Return a key of a section that stands beside its names."""
-        value = entry.value
-        for hint in below(section.model, name):
-            value = self._value(value, hint)
-        return Entry(entry.key, value)
+            return _with(node, section.at[0], lambda named: self._named(section, named))
+        return self._named(section, node) if section.names else node
 
     def _named(self, section: Section[Any, Any], node: Node) -> Node:
         if not isinstance(node, Mapping):
             return node
-        changed = {name: Entry(one.key, self._entry(section, name, one.value)) for name, one in node.entries.items()}
+        values = {name: section.rename(self, name, entry.value) for name, entry in node.entries.items()}
+        changed = {name: Entry(entry.key, values[name]) for name, entry in node.entries.items()}
         if section.has_topics:
             return self.topics(replace(node, entries=changed))
-        entries = {
-            f"{self.prefix}{name}": Entry(replace(entry.key, text=f"{self.prefix}{name}"), entry.value)
-            for name, entry in changed.items()
-        }
+        new = {name: f"{self.prefix}{name}" for name in changed}
+        entries = {new[name]: Entry(replace(one.key, text=new[name]), one.value) for name, one in changed.items()}
         return replace(node, entries=entries)
-
-    def _entry(self, section: Section[Any, Any], name: str, node: Node) -> Node:
-        if isinstance(node, Scalar):
-            node = self._value(node, section.short_type)
-        for hint in section.models(node) if section.models else (section.model,):
-            node = self._value(node, hint)
-        return section.rename(self, name, node)
-
-    def _value(self, node: Node, hint: Any) -> Node:
-        """Return a node with the names changed where its type refers to some."""
-        for kind in kinds_of(hint):
-            node = self.texts(node, lambda text, kind=kind: self.name(kind, text))  # type: ignore[misc]
-        match node:
-            case Mapping(entries=entries):
-                return replace(
-                    node, entries={n: Entry(e.key, self._below(e.value, hint, n)) for n, e in entries.items()}
-                )
-            case Sequence(items=items):
-                return replace(node, items=tuple(self._below(one, hint, index) for index, one in enumerate(items)))
-        return node
-
-    def _below(self, node: Node, hint: Any, key: str | int) -> Node:
-        for inner in below(hint, key):
-            node = self._value(node, inner)
-        return node
 
 
 def topics_of(roots: Iterable[Mapping]) -> set[str]:

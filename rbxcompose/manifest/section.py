@@ -21,7 +21,7 @@ from rbxcompose.config import Name
 from rbxcompose.findings import Report
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.renames import Renames
-from rbxcompose.manifest.shapes import below, kinds_of
+from rbxcompose.manifest.shapes import below, kinds_of, with_references
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, at
 from rbxcompose.manifest.validate import WRONG_TYPE, is_valid, label_of, validate
 from rbxcompose.manifest.wanted import WantedComponent, Wiring
@@ -127,6 +127,12 @@ class Declaration(Generic[M]):
         """Tell whether its keys are names that the user gives."""
         return bool(self.names) and not self.at
 
+    def types_of(self, entry: Node) -> Iterable[Any]:
+        """Return the types that tell what stands in an entry."""
+        if isinstance(entry, Scalar):
+            return (self.short_type,)
+        return self.models(entry) if self.models else (self.model,)
+
     def has_names_of(self, kind: str) -> bool:
         """Tell whether its keys are names of a kind; what runs is a component as well."""
         return kind == self.names or (kind == COMPONENT and self.runs)
@@ -155,6 +161,18 @@ class Declaration(Generic[M]):
     def type(self) -> Any:
         """Return what stands below its name."""
         return GenericAlias(dict, (Name, self.entry_type)) if self.is_map else self.model
+
+    def with_references(self, node: Node, change: Callable[[str, Node], Node]) -> Node:
+        """Return what stands below its name with `change(kind, value)` in the place of each name of something."""
+        if not self.is_map or not isinstance(node, Mapping):
+            return with_references(node, self.type, change)
+        entries = {}
+        for name, entry in node.entries.items():
+            value = entry.value
+            for hint in self.types_of(value):
+                value = with_references(value, hint, change)
+            entries[name] = Entry(entry.key, value)
+        return replace(node, entries=entries)
 
     def names_in(self, root: Mapping) -> Iterable[str]:
         """Return the names that a tree gives in this section."""
@@ -212,7 +230,7 @@ class _Names(AnyMapping[str, object]):
 
     def __getitem__(self, name: str) -> object:
         read = self._contents.of(self._section[name])
-        return read[name] if isinstance(read, AnyMapping) else name
+        return read.get(name, name) if isinstance(read, AnyMapping) else name
 
     def __contains__(self, name: object) -> bool:
         return name in self._section

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel
 
 from rbxcompose.config import Dimensioned
-from rbxcompose.manifest.tree import Path
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Sequence
 from rbxcompose.references import Refers
 from rbxcompose.units import Dimension
 
@@ -55,6 +56,25 @@ def below(hint: Any, key: str | int) -> Iterator[Any]:
             yield get_args(one)[1]
         elif get_origin(one) in (list, tuple):
             yield get_args(one)[0]
+
+
+def with_references(node: Node, hint: Any, change: Callable[[str, Node], Node]) -> Node:
+    """Return a node with `change(kind, value)` in the place of each value that is a name of a kind by its type."""
+    for kind in kinds_of(hint):
+        node = change(kind, node)
+    match node:
+        case Mapping(entries=entries):
+            values = {name: _changed_below(one.value, hint, name, change) for name, one in entries.items()}
+            return replace(node, entries={name: Entry(one.key, values[name]) for name, one in entries.items()})
+        case Sequence(items=items):
+            return replace(node, items=tuple(_changed_below(one, hint, i, change) for i, one in enumerate(items)))
+    return node
+
+
+def _changed_below(node: Node, hint: Any, key: str | int, change: Callable[[str, Node], Node]) -> Node:
+    for inner in below(hint, key):
+        node = with_references(node, inner, change)
+    return node
 
 
 def alternatives(hint: Any) -> Iterator[Any]:
