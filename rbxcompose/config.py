@@ -5,22 +5,14 @@ Inside, all is SI and ratios are 0 to 1. A field's docstring becomes its descrip
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    GetCoreSchemaHandler,
-    StringConstraints,
-    ValidationInfo,
-    WithJsonSchema,
-)
+from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandler, StringConstraints, WithJsonSchema
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from rbxcompose import units
+from rbxcompose.references import PLACE, Refers
 from rbxcompose.units import Dimension, to_si
 
 
@@ -119,18 +111,5 @@ def _secret(value: object) -> Secret:
     return value
 
 
-def _place(value: object, info: ValidationInfo) -> Place:
-    places: Mapping[str, Place] = (info.context or {}).get("places", {})
-    if isinstance(value, Place):
-        return value
-    if not isinstance(value, str):
-        raise PydanticCustomError("place", "must be the name of a place")
-    if value not in places:
-        context = {"name": value, "valid": list(places), "what": "places of this robot"}
-        raise PydanticCustomError("place", "there is no place '{name}'", context)
-    return places[value]
-
-
-_Word = Annotated[str, WithJsonSchema({"type": "string", "x-names": "place"})]
-PlaceName = Annotated[Place, BeforeValidator(_place, json_schema_input_type=_Word)]
+PlaceName = Annotated[Place, Refers(PLACE)]
 """A field that names one of the robot's `places` and holds the place itself."""

@@ -34,8 +34,9 @@ LEFT_OUT = kind(
     "RBX9302",
     """A plug-in of another package is left out
 
-It has the name of one that ships with the project, which is taken instead, or it is a check that cannot be imported or
-that raised an error. The message names the package. Everything else goes on without it.
+It has the name of one that ships with the project, which is taken instead, or it is a check or a section of the
+manifest that cannot be imported, or a check that raised an error. The message names the package. Everything else goes
+on without it.
 
 Upgrade the package, uninstall it, or tell its authors.
 """,

@@ -8,9 +8,10 @@ from typing import Any
 from docs.generating.markdown import about, code, example, example_of, indented, page, table
 from docs.generating.shapes import keys_table
 from rbxcompose.config import Place
-from rbxcompose.manifest.models import ComponentOptions
+from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.missions.goals import typed_fields
 from rbxcompose.qos import Qos
+from rbxcompose.references import PLACE
 from rbxcompose.schema.components import examples_of
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import In, Looks, Out, Port, ServesAction, ServesTopic
@@ -87,7 +88,7 @@ def ports_of(name: str) -> dict[str, Port[Any]]:
     [written] = examples_of(name)
     options = {"type", *ComponentOptions.model_fields}
     settings = {key: value for key, value in dict(written).items() if key not in options}  # type: ignore[call-overload]
-    config = cls.config_type().model_validate(settings, context={"places": {"dock": Place("dock", 0, 0, 0)}})
+    config = cls.config_type().model_validate(settings, context={PLACE: {"dock": Place("dock", 0, 0, 0)}})
     return cls.ports(config)
 
 

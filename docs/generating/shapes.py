@@ -3,34 +3,24 @@
 from __future__ import annotations
 
 from types import UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 
 from docs.generating.markdown import code, table
-from rbxcompose.config import Config, Dimensioned, Name, PlaceName, Secret
-from rbxcompose.manifest.models import (
-    IncludeModel,
-    InterfaceName,
-    MissionModel,
-    PortName,
-    RestartModel,
-    TopicName,
-    ValueModel,
-)
+from rbxcompose.config import Config, Dimensioned, Name, Secret
+from rbxcompose.manifest.fields import DottedName, InterfaceName
+from rbxcompose.manifest.options import RestartModel
+from rbxcompose.manifest.registry import naming
+from rbxcompose.references import ANYTHING, FILE, PORT, TOPIC, Refers
 from rbxcompose.restarts import Restart
 from rbxcompose.units import Dimension, format_number, format_quantity
 
 _NAMED: tuple[tuple[object, str], ...] = (
     (Name, "name"),
-    (TopicName, "topic"),
     (InterfaceName, "message type"),
-    (PortName, "`component` or `component.port`"),
-    (PlaceName, "name of a place"),
-    (IncludeModel, "file, or a map"),
-    (ValueModel, "`component.port`, or a map"),
-    (MissionModel, "file, or a map"),
+    (DottedName, "`field` or `field.field`"),
     (RestartModel, "word, or a map"),
     (Secret, "secret"),
     (str, "text"),
@@ -39,6 +29,7 @@ _NAMED: tuple[tuple[object, str], ...] = (
     (float, "number"),
     (Any, "any value"),
 )
+_KINDS = {TOPIC: "topic", PORT: "`component` or `component.port`", FILE: "file", ANYTHING: "any value"}
 _LIMITS: tuple[tuple[type, str, str], ...] = (
     (Gt, "gt", "above"),
     (Ge, "ge", "at least"),
@@ -71,6 +62,9 @@ def _row(key: str, field: FieldInfo, hint: object) -> tuple[str, str, str, str]:
 
 def takes_of(hint: object) -> str:
     """Return what a key with this annotation takes."""
+    if get_origin(hint) is Annotated and (marks := [one for one in get_args(hint) if isinstance(one, Refers)]):
+        base, *others = [one for one in get_args(hint) if one not in marks]
+        return _referring(marks[0].kind) or takes_of(Annotated[(base, *others)] if others else base)
     for known, words in _NAMED:
         if hint == known:
             return words
@@ -87,6 +81,11 @@ def takes_of(hint: object) -> str:
     if origin is dict:
         return f"map from {plural(inner[0])} to {plural(inner[1])}"
     return "map" if isinstance(hint, type) and issubclass(hint, Config) else "made by the compiler"
+
+
+def _referring(kind: str) -> str:
+    """Return what a key takes that refers to something of a kind; empty if its type tells more."""
+    return _KINDS.get(kind) or (f"name of a{'n' if kind[0] in 'aeiou' else ''} {kind}" if any(naming(kind)) else "")
 
 
 def plural(words: str) -> str:

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from rbxcompose.lsp.document import Document, Spot
-from rbxcompose.lsp.names import PLACE, SKILL, named_by_key, named_by_value
+from rbxcompose.lsp.names import SKILL, named_by_key
 from rbxcompose.lsp.variables import fills, variables
 from rbxcompose.missions.keys import anywhere
+from rbxcompose.references import PLACE
 from rbxcompose.schema.guide import Guide, Value
 from rbxcompose.schema.scalars import Schema, units_of
 from rbxcompose.units import NUMBER_TEXT, Dimension
@@ -110,7 +111,7 @@ def _of_value(spot: Spot, path: tuple[str | int, ...]) -> Iterator[Item]:
             yield from _units(value.dimension, match)
         return
     replaces = len(before) - len(before.rstrip(_WORD_CHARACTERS))
-    kind = value.names or named_by_value(path)
+    kind = value.names
     for name, about in (spot.known.of(kind, path) if kind else {}).items():
         yield Item(name, "name", name, replaces, about)
     if spot.document.is_mission and not kind and _is_expression(value):

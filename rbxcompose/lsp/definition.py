@@ -6,15 +6,17 @@ import re
 
 from rbxcompose.findings import Span
 from rbxcompose.lsp.document import Document, Spot
-from rbxcompose.lsp.names import COMPONENT, PLACE, PORT, SECTIONS, SKILL, below_profile, named_by_key, named_by_value
+from rbxcompose.lsp.names import SKILL, named_by_key
 from rbxcompose.lsp.variables import variable_span
 from rbxcompose.manifest.files import resolve, shown_name
+from rbxcompose.manifest.registry import naming
 from rbxcompose.manifest.tree import Path, at, key_span
+from rbxcompose.references import COMPONENT, FILE, PLACE, PORT, RUNNING
+from rbxcompose.sections.args import args
 
 _FRONT = re.compile(r"(\$\{?\s*)?[A-Za-z0-9_.]*$")
 _BACK = re.compile(r"[A-Za-z0-9_.]*")
 _SERVING = ("serves_action", "serves", "serves_topic")  # kinds of ports that are skills
-_FILES = ("file", "part")  # keys whose values are paths
 
 
 def define(document: Document, line: int, column: int) -> Span | None:
@@ -38,10 +40,7 @@ def _here(spot: Spot, span: Span) -> Span:
 
 
 def _file(spot: Spot) -> Span | None:
-    path = below_profile(spot.cursor.path)
-    is_entry = path[:1] in (("missions",), ("include",)) and (len(path) == 2 or (len(path) == 3 and path[2] in _FILES))
-    is_path = is_entry or path == ("body", "urdf")
-    if spot.document.is_mission or spot.cursor.is_key or not is_path:
+    if spot.document.is_mission or spot.cursor.is_key or spot.guide.value(spot.cursor.path).names != FILE:
         return None
     place = Span("", 1, 1, 1, 1)
     found = resolve(spot.cursor.text, spot.document.path, place)
@@ -51,14 +50,14 @@ def _file(spot: Spot) -> Span | None:
 def _named(spot: Spot, word: str) -> Span | None:
     if word.startswith("${"):
         name = word.removeprefix("${").strip()
-        return _own(spot, ("args", name.removeprefix("args."))) if name.startswith("args.") else None
+        return _own(spot, (args.name, name.removeprefix("args."))) if name.startswith("args.") else None
     if word.startswith("$"):
         return variable_span(spot, word.removeprefix("$").partition(".")[0])
     cursor = spot.cursor
     if cursor.is_key:
         kind = named_by_key(cursor.path, is_overlay=False)
         return _skill(spot, word) if spot.document.is_mission else _of_kind(spot, kind, word)
-    kind = spot.guide.value(cursor.path).names or named_by_value(cursor.path)
+    kind = spot.guide.value(cursor.path).names
     if spot.document.is_mission:
         return _of_kind(spot, PLACE, word) or _skill(spot, word)
     return _of_kind(spot, kind, word)
@@ -68,8 +67,8 @@ def _of_kind(spot: Spot, kind: str, word: str) -> Span | None:
     if kind == SKILL:
         return _skill(spot, word)
     name = word.partition(".")[0] if kind == PORT else word
-    sections = SECTIONS.get(COMPONENT if kind == PORT else kind, ())
-    return next((span for section in sections if (span := _own(spot, (section, name)))), None)
+    paths = ((one.name, *one.at, name) for one in naming(COMPONENT if kind in (PORT, RUNNING) else kind))
+    return next((span for path in paths if (span := _own(spot, path))), None)
 
 
 def _own(spot: Spot, path: Path) -> Span | None:

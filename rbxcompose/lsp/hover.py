@@ -6,10 +6,11 @@ from collections.abc import Iterator
 
 from rbxcompose.lsp.definition import word_at
 from rbxcompose.lsp.document import Document, Spot
-from rbxcompose.lsp.names import PLACE, SKILL, below_profile, named_by_value
+from rbxcompose.lsp.names import SKILL, below_profile
 from rbxcompose.lsp.variables import fills, variables
 from rbxcompose.manifest.tree import BROKEN, Path, Scalar, at
 from rbxcompose.model.robot import Robot
+from rbxcompose.references import PLACE
 from rbxcompose.units import Quantity, format_quantity
 
 
@@ -34,7 +35,7 @@ def _name(spot: Spot) -> str:
         return skill or ("" if cursor.is_key else _told(word, spot.known.of(PLACE).get(word, "")))
     if cursor.is_key:
         return ""
-    kind = spot.guide.value(cursor.path).names or named_by_value(cursor.path)
+    kind = spot.guide.value(cursor.path).names
     return _told(word, spot.known.of(kind, cursor.path).get(word, "")) if kind else ""
 
 

@@ -1,68 +1,43 @@
-"""The names that cross files: where in a manifest which kind of name stands, and which names there are."""
+"""The names that cross files: of what the keys of a map are names, and which names of a kind there are."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from rbxcompose.manifest.files import resolve
+from rbxcompose.manifest.options import OWN_PORT
 from rbxcompose.manifest.reader import read_file
+from rbxcompose.manifest.registry import naming, section_named
+from rbxcompose.manifest.shapes import kind_of_keys
 from rbxcompose.manifest.tree import Mapping, Scalar, at
 from rbxcompose.manifest.tree import Path as TreePath
 from rbxcompose.model.robot import Robot
+from rbxcompose.references import COMPONENT, PORT, RUNNING, VALUE
+from rbxcompose.sections.args import args
+from rbxcompose.sections.include import PART_ARGUMENT, include
+from rbxcompose.sections.missions import INPUT
+from rbxcompose.sections.profiles import profiles
 
-COMPONENT, PORT, PART, MISSION, PLACE, SKILL = "component", "port", "part", "mission", "place", "skill"
-INPUT, VALUE, ARGUMENT, OWN_PORT, PART_ARGUMENT = "input", "value", "argument", "own port", "part argument"
-
-_ANY = "*"
-_VALUES: tuple[tuple[tuple[str, ...], str], ...] = (
-    (("components", _ANY, "starts_after", _ANY), COMPONENT),
-    (("muxes", _ANY, "inputs", _ANY, "from"), PORT),
-    (("values", _ANY), PORT),
-    (("values", _ANY, "port"), PORT),
-    (("diagnostics", "analyzers", _ANY, "match", _ANY), PART),
-    (("diagnostics", "analyzers", _ANY, "expected", _ANY), PART),
-    (("start",), MISSION),
-)
-_KEYS: tuple[tuple[tuple[str, ...], str], ...] = (
-    (("components", _ANY, "connect"), OWN_PORT),
-    (("missions", _ANY, "with"), INPUT),
-    (("include", _ANY, "with"), PART_ARGUMENT),
-)
-_CHANGED: dict[str, str] = {"components": COMPONENT, "places": PLACE, "values": VALUE, "missions": MISSION}
-"""Sections of an overlay: their keys name what is there already."""
-
-SECTIONS = {COMPONENT: ("components", "muxes"), PART: ("components", "muxes"), PLACE: ("places",)}
-SECTIONS |= {MISSION: ("missions",), VALUE: ("values",), ARGUMENT: ("args",)}
-"""The sections whose keys are the names of a kind."""
+SKILL = "skill"
 
 
 def below_profile(path: TreePath) -> TreePath:
     """Return a path as it is in the robot that a profile changes."""
-    return path[2:] if path[:1] == ("profiles",) else path
-
-
-def named_by_value(path: TreePath) -> str:
-    """Return of what the value at `path` is a name, or nothing."""
-    return _match(_VALUES, below_profile(path))
+    return path[2:] if path[:1] == (profiles.name,) else path
 
 
 def named_by_key(path: TreePath, is_overlay: bool) -> str:
     """Return of what the keys of the map at `path` are names that exist, or nothing."""
     below = below_profile(path)
-    if (is_overlay or below != path) and len(below) == 1:
-        return _CHANGED.get(str(below[0]), "")
-    return _match(_KEYS, below)
-
-
-def _match(table: tuple[tuple[tuple[str, ...], str], ...], path: TreePath) -> str:
-    fits = (kind for pattern, kind in table if len(pattern) == len(path) and all(map(_fits, pattern, path)))
-    return next(fits, "")
-
-
-def _fits(pattern: str, key: str | int) -> bool:
-    return pattern in (_ANY, key)
+    section = section_named(below[0]) if below else None
+    if section is None:
+        return ""
+    if len(below) == 1:
+        is_over = is_overlay or below != path  # its keys name what is there already
+        return section.names if is_over and section.is_map else ""
+    return kind_of_keys(section.type, below[1:])
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,20 +50,15 @@ class Known:
 
     def of(self, kind: str, path: TreePath = ()) -> dict[str, str]:
         """Return the names of a kind with what each is; `path` is where one of them is to stand."""
-        match kind:
-            case "port":
-                return {**self._in_text(COMPONENT), **dict(self._ports())}
-            case "own port":
-                return dict(self._own_ports(str(below_profile(path)[1])))
-            case "part":
-                return {**self._in_text(kind), **self._parts()}
-            case "skill":
-                return self._skills()
-            case "input":
-                return self._inputs(str(below_profile(path)[1]))
-            case "part argument":
-                return self._part_arguments(str(below_profile(path)[1]))
-        return {**self._in_text(kind), **self._in_robot(kind)}
+        special: dict[str, Callable[[], dict[str, str]]] = {
+            PORT: lambda: {**self._in_text(COMPONENT), **dict(self._ports())},
+            RUNNING: lambda: {**self._in_text(COMPONENT), **self._parts()},
+            OWN_PORT: lambda: dict(self._own_ports(str(below_profile(path)[1]))),
+            SKILL: self._skills,
+            INPUT: lambda: self._inputs(str(below_profile(path)[1])),
+            PART_ARGUMENT: lambda: self._part_arguments(str(below_profile(path)[1])),
+        }
+        return special[kind]() if kind in special else {**self._in_text(kind), **self._in_robot(kind)}
 
     @property
     def types(self) -> dict[str, str]:
@@ -99,8 +69,8 @@ class Known:
 
     def _in_text(self, kind: str) -> dict[str, str]:
         found: dict[str, str] = {}
-        for section in SECTIONS.get(kind, ()):
-            named = self.root.get(section)
+        for section in naming(kind):
+            named = at(self.root, (section.name, *section.at))
             if isinstance(named, Mapping):
                 found |= {name: _about(named, name) for name in named.entries if name.isidentifier()}
         return found
@@ -108,17 +78,10 @@ class Known:
     def _in_robot(self, kind: str) -> dict[str, str]:
         if self.robot is None:
             return {}
-        manifest = self.robot.manifest
-        match kind:
-            case "component":
-                return self.types | dict.fromkeys(manifest.muxes, "mux")
-            case "place":
-                return {name: f"({place.x:g} m, {place.y:g} m)" for name, place in manifest.places.items()}
-            case "mission":
-                return dict.fromkeys(manifest.missions, "mission")
-            case "value":
-                return {name: source.type.phrase for name, source in self.robot.values.items()}
-        return {}
+        if kind == VALUE:
+            return {name: source.type.phrase for name, source in self.robot.values.items()}
+        contents = self.robot.manifest.contents
+        return {name: words for one in naming(kind) for name, words in one.described(contents).items()}
 
     def _parts(self) -> dict[str, str]:
         return {name: part.type_name for name, part in self.robot.parts.items()} if self.robot else {}
@@ -142,10 +105,10 @@ class Known:
 
     def _part_arguments(self, instance: str) -> dict[str, str]:
         """Return the arguments of the part that an instance is of."""
-        written = at(self.root, ("include", instance, "part"))
+        written = at(self.root, (include.name, instance, "part"))
         path = resolve(written.text, self.path, written.span) if isinstance(written, Scalar) else None
         part = read_file(path, str(path), {})[0] if isinstance(path, Path) else None
-        named = part.get("args") if isinstance(part, Mapping) else None
+        named = part.get(args.name) if isinstance(part, Mapping) else None
         return {name: _about(named, name) for name in named.entries} if isinstance(named, Mapping) else {}
 
 

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span
 from rbxcompose.lsp.document import Spot
-from rbxcompose.lsp.names import ARGUMENT
 from rbxcompose.manifest.tree import Mapping, Scalar, at, key_span
 from rbxcompose.missions.program import Program
 from rbxcompose.missions.views import base_names, views
 from rbxcompose.missions.watching import POSE
+from rbxcompose.references import ARGUMENT
 
 _FILLS = {"robot.name": "name of the robot", "sim": "true in simulation", "env.": "a variable of the environment"}
 _FILLS |= {"secret.": "a secret, from a file of its own or the environment; it is never shown"}

@@ -4,38 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TypeVar
 
-from rbxcompose.findings import Report
-from rbxcompose.manifest.models import About, Claim, Needs, Provides
+from rbxcompose.manifest.models import About, Claim
 from rbxcompose.manifest.renaming import Renaming
-from rbxcompose.manifest.tree import Mapping, key_span, value_span
-from rbxcompose.manifest.validate import validate
+from rbxcompose.manifest.section import Contents
+from rbxcompose.manifest.tree import key_span, value_span
+from rbxcompose.references import TOPIC, VALUE
+from rbxcompose.sections.needs import needs
+from rbxcompose.sections.provides import provides
 
-M = TypeVar("M", Needs, Provides)
 
-
-def claims_of(root: Mapping, report: Report) -> Iterator[Claim]:
+def claims_of(part: Contents) -> Iterator[Claim]:
     """Yield what the file of a part says under `needs:` and `provides:`."""
-    needs, provides = _read(Needs, root, "needs", report), _read(Provides, root, "provides", report)
-    for section, about, ports in (("needs", About.NEED, needs.ports), ("provides", About.PORT, provides.ports)):
+    needed, given = part.of(needs), part.of(provides)
+    for section, about, ports in (("needs", About.NEED, needed.ports), ("provides", About.PORT, given.ports)):
         for topic, type_name in ports.items():
-            yield Claim(about, topic, type_name, key_span(root, (section, "ports", topic)))
-    for key, about, names in (("skills", About.SKILL, provides.skills), ("values", About.VALUE, provides.values)):
+            yield Claim(about, topic, type_name, key_span(part.root, (section, "ports", topic)))
+    for key, about, names in (("skills", About.SKILL, given.skills), ("values", About.VALUE, given.values)):
         for index, name in enumerate(names):
-            yield Claim(about, name, "", value_span(root, ("provides", key, index)))
+            yield Claim(about, name, "", value_span(part.root, ("provides", key, index)))
 
 
 def renamed(claim: Claim, renaming: Renaming) -> Claim:
     """Return a claim by the name outside of the part; a skill is named like the topic of its action."""
     match claim.about:
         case About.VALUE:
-            return replace(claim, name=renaming.name_in("values")(claim.name))
+            return replace(claim, name=renaming.name(VALUE, claim.name))
         case About.SKILL:
             return replace(claim, name=renaming.topic(claim.name).rpartition("/")[-1])
-    return replace(claim, name=renaming.topic(claim.name))
-
-
-def _read(model: type[M], root: Mapping, key: str, report: Report) -> M:
-    node = root.get(key)
-    return (validate(model, node, (key,), report) if node is not None else None) or model()
+    return replace(claim, name=renaming.name(TOPIC, claim.name))

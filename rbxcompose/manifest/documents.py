@@ -9,7 +9,7 @@ from typing import Any
 
 from rbxcompose.findings import Finding, Related, Report, Span, kind
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.manifest.models import Header
+from rbxcompose.manifest.header import Header
 from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
 from rbxcompose.manifest.validate import validate

@@ -11,11 +11,15 @@ from dataclasses import replace
 from pathlib import Path as FilePath
 
 from rbxcompose.config import Secret
-from rbxcompose.manifest.files import project_of
+from rbxcompose.manifest.files import project_of, resolve
 from rbxcompose.manifest.library import PREFIX, library_root
 from rbxcompose.manifest.models import RobotManifest
+from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.scalars import plain_value
+from rbxcompose.manifest.section import ROBOT
 from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar, Sequence
+from rbxcompose.manifest.validate import to_plain
+from rbxcompose.references import FILE
 from rbxcompose.units import UNITS, Dimension, Quantity, UnitError, format_quantity, to_si
 
 Note = Callable[[Path, Node], str]
@@ -27,7 +31,7 @@ _PLAIN = re.compile(r"(?!- |-$|---|\.\.\.)[\w./+-](?:[^\n:#]|:(?! |$)|(?<! )#)*(
 def dump_robot(manifest: RobotManifest, note: Note = lambda path, node: "") -> str:
     """Return a robot with its parts, profiles, overlays and values put together and filled in, as one file.
 
-    It is meant for the folder of the robot's file: paths of missions and of the URDF are relative to that. `note` gives
+    It is meant for the folder of the robot's file: paths of files are relative to that. `note` gives
     the comment behind a value. Secrets keep their names: `${secret.NAME}`.
     """
     return dump(_in_one_file(manifest), note)
@@ -40,18 +44,20 @@ def dump(root: Mapping, note: Note = lambda path, node: "") -> str:
 
 def _in_one_file(manifest: RobotManifest) -> Mapping:
     """Return the tree with each file that it names as the robot's own file would name it."""
-    root = manifest.root
-    for name, one in manifest.missions.items():
-        root = _with_path(root, ("missions", name, "file"), _path_from(manifest.path, one.path))
-    return _with_path(root, ("body", "urdf"), _path_from(manifest.path, manifest.body.path)) if manifest.body else root
 
+    def named(kind: str, node: Node) -> Node:
+        if kind != FILE or not isinstance(node, Scalar):
+            return node
+        writer = manifest.contents.documents.writer(node.span, manifest.path)
+        file = resolve(str(to_plain(node)), writer, node.span)
+        return Scalar(_path_from(manifest.path, file), node.span) if isinstance(file, FilePath) else node
 
-def _with_path(root: Mapping, path: Path, text: str) -> Mapping:
-    """Return a tree with another text at `path`; what stands there keeps its place."""
-    entry = root.entries[str(path[0])]
-    inner = entry.value
-    changed = _with_path(inner, path[1:], text) if isinstance(inner, Mapping) else Scalar(text, inner.span)
-    return replace(root, entries={**root.entries, str(path[0]): Entry(entry.key, changed)})
+    entries = dict(manifest.root.entries)
+    for section in sections(ROBOT):
+        if section.name in entries:
+            key, value = entries[section.name].key, entries[section.name].value
+            entries[section.name] = Entry(key, section.with_references(value, named))
+    return replace(manifest.root, entries=entries)
 
 
 def _path_from(robot: FilePath, file: FilePath) -> str:

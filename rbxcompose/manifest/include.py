@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from rbxcompose.findings import Finding, Related, Span, kind
 from rbxcompose.manifest.claims import claims_of, renamed
 from rbxcompose.manifest.composing import TOO_LARGE
 from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.files import resolve, shown_name
+from rbxcompose.manifest.header import Header
 from rbxcompose.manifest.inclusions import Inclusion, Inclusions
 from rbxcompose.manifest.limits import ALL_BYTES, INCLUDE_DEPTH, INSTANCES
-from rbxcompose.manifest.models import Claim, Include, IncludedPart, PartFile
-from rbxcompose.manifest.overlay import INCLUDE, settled
-from rbxcompose.manifest.renaming import Renaming, Topic, names_in, topics_of
-from rbxcompose.manifest.sections import named_entries
+from rbxcompose.manifest.models import Claim, IncludedPart
+from rbxcompose.manifest.overlay import settled
+from rbxcompose.manifest.registry import naming, sections
+from rbxcompose.manifest.renames import Topic
+from rbxcompose.manifest.renaming import Renaming, topics_of
+from rbxcompose.manifest.section import PART, Contents, Section
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence, at, key_span, value_span
-from rbxcompose.manifest.validate import WRONG_TYPE, validate
+from rbxcompose.manifest.validate import WRONG_TYPE
+from rbxcompose.references import COMPONENT, VALUE
+from rbxcompose.sections.args import args
+from rbxcompose.sections.include import Include, include
 
 CIRCLE = kind(
     "RBX1308",
@@ -63,9 +71,6 @@ include:
 """,
     is_fixable=True,
 )
-
-PART = "Part"
-_OWN = ("rbx", "kind", "name", "about", "args", INCLUDE, "needs", "provides")  # what is not laid into the robot
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,10 +116,9 @@ class Parts:
 
     def instances(self, root: Mapping, path: str = "", above: tuple[_Open, ...] = ()) -> Iterator[Instance]:
         """Yield what `include:` of a file brings, an instance behind those that it includes itself."""
-        for name, entry in named_entries(root, (INCLUDE,), self.documents.report):
-            include = validate(Include, entry.value, (INCLUDE, name), self.documents.report)
-            opened = self._open(include, entry, above) if include else None
-            if include is None or opened is None:
+        for name, entry, read in Contents(root, self.robot, self.documents).of(include):
+            opened = self._open(read, entry, above) if read else None
+            if read is None or opened is None:
                 self.is_complete = False
                 if self._is_full:
                     return
@@ -124,25 +128,25 @@ class Parts:
             self.inclusions.add(shown_name(opened.file), Inclusion(instance, chain))
             if (file := self._read(opened.file, value_span(entry.value, ("part",)))) is not None:
                 inside = [*self._inside(instance, file, (*above, opened)), _instance(instance, file, opened, entry)]
-                yield from self._renamed(name, include, entry.value, inside)
+                yield from self._renamed(name, read, entry.value, inside)
 
     def _inside(self, instance: str, file: _File, above: tuple[_Open, ...]) -> Iterator[Instance]:
         """Yield what a part includes itself."""
-        included = replace(file.root, entries={n: e for n, e in file.root.entries.items() if n == INCLUDE})
+        included = replace(file.root, entries={n: e for n, e in file.root.entries.items() if n == include.name})
         yield from self.instances(in_scope(settled(included, self.documents.report), instance), instance, above)
 
     @property
     def _is_full(self) -> bool:
         return self._count > INSTANCES or self._size > ALL_BYTES
 
-    def _open(self, include: Include, entry: Entry, above: tuple[_Open, ...]) -> _Open | None:
+    def _open(self, read: Include, entry: Entry, above: tuple[_Open, ...]) -> _Open | None:
         """Return the file of an instance, or None after a finding."""
         span = value_span(entry.value, ("part",))
         self._count += 1
         finding = self._limit(span, above)
-        if finding is None and "${" in include.part:
+        if finding is None and "${" in read.part:
             finding = WRONG_TYPE.at(span, "the file of a part cannot be filled in: parts are read before that")
-        file = finding or resolve(include.part, self.documents.writer(span, self.robot), span)
+        file = finding or resolve(read.part, self.documents.writer(span, self.robot), span)
         if isinstance(file, Path):
             if all(one.file != file for one in above):
                 return _Open(file, entry.key.span)
@@ -164,17 +168,17 @@ class Parts:
         if path not in self._files:
             root = self.documents.read(path, PART, span)
             if root is not None:
-                self.documents.check(PartFile, root)
-            self._files[path] = _File(root, tuple(claims_of(root, self.documents.report))) if root else None
+                self.documents.check(file_model(PART), root)
+            self._files[path] = _File(root, tuple(claims_of(Contents(root, path, self.documents)))) if root else None
         self._size += len(self.documents.sources.get(shown_name(path), ""))
         self.is_complete &= self._files[path] is not None
         return self._files[path]
 
-    def _renamed(self, name: str, include: Include, written: Node, inside: list[Instance]) -> Iterator[Instance]:
+    def _renamed(self, name: str, read: Include, written: Node, inside: list[Instance]) -> Iterator[Instance]:
         """Yield an instance and what it includes under the names of the file that includes it."""
         connect = {
             topic: Topic(new, value_span(written, ("connect", topic)), key_span(written, ("connect", topic)))
-            for topic, new in include.connect.items()
+            for topic, new in read.connect.items()
         }
         renaming = Renaming.of(f"{name}_", connect, [instance.root for instance in inside])
         for instance in inside:
@@ -196,13 +200,14 @@ class Parts:
 def _instance(name: str, file: _File, opened: _Open, entry: Entry) -> Instance:
     """Return an instance as its own file describes it."""
     scoped = in_scope(file.root, name)
+    own = {*Header.model_fields, *(one.name for one in sections(PART) if not one.is_composed)}
     given = at(entry.value, ("with",))
     return Instance(
         name=name,
         file=shown_name(opened.file),
         span=opened.span,
-        root=replace(scoped, entries={key: one for key, one in scoped.entries.items() if key not in _OWN}),
-        arguments=replace(scoped, entries={key: one for key, one in scoped.entries.items() if key == "args"}),
+        root=replace(scoped, entries={key: one for key, one in scoped.entries.items() if key not in own}),
+        arguments=replace(scoped, entries={key: one for key, one in scoped.entries.items() if key == args.name}),
         given=given if isinstance(given, Mapping) else Mapping({}, opened.span),
         claims=file.claims,
     )
@@ -236,9 +241,15 @@ def included_parts(instances: SequenceOf[Instance]) -> dict[str, IncludedPart]:
     found = {}
     for one in instances:
         own = [other for other in instances if f"{other.name}.".startswith(f"{one.name}.")]
-        components, muxes, values = (
-            frozenset(name for other in own for name in names_in(other.root, section))
-            for section in ("components", "muxes", "values")
-        )
+        roots = [other.root for other in own]
+        running = list(naming(COMPONENT))
+        components = _names(roots, (one for one in running if not one.has_topics))
+        muxes = _names(roots, (one for one in running if one.has_topics))
+        values = _names(roots, naming(VALUE))
         found[one.name] = IncludedPart(one.name, one.file, one.span, components, muxes, values, one.claims)
     return found
+
+
+def _names(roots: Iterable[Mapping], those: Iterable[Section[Any, Any]]) -> frozenset[str]:
+    chosen = list(those)
+    return frozenset(name for root in roots for section in chosen for name in section.names_in(root))

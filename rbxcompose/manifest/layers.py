@@ -5,23 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
-from rbxcompose.config import Name
 from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.files import find, shown_name
+from rbxcompose.manifest.header import Header
 from rbxcompose.manifest.history import ROBOT_LAYER, History, Step
 from rbxcompose.manifest.include import Instance, Parts
-from rbxcompose.manifest.models import Header, OverlayFile
-from rbxcompose.manifest.overlay import INCLUDE, NOTHING_TO_CHANGE, compose, join, read_sets, settled
-from rbxcompose.manifest.tree import Entry, Mapping
-from rbxcompose.manifest.validate import validate
+from rbxcompose.manifest.overlay import NOTHING_TO_CHANGE, compose, join, settled
+from rbxcompose.manifest.section import OVERLAY, Contents
+from rbxcompose.manifest.sets import read_sets
+from rbxcompose.manifest.tree import Mapping
 from rbxcompose.plain import plain
+from rbxcompose.sections.include import include
+from rbxcompose.sections.profiles import profiles
 
-OVERLAY = "Overlay"
 PROFILE = "--profile"
-PROFILES: Any = dict[Name, dict[str, Any]]
+INCLUDE = include.name
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +48,11 @@ class Composed:
 def compose_robot(root: Mapping, file: Path, chosen: Chosen, documents: Documents) -> Composed:
     """Return a robot's file with its parts below and what was chosen on top."""
     report, history = documents.report, History()
-    overlays = [*_profiles(root, chosen.profiles, documents), *_overlays(chosen.overlays, documents)]
-    own = _without(root, "profiles")
-    include = _include(own, overlays, chosen.sets, history, documents)
+    overlays = [*_profiles(root, file, chosen.profiles, documents), *_overlays(chosen.overlays, documents)]
+    own = _without(root, profiles.name)
+    included = _include(own, overlays, chosen.sets, history, documents)
     parts = Parts(documents, file)
-    instances = tuple(parts.instances(include))
+    instances = tuple(parts.instances(included))
     own = _without(own, INCLUDE)
     if instances:
         brought = join([(one.root, one.name, one.span) for one in instances], report, history)
@@ -65,20 +66,20 @@ def compose_robot(root: Mapping, file: Path, chosen: Chosen, documents: Document
     composed = compose(composed, [(_without(tree, INCLUDE), name) for tree, name in overlays], report, history)
     if chosen.sets:
         composed = compose(composed, read_sets(chosen.sets, composed, report, documents.sources), report, history)
-    return Composed(composed, include, instances, parts, history)
+    return Composed(composed, included, instances, parts, history)
 
 
 def _include(
     root: Mapping, overlays: list[tuple[Mapping, str]], sets: Sequence[str], history: History, documents: Documents
 ) -> Mapping:
     """Return the section `include` as all layers have it: what it names is read before anything else is composed."""
-    include = settled(only(root, INCLUDE), documents.report)
-    for entry in include.entries.values():
+    included = settled(only(root, INCLUDE), documents.report)
+    for entry in included.entries.values():
         history.write((INCLUDE,), Step(ROBOT_LAYER, entry.value, entry.value.span))
     changes = [(only(tree, INCLUDE), name) for tree, name in overlays]
-    include = compose(include, changes, documents.report, history)
-    lines = read_sets(sets, include, documents.report, documents.sources, of_include=True)
-    return compose(include, lines, documents.report, history)
+    included = compose(included, changes, documents.report, history)
+    lines = read_sets(sets, included, documents.report, documents.sources, of_include=True)
+    return compose(included, lines, documents.report, history)
 
 
 def only(root: Mapping, key: str) -> Mapping:
@@ -90,27 +91,24 @@ def _without(root: Mapping, key: str) -> Mapping:
     return replace(root, entries={name: entry for name, entry in root.entries.items() if name != key})
 
 
-def _profiles(root: Mapping, chosen: Sequence[str], documents: Documents) -> Iterator[tuple[Mapping, str]]:
+def _profiles(root: Mapping, file: Path, chosen: Sequence[str], documents: Documents) -> Iterator[tuple[Mapping, str]]:
     """Yield the chosen profiles, in the order of the command."""
-    report = documents.report
-    there = root.get("profiles")
-    is_read = there is None or validate(PROFILES, there, ("profiles",), report) is not None
-    named: dict[str, Entry] = there.entries if isinstance(there, Mapping) and is_read else {}
+    named = Contents(root, file, documents).of(profiles)
     if chosen:
         documents.sources[PROFILE] = "\n".join(map(plain, chosen))
-    for line, name in enumerate(chosen, 1):
-        overlay = named[name].value if name in named else None
+    for line, name in enumerate(chosen if named is not None else (), 1):
+        overlay = named[name].value if named and name in named else None
         if isinstance(overlay, Mapping):
             yield overlay, f"profile '{name}'"
-        elif is_read:
+        else:
             span = Span(PROFILE, line, 1, line, len(name) + 1)
             message = f"the robot has no profile '{name}'"
-            report.add(NOTHING_TO_CHANGE.misspelt(span, message, name, named, "profiles"))
+            documents.report.add(NOTHING_TO_CHANGE.misspelt(span, message, name, named or (), "profiles"))
 
 
 def profile_spans(root: Mapping) -> dict[str, Span]:
     """Return where each profile of a robot's file stands, from its name to its end."""
-    there = root.get("profiles")
+    there = root.get(profiles.name)
     named = there.entries if isinstance(there, Mapping) else {}
     return {
         name: one.key.span._replace(end_line=one.value.span.end_line, end_column=one.value.span.end_column)
@@ -126,6 +124,6 @@ def _overlays(chosen: Sequence[str], documents: Documents) -> Iterator[tuple[Map
         if isinstance(file, Finding):
             documents.report.add(file)
         elif (root := documents.read(file, OVERLAY)) is not None:
-            documents.check(OverlayFile, root)
+            documents.check(file_model(OVERLAY), root)
             sections = {name: entry for name, entry in root.entries.items() if name not in Header.model_fields}
             yield replace(root, entries=sections), f"overlay '{shown_name(file)}'"

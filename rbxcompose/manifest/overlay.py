@@ -5,13 +5,13 @@ Maps merge by key, the rest is replaced; each value keeps its place, and a `Hist
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from operator import is_
 
 from rbxcompose.findings import Related, Report, Span, correction, kind, suggest
 from rbxcompose.manifest.history import History, Step
-from rbxcompose.manifest.reader import read_text
+from rbxcompose.manifest.registry import section_named
 from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar
 from rbxcompose.manifest.tree import Sequence as NodeSequence
 from rbxcompose.manifest.walk import REMOVE
@@ -41,17 +41,6 @@ profiles:
 ```
 """,
     is_fixable=True,
-)
-BAD_SET = kind(
-    "RBX1303",
-    """A `--set` that cannot be read
-
-`--set` takes a path and a value with `=` between them. The path begins with a component or a section; the value is
-YAML, as it would stand in the file.
-
-Bad: `--set battery.runtime`
-Good: `--set battery.runtime="30 s"`
-""",
 )
 NOT_AN_OVERLAY = kind(
     "RBX1305",
@@ -102,17 +91,7 @@ include:
 """,
 )
 
-INCLUDE = "include"
-NAMED_MAPS = ("components", "muxes", "args", "places", "values", "missions", INCLUDE)
-"""Sections whose keys are names that the user gives."""
-
-SETTABLE = (*NAMED_MAPS, "about", "body", "bus", "diagnostics", "start")
-"""Sections that a path of `--set` may begin with."""
-
 SET = "--set"
-_WRITTEN_SHORT = {"missions": "file", "args": "default", INCLUDE: "part"}  # `patrol: FILE` is `{file: FILE}`
-_NEW_ENTRY_NEEDS = {"components": ("component", "type"), INCLUDE: ("part", "part")}  # else it was to change an old one
-_JOINED = ("components", "diagnostics", "missions", "muxes", "places", "values")  # what several parts may bring
 
 
 def compose(
@@ -149,10 +128,11 @@ def settled(root: Mapping, report: Report) -> Mapping:
 def _spelt_out(root: Mapping) -> Mapping:
     """Write the short forms of section entries in full, so that every layer can change a part of them."""
     entries = dict(root.entries)
-    for section, key in _WRITTEN_SHORT.items():
-        if section in entries and isinstance(named := entries[section].value, Mapping):
-            full = {name: replace(entry, value=_in_full(entry.value, key)) for name, entry in named.entries.items()}
-            entries[section] = replace(entries[section], value=replace(named, entries=full))
+    for name, entry in root.entries.items():
+        short = section.short if (section := section_named(name)) else None
+        if short is not None and short.is_merged and isinstance(named := entry.value, Mapping):
+            full = {key: replace(one, value=_in_full(one.value, short.key)) for key, one in named.entries.items()}
+            entries[name] = replace(entry, value=replace(named, entries=full))
     return replace(root, entries=entries)
 
 
@@ -180,9 +160,9 @@ class _Merge:
         """Lay one entry over those of the map above it."""
         name = entry.key.text
         below = entries.get(name)
-        is_removal = _is_removal(entry.value)
+        is_gone = is_removal(entry.value)
         if below is None:
-            (self._nothing_to_remove if is_removal else self._add)(entries, entry, path)
+            (self._nothing_to_remove if is_gone else self._add)(entries, entry, path)
         elif isinstance(below.value, Mapping) and isinstance(entry.value, Mapping) and not entry.value.tag:
             if self.may_merge(path):
                 entries[name] = replace(below, value=self.mapping(below.value, entry.value, path))
@@ -190,7 +170,7 @@ class _Merge:
                 self._clash(below, entry, path)
         elif not self.may_change(path):
             self._clash(below, entry, path)
-        elif is_removal:
+        elif is_gone:
             del entries[name]
             self.history.write(path, Step(self.overlay, None, entry.key.span))
         else:
@@ -217,7 +197,8 @@ class _Merge:
 
     def _add(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
         name = entry.key.text
-        one, needed = _NEW_ENTRY_NEEDS.get(str(path[0]), ("", "")) if len(path) == 2 else ("", "")
+        section = section_named(path[0]) if len(path) == 2 else None
+        one, needed = (section.entry, section.needs) if section else ("", "")
         if needed and isinstance(entry.value, Mapping) and needed not in entry.value:
             message = f"{self.overlay} changes the {one} '{name}', which the robot does not have"
             help_text = suggest(name, entries, str(path[0])) or f"a new {one} needs a '{needed}:'"
@@ -246,27 +227,21 @@ class _Join(_Merge):
         return self.history.layer(path).startswith(self.included)
 
     def _clash(self, below: Entry, entry: Entry, path: Path) -> None:
-        section, *names = map(str, path)
-        other = self.history.layer(path)
-        what = f"'{names[-1]}' of '{section}'" if names else f"'{section}'"
+        name, *names = map(str, path)
+        other, section = self.history.layer(path), section_named(name)
+        what = f"'{names[-1]}' of '{name}'" if names else f"'{name}'"
+        help_text = "rename one of the two instances" if names else f"a robot has one '{name}': leave one out"
+        if section and (told := section.clash(names)):
+            what, help_text = told
         message = f"{self.overlay} and {other} both bring {what}"
-        help_text = "rename one of the two instances" if names else f"a robot has one '{section}': leave one out"
-        if section == "muxes" and len(names) > 1:
-            mux, *_, name = names
-            message = f"{self.overlay} and {other} both bring '{name}' of mux '{mux}'"
-            help_text = f"give one of them another topic: 'connect: {{{mux}/{name}: {mux}/ANOTHER_NAME}}'"
         related = [Related(below.key.span, f"from {other}"), Related(entry.key.span, f"from {self.overlay}")]
         self.report.add(TWO_PARTS.at(self.span, message, label="the second", help=help_text, related=related))
 
 
 def _is_shared(path: Path) -> bool:
     """Tell whether several parts may add to the map at `path`."""
-    match path:
-        case (section,):
-            return section in _JOINED
-        case ("diagnostics", "analyzers") | ("muxes", _) | ("muxes", _, "inputs" | "locks"):
-            return True
-    return False
+    section = section_named(path[0])
+    return section is not None and section.is_shared(path[1:])
 
 
 def _settled(node: Node, report: Report) -> Node:
@@ -284,7 +259,8 @@ def _settled(node: Node, report: Report) -> Node:
             return node if all(map(is_, inner, items)) else replace(node, items=inner)
 
 
-def _is_removal(node: Node) -> bool:
+def is_removal(node: Node) -> bool:
+    """Tell whether a layer takes away what lies below it."""
     return isinstance(node, Mapping) and node.tag == REMOVE
 
 
@@ -295,83 +271,10 @@ def _settled_map(node: Mapping, report: Report) -> Mapping:
         value = entry.value
         if isinstance(value, Scalar):
             continue
-        if _is_removal(value):
+        if is_removal(value):
             message = f"'!remove' has nothing to remove '{name}' from"
             report.add(NOT_AN_OVERLAY.at(value.span, message, help="it belongs in a profile"))
             changed[name] = Entry(entry.key, Scalar("", value.span, filled=BROKEN))  # so that nobody misses it
         elif (inner := _settled(value, report)) is not value:
             changed[name] = Entry(entry.key, inner)
     return Mapping({**node.entries, **changed}, node.span) if changed or node.tag else node
-
-
-def read_sets(
-    sets: Sequence[str], root: Mapping, report: Report, sources: dict[str, str], *, of_include: bool = False
-) -> list[tuple[Mapping, str]]:
-    """Return one overlay for each `PATH=VALUE`; together they are one source, a line for each.
-
-    Those of `include` come in a run of their own, since parts are read before all else is composed.
-    """
-    if sets:
-        sources[SET] = "\n".join(text.replace("\n", " ") for text in sets)
-    overlays = (
-        _set_overlay(text.replace("\n", " "), line, root, report)
-        for line, text in enumerate(sets, 1)
-        if (text.partition("=")[0].strip().partition(".")[0] == INCLUDE) is of_include
-    )
-    return [(overlay, f"'{SET}'") for overlay in overlays if overlay]
-
-
-def _set_overlay(text: str, line: int, root: Mapping, report: Report) -> Mapping | None:
-    written, equals, value_text = text.partition("=")
-    span = Span(SET, line, 1, line, len(written) + 1)
-    names = written.strip().split(".")
-    if not equals or not all(names):
-        message = f"'{SET} {text}' is no path and value"
-        report.add(BAD_SET.at(span, message, help=f"write {SET} battery.runtime='30 s'"))
-        return None
-    path = _set_path(names, span, root, report)
-    if path is None:
-        return None
-    value = _set_value(value_text, line, len(written) + 1, report)
-    if value is None:
-        return None
-    if len(path) == 2 and path[0] in ("components", "muxes") and not _is_removal(value):
-        message = f"'{SET}' does not say what of '{path[1]}' to change"
-        report.add(BAD_SET.at(span, message, help=f"write {SET} {path[1]}.KEY=VALUE"))
-        return None
-    for name in reversed(path):
-        value = Mapping({name: Entry(Scalar(name, span), value)}, span)
-    return value if isinstance(value, Mapping) else None
-
-
-def _set_path(names: list[str], span: Span, root: Mapping, report: Report) -> list[str] | None:
-    """Return the path from the root, or None after a finding if it leads to nothing."""
-    section, *rest = names if names[0] in SETTABLE else ["components", *names]
-    if section in NAMED_MAPS:
-        named = root.get(section)
-        there = list(named.entries) if isinstance(named, Mapping) else []
-        if not rest or rest[0] not in there:
-            message = f"'{SET}' changes '{'.'.join(names)}', which the robot does not have"
-            choices = there if section == names[0] else [*there, *SETTABLE]
-            fix = in_section(names, root) or suggest(rest[0] if rest else "", choices, "a path begins with")
-            report.add(NOTHING_TO_CHANGE.at(span, message, help=fix))
-            return None
-    return [section, *rest]
-
-
-def in_section(names: Sequence[str], root: Mapping) -> str:
-    """Return the help for a path that begins with a name of a section, not with the section; else nothing."""
-    for section in NAMED_MAPS:
-        named = root.get(section)
-        if isinstance(named, Mapping) and names[0] in named:
-            return f"did you mean '{section}.{'.'.join(names)}'?"
-    return ""
-
-
-def _set_value(text: str, line: int, column: int, report: Report) -> Node | None:
-    """Read the value of a `--set`; blank lines and columns before it make its places those of the argument."""
-    if not text.strip():
-        return Scalar("", Span(SET, line, column, line, column + 1))
-    node, findings = read_text("\n" * (line - 1) + " " * column + text, SET)
-    report.extend(findings)
-    return node

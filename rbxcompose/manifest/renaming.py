@@ -1,38 +1,24 @@
 """What a part brings, under the names that it has in the file that includes it.
 
-Components, places, values, missions and analyzers of the instance `head` get `head_` in front, and what the part says
-of them follows. Topics get nothing in front: a mux is named after its topic, so it keeps its name; `connect` gives a
-topic of the part another name, and with it a mux, or one of its inputs. A name that the part itself does not have is
-one of the file that includes it. What holds `${` is filled in later and stays as it is.
+Names of the instance `head` get `head_` in front, and what the part says of them follows. Topics get nothing in front:
+a mux is named after its topic, so it keeps its name; `connect` gives a topic of the part another name, and with it a
+mux, or one of its inputs. A name that the part itself does not have is one of the file that includes it. What holds
+`${` is filled in later and stays as it is. Which names a section has and where it refers to some, its descriptor tells.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
-from typing import Any, get_args
+from typing import Any
 
-from pydantic import BaseModel
-
-from rbxcompose.config import Place
-from rbxcompose.findings import Span
+from rbxcompose.manifest.registry import naming, section_named, sections
+from rbxcompose.manifest.renames import Topic
+from rbxcompose.manifest.section import Section
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence, at
-from rbxcompose.plugins import BrokenPluginError
-from rbxcompose.sdk import registry
-from rbxcompose.sdk.ports import Port
+from rbxcompose.references import ANYTHING, COMPONENT, PORT, TOPIC
 
 Rename = Callable[[str], str]
-_NAMED = ("components", "places", "values", "missions")
-
-
-@dataclass(frozen=True, slots=True)
-class Topic:
-    """Another name for a topic of a part, and where it is written."""
-
-    name: str
-    span: Span
-    key_span: Span
 
 
 @dataclass(slots=True)
@@ -47,27 +33,22 @@ class Renaming:
     @classmethod
     def of(cls, prefix: str, connect: dict[str, Topic], roots: Iterable[Mapping]) -> Renaming:
         """Return the renaming for what `roots` bring: the file of a part and all that it includes."""
-        sections = (*_NAMED, "muxes")
-        found: dict[str, set[str]] = {section: set() for section in sections}
-        for root in roots:
-            for section in sections:
-                found[section] |= set(names_in(root, section))
-        return cls(prefix, connect, {section: frozenset(names) for section, names in found.items()})
+        trees = list(roots)
+        named = [one for one in sections() if one.names and one.is_composed]
+        own = {one.name: frozenset(name for root in trees for name in one.names_in(root)) for one in named}
+        return cls(prefix, connect, own)
+
+    @property
+    def running(self) -> frozenset[str]:
+        """Return the names of all that the part runs."""
+        return frozenset(name for one in naming(COMPONENT) for name in self.own[one.name])
 
     def root(self, root: Mapping) -> Mapping:
         """Return the sections of a part under their new names."""
-        changed = {
-            "components": lambda node: self._named(node, self._component),
-            "places": lambda node: self._named(node, lambda place: place),
-            "values": lambda node: self._named(node, self._value),
-            "missions": lambda node: self._named(node, self._mission),
-            "muxes": self._muxes,
-            "diagnostics": self._diagnostics,
-        }
         entries = {}
         for name, entry in root.entries.items():
-            change = changed.get(name)
-            entries[name] = Entry(entry.key, change(entry.value)) if change else entry
+            section = section_named(name)
+            entries[name] = Entry(entry.key, self._section(section, entry.value)) if section else entry
         return replace(root, entries=entries)
 
     def topic(self, topic: str) -> str:
@@ -76,27 +57,35 @@ class Renaming:
             self.used.add(topic)
             return found.name
         above, slash, name = topic.rpartition("/")
-        if slash and above in self.own["muxes"] and above in self.connect:
+        if slash and above in self.connect and self._is_own_topic(above):
             return f"{self.topic(above)}/{name}"
         return topic
 
-    def component(self, name: str) -> str:
-        """Return the new name of a component or a mux; `component.port` keeps its port."""
-        component, dot, port = name.partition(".")
-        if component in self.own["components"]:
-            return f"{self.prefix}{component}{dot}{port}"
-        return f"{self.topic(component)}{dot}{port}" if component in self.own["muxes"] else name
+    def written(self, topic: str) -> Topic:
+        """Return what gives a topic its other name: itself, or the topic that it stands below."""
+        return self.connect.get(topic) or self.connect[topic.rpartition("/")[0]]
 
-    def name_in(self, section: str) -> Rename:
-        """Return what a name of one of the part's sections becomes."""
-        return lambda name: f"{self.prefix}{name}" if name in self.own[section] else name
+    def component(self, name: str) -> str:
+        """Return the new name of something that runs; `component.port` keeps its port."""
+        return self.name(PORT, name)
+
+    def name(self, kind: str, name: str) -> str:
+        """Return what the name of something of a kind becomes."""
+        if kind == TOPIC:
+            return self.topic(name)
+        if kind == ANYTHING:
+            return self.any_name(name)
+        head, dot, rest = name.partition(".") if kind in (PORT, COMPONENT) else (name, "", "")
+        for section in naming(COMPONENT if kind == PORT else kind):
+            if head in self.own.get(section.name, ()):
+                return f"{self._new(section, head)}{dot}{rest}"
+        return name
 
     def any_name(self, name: str) -> str:
         """Return what a word becomes that may name anything of the part: a value given by `with:`."""
-        changed = self.component(name)
-        for section in ("places", "values", "missions"):
-            changed = self.name_in(section)(name) if changed == name else changed
-        return changed
+        kinds = (one.names for one in sections() if one.is_map and one.is_composed)
+        changed = (self.name(kind, name) for kind in (COMPONENT, *kinds))
+        return next((one for one in changed if one != name), name)
 
     def values(self, given: Mapping) -> Mapping:
         """Return the values that a part gives to one that it includes."""
@@ -127,144 +116,40 @@ class Renaming:
             entries[changed] = Entry(replace(entry.key, text=changed, span=span), entry.value)
         return replace(node, entries=entries)
 
-    def _named(self, node: Node, change: Callable[[Node], Node]) -> Node:
+    def _is_own_topic(self, topic: str) -> bool:
+        return any(one.has_topics and topic in self.own.get(one.name, ()) for one in sections())
+
+    def _new(self, section: Section[Any, Any], name: str) -> str:
+        return self.topic(name) if section.has_topics else f"{self.prefix}{name}"
+
+    def _section(self, section: Section[Any, Any], node: Node) -> Node:
+        node = section.with_references(node, lambda kind, one: self.texts(one, lambda text: self.name(kind, text)))
+        if section.at and isinstance(node, Mapping):
+            return _with(node, section.at[0], lambda named: self._named(section, named))
+        return self._named(section, node) if section.names else node
+
+    def _named(self, section: Section[Any, Any], node: Node) -> Node:
         if not isinstance(node, Mapping):
             return node
-        entries = {
-            f"{self.prefix}{name}": Entry(replace(entry.key, text=f"{self.prefix}{name}"), change(entry.value))
-            for name, entry in node.entries.items()
-        }
+        values = {name: section.rename(self, name, entry.value) for name, entry in node.entries.items()}
+        changed = {name: Entry(entry.key, values[name]) for name, entry in node.entries.items()}
+        if section.has_topics:
+            return self.topics(replace(node, entries=changed))
+        new = {name: f"{self.prefix}{name}" for name in changed}
+        entries = {new[name]: Entry(replace(one.key, text=new[name]), one.value) for name, one in changed.items()}
         return replace(node, entries=entries)
-
-    def _component(self, node: Node) -> Node:
-        if not isinstance(node, Mapping):
-            return node
-        node = _with(node, "starts_after", lambda after: self.texts(after, self.component))
-        node = _with(node, "connect", lambda connect: self.texts(connect, self.topic))
-        cls = _type(node)
-        return self._places_of(cls.config_type(), self._connected(node, _ports(cls))) if cls else node
-
-    def _connected(self, node: Mapping, ports: dict[str, Port[Any]]) -> Mapping:
-        """Return a component with `connect:` for each port whose own topic gets another name."""
-        written = node.get("connect")
-        if written is not None and not isinstance(written, Mapping):
-            return node
-        entries = dict(written.entries) if written else {}
-        for name, port in ports.items():
-            if name not in entries and (changed := self.topic(port.topic)) != port.topic:
-                given = self.connect.get(port.topic) or self.connect[port.topic.rpartition("/")[0]]
-                entries[name] = Entry(Scalar(name, given.key_span), Scalar(changed, given.span))
-        if not entries:
-            return node
-        span = next(iter(entries.values())).key.span
-        connect = Mapping(entries, written.span if written else span)
-        key = node.entries["connect"].key if written else Scalar("connect", span)
-        return replace(node, entries={**node.entries, "connect": Entry(key, connect)})
-
-    def _places_of(self, model: type[BaseModel], node: Mapping) -> Mapping:
-        """Return a map with the names of the part's places changed where `model` takes the name of a place."""
-        for name, model_field in model.model_fields.items():
-            if _takes_place(model_field.annotation):
-                node = _with(node, model_field.alias or name, lambda value: self.texts(value, self.name_in("places")))
-        return node
-
-    def _value(self, node: Node) -> Node:
-        if isinstance(node, Scalar):
-            return self.texts(node, self.component)
-        if not isinstance(node, Mapping):
-            return node
-        node = _with(node, "port", lambda port: self.texts(port, self.component))
-        return _with(node, "topic", lambda topic: self.texts(topic, self.topic))
-
-    def _mission(self, node: Node) -> Node:
-        if not isinstance(node, Mapping):
-            return node
-        return _with(node, "with", lambda given: self.texts(given, self.any_name))
-
-    def _muxes(self, node: Node) -> Node:
-        if not isinstance(node, Mapping):
-            return node
-        muxes = {mux: Entry(entry.key, self._mux(mux, entry.value)) for mux, entry in node.entries.items()}
-        return self.topics(replace(node, entries=muxes))
-
-    def _mux(self, mux: str, node: Node) -> Node:
-        if not isinstance(node, Mapping):
-            return node
-        node = _with(node, "inputs", lambda inputs: self._each(inputs, lambda one: _with(one, "from", self._source)))
-        for key in ("inputs", "locks"):
-            node = _with(node, key, lambda named: self.topics(named, f"{mux}/"))
-        return node
-
-    def _source(self, node: Node) -> Node:
-        return self.texts(node, self.component)
-
-    def _each(self, node: Node, change: Callable[[Mapping], Node]) -> Node:
-        if not isinstance(node, Mapping):
-            return node
-        entries = {
-            name: Entry(entry.key, change(entry.value) if isinstance(entry.value, Mapping) else entry.value)
-            for name, entry in node.entries.items()
-        }
-        return replace(node, entries=entries)
-
-    def _diagnostics(self, node: Node) -> Node:
-        analyzers = at(node, ("analyzers",))
-        if not isinstance(node, Mapping) or not isinstance(analyzers, Mapping):
-            return node
-        return _with(node, "analyzers", lambda named: self._named(self._each(named, self._analyzer), lambda one: one))
-
-    def _analyzer(self, node: Mapping) -> Node:
-        return _with(_with(node, "match", self._patterns), "expected", self._patterns)
-
-    def _patterns(self, node: Node) -> Node:
-        """Return a list of names and patterns; one that also matches muxes of the part names them beside it."""
-        if not isinstance(node, Sequence):
-            return node
-        items: list[Node] = []
-        for item in node.items:
-            changed = self._pattern(item.text) if isinstance(item, Scalar) and "${" not in item.text else []
-            items += [replace(item, text=text) for text in changed] if isinstance(item, Scalar) and changed else [item]
-        return replace(node, items=tuple(items))
-
-    def _pattern(self, pattern: str) -> list[str]:
-        matched = [self.topic(mux) for mux in sorted(self.own["muxes"]) if fnmatchcase(mux, pattern)]
-        is_own = any(fnmatchcase(name, pattern) for name in self.own["components"])
-        return [f"{self.prefix}{pattern}", *matched] if is_own else matched
-
-
-def names_in(root: Mapping, section: str) -> Iterable[str]:
-    """Return the names in a section of a tree."""
-    node = root.get(section)
-    return node.entries if isinstance(node, Mapping) else ()
 
 
 def topics_of(roots: Iterable[Mapping]) -> set[str]:
     """Return the topics that trees have, as `connect:` of an instance may name them."""
-    found: set[str] = set()
-    for root in roots:
-        for name in names_in(root, "components"):
-            connect, cls = at(root, ("components", name, "connect")), _type(at(root, ("components", name)))
-            ports = {port: one.topic for port, one in _ports(cls).items()} if cls else {}
-            for port, entry in connect.entries.items() if isinstance(connect, Mapping) else ():
-                ports |= {port: entry.value.text} if isinstance(entry.value, Scalar) else {}
-            found |= set(ports.values())
-        for mux in names_in(root, "muxes"):
-            found.add(mux)
-            for key in ("inputs", "locks"):
-                node = at(root, ("muxes", mux, key))
-                found |= {f"{mux}/{name}" for name in (node.entries if isinstance(node, Mapping) else ())}
-    return found
-
-
-def _type(component: Node | None) -> type[Any] | None:
-    """Return the class of a component, if its type is written down and known."""
-    written = at(component, ("type",)) if component else None
-    if not isinstance(written, Scalar) or written.text not in registry.component_names():
-        return None
-    try:
-        return registry.component_type(written.text)
-    except BrokenPluginError:  # told where the section is read
-        return None
+    return {
+        topic
+        for root in roots
+        for section in sections()
+        for name in section.names_in(root)
+        if (node := at(root, (section.name, *section.at, name))) is not None
+        for topic in section.topics(name, node)
+    }
 
 
 def _with(node: Mapping, key: str, change: Callable[[Node], Node]) -> Mapping:
@@ -273,13 +158,3 @@ def _with(node: Mapping, key: str, change: Callable[[Node], Node]) -> Mapping:
         return node
     entry = node.entries[key]
     return replace(node, entries={**node.entries, key: Entry(entry.key, change(entry.value))})
-
-
-def _ports(cls: type[Any]) -> dict[str, Port[Any]]:
-    """Return the ports that a class declares; those that depend on its configuration are not known yet."""
-    return {name: port for name in dir(cls) if isinstance(port := getattr(cls, name), Port) and port.topic}
-
-
-def _takes_place(annotation: object) -> bool:
-    """Tell whether a field takes the name of a place, or several of them."""
-    return annotation is Place or any(map(_takes_place, get_args(annotation)))

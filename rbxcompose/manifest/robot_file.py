@@ -8,22 +8,24 @@ from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.findings import Finding, Report
-from rbxcompose.manifest.body import read_body
 from rbxcompose.manifest.collection import paused_collection
 from rbxcompose.manifest.data import is_moderate
 from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.fill import fill
+from rbxcompose.manifest.header import Header
 from rbxcompose.manifest.include import included_parts
 from rbxcompose.manifest.layers import Chosen, Composed, compose_robot, profile_spans
-from rbxcompose.manifest.models import Header, RobotFile, RobotManifest
+from rbxcompose.manifest.models import RobotManifest
 from rbxcompose.manifest.names import names_of
 from rbxcompose.manifest.scopes import fill_scopes
 from rbxcompose.manifest.secrets import Secrets
+from rbxcompose.manifest.section import ROBOT
 from rbxcompose.manifest.sections import read_sections
 from rbxcompose.manifest.tree import Mapping, Scalar
 
-ROBOT, MISSION = "Robot", "Mission"
+MISSION = "Mission"
 
 
 @paused_collection()
@@ -64,16 +66,14 @@ def load_robot(
 def _manifest(
     composed: Composed, file: Path, sim: bool, environment: AnyMapping[str, str], documents: Documents
 ) -> RobotManifest | None:
-    report = documents.report
     if not composed.parts.is_complete:
         return None  # what a missing part was to bring would be missing everywhere
-    documents.check(RobotFile, composed.root)
+    documents.check(file_model(ROBOT), composed.root)
     names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
-    root, include = fill_scopes(composed, names, report)
-    manifest = read_sections(root, file, sim, report, documents.files)
+    root, include = fill_scopes(composed, names)
+    manifest = read_sections(root, file, sim, documents)
     return replace(
         manifest,
-        body=read_body(root, file, documents),
         parts=included_parts(composed.instances),
         include=include,
         history=composed.history,

@@ -6,15 +6,16 @@ from dataclasses import replace
 
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Related, Report, Span, kind
-from rbxcompose.manifest.arguments import Argument, read_argument
+from rbxcompose.manifest.arguments import Argument
 from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.history import ROBOT_LAYER, History
-from rbxcompose.manifest.include import Instance
+from rbxcompose.manifest.include import Instance, Parts
 from rbxcompose.manifest.layers import Composed, only
 from rbxcompose.manifest.names import Names, Typed, with_arguments
-from rbxcompose.manifest.sections import named_entries
+from rbxcompose.manifest.section import Contents
 from rbxcompose.manifest.tree import BROKEN, Mapping
 from rbxcompose.manifest.validate import UNKNOWN_KEY
+from rbxcompose.sections.args import args
 
 NO_VALUE = kind(
     "RBX1206",
@@ -39,31 +40,24 @@ args:
 )
 
 
-def fill_scopes(composed: Composed, names: Names, report: Report) -> tuple[Mapping, Mapping]:
+def fill_scopes(composed: Composed, names: Names) -> tuple[Mapping, Mapping]:
     """Return the robot's sections and its `include:` with every `${...}` filled in.
 
     The arguments' own values come first: those of the robot, then those of each instance, which are given in the scope
     of the file that includes it.
     """
-    root = composed.root
-    arguments = fill(only(root, "args"), names, report)
-    declared = _declared(arguments, report)
+    root, parts = composed.root, composed.parts
+    report = parts.documents.report
+    arguments = fill(only(root, args.name), names, report)
+    declared = Contents(arguments, parts.robot, parts.documents).of(args)
     values = {name: _own_value(name, one, composed.history, report) for name, one in declared.items()}
     names = with_arguments(names, values)
     include = fill(composed.include, names, report)
     for instance in reversed(composed.instances):  # what includes stands behind what it includes
-        names = with_arguments(names, _given_values(instance, names, report), instance.name)
-    others = {name: entry for name, entry in root.entries.items() if name != "args"}
+        names = with_arguments(names, _given_values(instance, names, parts), instance.name)
+    others = {name: entry for name, entry in root.entries.items() if name != args.name}
     filled = {**arguments.entries, **fill(replace(root, entries=others), names, report).entries}
     return replace(root, entries={name: filled[name] for name in root.entries}), include
-
-
-def _declared(section: Mapping, report: Report) -> dict[str, tuple[Argument | None, Span]]:
-    """Return the declarations of `args:` with the places of their names; None for one that has mistakes."""
-    return {
-        name: (read_argument(name, entry.value, ("args", name), report), entry.key.span)
-        for name, entry in named_entries(section, ("args",), report)
-    }
 
 
 def _own_value(name: str, declared: tuple[Argument | None, Span], history: History, report: Report) -> Typed:
@@ -78,9 +72,10 @@ def _own_value(name: str, declared: tuple[Argument | None, Span], history: Histo
     return Typed(argument.type, argument.read(argument.default, report), argument.default.span if is_given else None)
 
 
-def _given_values(instance: Instance, names: Names, report: Report) -> dict[str, Typed]:
+def _given_values(instance: Instance, names: Names, parts: Parts) -> dict[str, Typed]:
     """Return the values of a part's arguments: given by `with:`, else their defaults."""
-    declared = _declared(fill(instance.arguments, names, report), report)
+    report = parts.documents.report
+    declared = Contents(fill(instance.arguments, names, report), parts.robot, parts.documents).of(args)
     given = fill(instance.given, names, report)
     for name, entry in given.entries.items():
         if name not in declared:

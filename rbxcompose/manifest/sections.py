@@ -2,61 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
-from collections.abc import Mapping as AnyMapping
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
-from rbxcompose.config import Config, Name, Place, Secret
-from rbxcompose.findings import Finding, Report
-from rbxcompose.manifest.components import read_component
-from rbxcompose.manifest.data import is_moderate
-from rbxcompose.manifest.files import resolve
-from rbxcompose.manifest.fill import SHOWN_SECRET
-from rbxcompose.manifest.models import (
-    Analyzer,
-    Bus,
-    ComponentEntry,
-    Diagnostics,
-    Mission,
-    MissionEntry,
-    Mux,
-    PlaceModel,
-    RobotManifest,
-    ValueModel,
+from rbxcompose.findings import Finding, Related, kind
+from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.models import RobotManifest
+from rbxcompose.manifest.registry import broken_sections, naming, sections
+from rbxcompose.manifest.section import ROBOT, Contents, Section
+from rbxcompose.manifest.tree import Mapping, Scalar, key_span
+from rbxcompose.references import COMPONENT
+
+TAKEN_NAME = kind(
+    "RBX1007",
+    """A name that is taken
+
+Everything that runs has a name of its own. The names of sections, of muxes and of the components that every robot
+runs cannot be given to a component.
+
+Bad:
+```yaml
+components:
+  diagnostics:
+    type: battery_sim
+    runtime: 45 s
+```
+Good:
+```yaml
+components:
+  battery:
+    type: battery_sim
+    runtime: 45 s
+```
+""",
 )
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, at, children
-from rbxcompose.manifest.validate import WRONG_TYPE, is_valid, label_of, validate
+ALWAYS_THERE = ("transforms", "mission")
+"""Components that every robot runs, beside `diagnostics`."""
 
-C = TypeVar("C", bound=Config)
+RESERVED = ("buses", "actuators", "joints", "controllers", "safety", "devices", "console", "security", "record")
+"""The words of sections that a robot's file will have."""
 
 
-def read_sections(
-    root: Mapping, file: Path, sim: bool, report: Report, files: AnyMapping[str, Path] = MappingProxyType({})
-) -> RobotManifest:
-    """Return the robot that a composed and filled tree describes; entries with mistakes are left out.
-
-    `files` are all that were read, by the names that findings show: a path is relative to the one that writes it.
-    """
-    places = _places(root, report)
-    missions = _missions(root, file, files, report)
+def read_sections(root: Mapping, file: Path, sim: bool, documents: Documents) -> RobotManifest:
+    """Return the robot that a composed and filled tree describes; entries with mistakes are left out."""
+    documents.report.extend([*broken_sections(), *_taken_names(root)])
+    contents = Contents(root, file, documents, sections())
+    for section in sections(ROBOT):
+        if section.is_composed:
+            contents.of(section)
     return RobotManifest(
-        name=_text(root, "name"),
-        about=_text(root, "about"),
-        path=file,
-        root=root,
-        is_simulated=sim,
-        bus=_one(Bus, root, "bus", report),
-        components=_components(root, places, report),
-        muxes=dict(_valid(Mux, root, ("muxes",), report)),
-        diagnostics=_diagnostics(root, report),
-        places=places,
-        values=dict(_valid(ValueModel, root, ("values",), report)),
-        missions=missions,
-        start=_start(root, missions, report),
+        name=_text(root, "name"), about=_text(root, "about"), path=file, root=root, is_simulated=sim, contents=contents
     )
+
+
+def reserved_names() -> frozenset[str]:
+    """Return the words that a section of a robot's file has or will have."""
+    return frozenset((*RESERVED, *(one.name for one in sections(ROBOT))))
 
 
 def _text(root: Mapping, key: str) -> str:
@@ -64,99 +66,35 @@ def _text(root: Mapping, key: str) -> str:
     return value.text if isinstance(value, Scalar) else ""
 
 
-def _one(model: type[C], root: Mapping, key: str, report: Report) -> C:
-    """Return a section that is one map; its defaults if it is missing or wrong."""
-    node = root.get(key)
-    read = validate(model, node, (key,), report) if node is not None and not is_empty(node) else None
-    return read if read is not None else model()
+def _taken_names(root: Mapping) -> Iterator[Finding]:
+    """Yield a finding for each name of something that runs which something else has already."""
+    running = list(naming(COMPONENT))
+    for index, section in enumerate(running):
+        for name in () if section.has_topics else section.names_in(root):
+            span = key_span(root, (section.name, *section.at, name))
+            if message := _own_name(name, section):
+                yield TAKEN_NAME.at(span, message)
+            elif found := _other_owner(root, name, section, running[index + 1 :]):
+                message, label, other = found
+                yield TAKEN_NAME.at(span, message, related=[Related(key_span(root, other), label)])
 
 
-def is_empty(node: Node) -> bool:
-    """Tell whether there is nothing behind the name of a section."""
-    return isinstance(node, Scalar) and node.plain and not node.text
+def _own_name(name: str, section: Section[Any, Any]) -> str:
+    """Return why nothing that a user writes may have a name, or nothing."""
+    if name in reserved_names():
+        return f"a {section.entry} cannot be named like the section '{name}'"
+    return f"every robot runs a component '{name}' already" if name in ALWAYS_THERE else ""
 
 
-def named_entries(root: Mapping, path: tuple[str, ...], report: Report) -> Iterator[tuple[str, Entry]]:
-    """Yield the entries of a section by name, after a finding for each bad name."""
-    node = at(root, path)
-    if node is None or is_empty(node):
-        return
-    if not isinstance(node, Mapping):
-        message = f"'{path[-1]}' must be a map from names to what they are"
-        report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
-        return
-    for name, entry in node.entries.items():
-        if is_valid(Name, name) or validate(Name, replace(entry.key, plain=False), (*path, name), report) is not None:
-            yield name, entry
-
-
-def _valid(model: Any, root: Mapping, path: tuple[str, ...], report: Report) -> Iterator[tuple[str, Any]]:
-    """Yield the entries of a section that are what `model` says."""
-    for name, entry in named_entries(root, path, report):
-        read = validate(model, entry.value, (*path, name), report)
-        if read is not None:
-            yield name, read
-
-
-def _diagnostics(root: Mapping, report: Report) -> Diagnostics:
-    """Return the analyzers without those that have mistakes."""
-    node = root.get("diagnostics")
-    if not isinstance(node, Mapping):
-        return _one(Diagnostics, root, "diagnostics", report)
-    others = {name: entry for name, entry in node.entries.items() if name != "analyzers"}
-    validate(Diagnostics, replace(node, entries=others), ("diagnostics",), report)
-    return Diagnostics(analyzers=dict(_valid(Analyzer, root, ("diagnostics", "analyzers"), report)))
-
-
-def _places(root: Mapping, report: Report) -> dict[str, Place]:
-    """Return all places; one with mistakes stands in the origin, so that what names it is not wrong as well."""
-    places = {}
-    for name, entry in named_entries(root, ("places",), report):
-        read = validate(PlaceModel, entry.value, ("places", name), report) or PlaceModel(x=0.0, y=0.0)
-        places[name] = Place(name, read.x, read.y, read.heading)
-    return places
-
-
-def _missions(root: Mapping, file: Path, files: AnyMapping[str, Path], report: Report) -> dict[str, MissionEntry]:
-    missions = {}
-    for name, entry in named_entries(root, ("missions",), report):
-        read = validate(Mission, entry.value, ("missions", name), report)
-        if read is None or not isinstance(entry.value, Mapping):
-            continue
-        _refuse_secrets(entry.value, report)
-        if not is_moderate(entry.value.get("with"), "input", report):
-            continue
-        span = entry.value.entries["file"].value.span
-        path = resolve(read.file, files.get(span.file, file), span)
-        if isinstance(path, Finding):
-            report.add(path)
-            continue
-        inputs = entry.value.get("with")
-        missions[name] = MissionEntry(name, path, inputs if isinstance(inputs, Mapping) else Mapping(), entry.key.span)
-    return missions
-
-
-def _refuse_secrets(node: Node, report: Report) -> None:
-    """Add a finding for each secret that would go into a mission, where it would be shown."""
-    if isinstance(node, Scalar) and isinstance(node.filled, Secret):
-        report.add(SHOWN_SECRET.at(node.span, "a mission cannot hold a secret: what it does is logged"))
-    for _, below in children(node):
-        _refuse_secrets(below, report)
-
-
-def _components(root: Mapping, places: dict[str, Place], report: Report) -> dict[str, ComponentEntry]:
-    components = {}
-    for name, entry in named_entries(root, ("components",), report):
-        if component := read_component(name, entry, root, places, report):
-            components[name] = component
-    return components
-
-
-def _start(root: Mapping, missions: Collection[str], report: Report) -> str | None:
-    """Return the name of the mission to start; None also if that mission has mistakes, which were said."""
-    start, written = root.get("start"), root.get("missions")
-    if start is None or is_empty(start):
-        return None
-    name = validate(str, start, ("start",), report)
-    is_broken = isinstance(written, Mapping) and name in written and name not in missions
-    return None if is_broken else name
+def _other_owner(
+    root: Mapping, name: str, section: Section[Any, Any], others: list[Section[Any, Any]]
+) -> tuple[str, str, tuple[str, ...]] | None:
+    """Return what else has a name: in words, as a label, and its path."""
+    for one in sections(ROBOT):
+        if name in one.brings and one.name in root:
+            return f"the {one.name} brings a component '{name}' already", f"the {one.name}", (one.name,)
+    for one in others:
+        if name in one.names_in(root):
+            words = f"a {section.entry} and a {one.entry} are both named '{name}'"
+            return words, f"the {one.entry}", (one.name, *map(str, one.at), name)
+    return None

@@ -1,61 +1,101 @@
-"""What a model takes at a place below it."""
+"""What a model takes at a place below it: keys, quantities, names of something."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, get_args, get_origin
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache
+from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel
 
 from rbxcompose.config import Dimensioned
-from rbxcompose.manifest.tree import Path
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Sequence
+from rbxcompose.references import Refers
 from rbxcompose.units import Dimension
+
+
+@cache
+def field_types(model: type[BaseModel]) -> dict[str, Any]:
+    """Return the types of a model's fields by key, with all that they are annotated with."""
+    return {
+        field.alias or name: Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+        for name, field in model.model_fields.items()
+    }
 
 
 def keys_at(model: Any, path: Path) -> list[str]:
     """Return the keys of the map at `path` below `model`; none if the model does not name them."""
-    return sorted({name for shape in _shapes_at(model, path) for name in _fields(shape)})
+    return sorted({name for one in _types_at(model, path) for shape in _models(one) for name in field_types(shape)})
 
 
 def dimension_at(model: Any, path: Path) -> Dimension | None:
     """Return what the quantity at `path` below `model` measures, None if it is no quantity."""
-    if not path:
-        return None
-    for shape in _shapes_at(model, path[:-1]):
-        if isinstance(shape, type) and issubclass(shape, BaseModel):
-            for name, field in shape.model_fields.items():
-                if (field.alias or name) == path[-1]:
-                    return next((mark.dimension for mark in field.metadata if isinstance(mark, Dimensioned)), None)
-    return None
+    marks = (mark for one in _types_at(model, path) for mark in alternatives(one))
+    return next((mark.dimension for mark in marks if isinstance(mark, Dimensioned)), None)
 
 
-def _shapes_at(model: Any, path: Path) -> list[Any]:
-    shapes = list(_models(model))
+def kinds_of(hint: Any) -> Iterator[str]:
+    """Yield of what a value of a type is the name itself; those in a list or map are not meant."""
+    return (one.kind for one in alternatives(hint) if isinstance(one, Refers))
+
+
+def kind_of_keys(model: Any, path: Path) -> str:
+    """Return of what the keys of the map at `path` below `model` are names, or nothing."""
+    maps = (shape for one in _types_at(model, path) for shape in alternatives(one) if get_origin(shape) is dict)
+    return next((kind for one in maps for kind in kinds_of(get_args(one)[0])), "")
+
+
+def below(hint: Any, key: str | int) -> Iterator[Any]:
+    """Yield the types that may stand under a key or index of a value of a type."""
+    for one in alternatives(hint):
+        if isinstance(one, type) and issubclass(one, BaseModel):
+            if key in field_types(one):
+                yield field_types(one)[str(key)]
+        elif get_origin(one) is dict:
+            yield get_args(one)[1]
+        elif get_origin(one) in (list, tuple):
+            yield get_args(one)[0]
+
+
+def with_references(node: Node, hint: Any, change: Callable[[str, Node], Node]) -> Node:
+    """Return a node with `change(kind, value)` in the place of each value that is a name of a kind by its type."""
+    for kind in kinds_of(hint):
+        node = change(kind, node)
+    match node:
+        case Mapping(entries=entries):
+            values = {name: _changed_below(one.value, hint, name, change) for name, one in entries.items()}
+            return replace(node, entries={name: Entry(one.key, values[name]) for name, one in entries.items()})
+        case Sequence(items=items):
+            return replace(node, items=tuple(_changed_below(one, hint, i, change) for i, one in enumerate(items)))
+    return node
+
+
+def _changed_below(node: Node, hint: Any, key: str | int, change: Callable[[str, Node], Node]) -> Node:
+    for inner in below(hint, key):
+        node = with_references(node, inner, change)
+    return node
+
+
+def alternatives(hint: Any) -> Iterator[Any]:
+    """Yield the models, maps, lists, plain types and marks that a type is made of, without looking into them."""
+    if not get_args(hint) or get_origin(hint) in (dict, list, tuple):
+        yield hint
+        return
+    inner, marks = get_args(hint), ()
+    if get_origin(hint) is Annotated:
+        inner, marks = inner[:1], inner[1:]
+    yield from marks
+    for one in inner:
+        yield from alternatives(one)
+
+
+def _models(hint: Any) -> Iterator[type[BaseModel]]:
+    return (one for one in alternatives(hint) if isinstance(one, type) and issubclass(one, BaseModel))
+
+
+def _types_at(model: Any, path: Path) -> list[Any]:
+    found = [model]
     for key in path:
-        shapes = [inner for shape in shapes for inner in _below(shape, str(key))]
-    return shapes
-
-
-def _models(annotation: Any) -> Iterator[Any]:
-    """Yield the models, maps and lists that an annotation allows; `X | None` and `Annotated[X, ...]` are X."""
-    is_model = isinstance(annotation, type) and issubclass(annotation, BaseModel)
-    if is_model or get_origin(annotation) in (dict, list, tuple):
-        yield annotation
-    else:
-        for argument in get_args(annotation):
-            yield from _models(argument)
-
-
-def _below(shape: Any, key: str) -> Iterator[Any]:
-    if isinstance(shape, type) and issubclass(shape, BaseModel):
-        for name, field in shape.model_fields.items():
-            if (field.alias or name) == key:
-                yield from _models(field.annotation)
-    else:
-        yield from _models(get_args(shape)[-1] if get_origin(shape) is dict else get_args(shape)[0])
-
-
-def _fields(shape: Any) -> Iterator[str]:
-    if isinstance(shape, type) and issubclass(shape, BaseModel):
-        for name, field in shape.model_fields.items():
-            yield field.alias or name
+        found = [inner for one in found for inner in below(one, key)]
+    return found

@@ -8,7 +8,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
 from rbxcompose.config import Config, Name, Time
-from rbxcompose.manifest.models import Header, TopicName
+from rbxcompose.manifest.fields import TopicName
+from rbxcompose.manifest.header import Header
 
 TEST = "Test"
 

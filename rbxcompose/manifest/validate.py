@@ -143,7 +143,8 @@ components:
 
 T = TypeVar("T")
 KEYS = "keys that it takes"
-_SINGULAR = {"components": "component", "muxes": "mux", "places": "place", "args": "argument", "missions": "mission"}
+ENTRY_WORDS: dict[str, str] = {}
+"""What an entry of a section is called: each section that is declared enters its own."""
 _MOST_FINDINGS = 100  # of one part: nobody writes more by mistake, and each costs a search for the nearest name
 _ROUNDS = 8  # of repairs; each one goes at least one level deeper into a value
 
@@ -240,10 +241,10 @@ def where(path: Path) -> str:
     match path:
         case ():
             return "this file"
-        case (str(section), name) if section in _SINGULAR:
-            return f"{_SINGULAR[section]} '{name}'"
-        case (str(section), name, *below) if section in _SINGULAR:
-            return f"'{'.'.join(map(str, below))}' of {_SINGULAR[section]} '{name}'"
+        case (str(section), name) if section in ENTRY_WORDS:
+            return f"{ENTRY_WORDS[section]} '{name}'"
+        case (str(section), name, *below) if section in ENTRY_WORDS:
+            return f"'{'.'.join(map(str, below))}' of {ENTRY_WORDS[section]} '{name}'"
     return f"'{'.'.join(map(str, path))}'"
 
 

@@ -6,25 +6,27 @@ What does not fit together is left out here; the checks say it.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from rbxcompose.config import Config
 from rbxcompose.diagnostics.levels import LOG_LEVELS
 from rbxcompose.findings import Report
-from rbxcompose.manifest.models import DESCRIPTION, ComponentEntry, ComponentOptions, RobotManifest
+from rbxcompose.manifest.models import RobotManifest
+from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.section import ROBOT, Contents
+from rbxcompose.manifest.wanted import WantedComponent
 from rbxcompose.missions.deeds import sent_by
 from rbxcompose.missions.sources import ValueSource
 from rbxcompose.model.missions import read_missions
 from rbxcompose.model.robot import Part, Robot
 from rbxcompose.model.skills import names_of_skills, services_of, skills_of, topics_of
 from rbxcompose.model.values import value_of
-from rbxcompose.model.wiring import End, ends_of, readers, resolve
+from rbxcompose.model.wiring import ends_of, readers, resolve
 from rbxcompose.sdk.capabilities import require_declared
 from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type
 
-MUX = "mux"
 MISSION = "mission"
-NO_OPTIONS = ComponentOptions()
 ALWAYS = ("transforms", "diagnostics")  # what every robot runs
 
 
@@ -44,36 +46,47 @@ def build_robot(
 
 
 def written_parts(manifest: RobotManifest) -> dict[str, Part]:
-    """Return the parts that `components:` and `muxes:` ask for, wired."""
-    remaps = _mux_sources(manifest)
-    parts: dict[str, Part] = {}
-    for name, entry in manifest.components.items():
-        if entry.config is not None:
-            connect = {**entry.options.connect, **remaps.get(name, {})}
-            parts[name] = _part(manifest, name, entry.type, entry.config, connect, ("components", name), entry.options)
-    for name in manifest.muxes:
-        parts[name] = _mux(manifest, name, parts)
-    return parts
+    """Return the parts that the sections ask for, wired: first those that users name, then what sections bring."""
+    wires = _Wires(manifest.bus.namespace or "")
+    given = _given_topics(manifest.contents)
+    for section in sorted(sections(ROBOT), key=lambda one: not one.names):
+        for wanted in section.components(manifest.contents, wires):
+            wires.parts[wanted.name] = _part(manifest, wanted, given.get(wanted.name, {}))
+    return wires.parts
+
+
+def _given_topics(contents: Contents) -> dict[str, dict[str, str]]:
+    """Return the topics that sections give to ports of components: component -> port -> topic."""
+    found: dict[str, dict[str, str]] = {}
+    for section in sections(ROBOT):
+        for component, topics in section.connects(contents).items():
+            found.setdefault(component, {}).update(topics)
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Wires:
+    """The wires of the parts that there are so far."""
+
+    namespace: str
+    parts: dict[str, Part] = field(default_factory=dict)
+
+    def message_of(self, topic: str) -> str:
+        """Return the type of who listens to a topic, else of who publishes below it; empty if nobody does."""
+        name = resolve(topic, self.namespace)
+        ends = [end for part in self.parts.values() for end in part.ends]
+        sources = [end for end in ends if isinstance(end.port, Out) and end.topic.startswith(f"{name}/")]
+        return next((end.type_name for end in [*readers(ends, name), *sources]), "")
 
 
 def own_parts(manifest: RobotManifest, written: Mapping[str, Part]) -> dict[str, Part]:
-    """Return the parts that robots run beside those that their user wrote, but for the one that runs missions."""
-    description = _description(manifest)
-    names = [*written, *ALWAYS, *description, *([MISSION] if manifest.missions else [])]
+    """Return the parts that every robot runs, but for the one that runs missions."""
+    names = [*written, *ALWAYS, *([MISSION] if manifest.missions else [])]
     analyzers = {name: one.model_dump(exclude_none=True) for name, one in manifest.diagnostics.analyzers.items()}
     return {
         "transforms": _own(manifest, "transforms", {}),
         "diagnostics": _own(manifest, "diagnostics", {"analyzers": analyzers, "expected": names}),
-        **description,
     }
-
-
-def _description(manifest: RobotManifest) -> dict[str, Part]:
-    """Return the part that publishes what the body is, if there is one."""
-    if manifest.body is None:
-        return {}
-    config = component_type(DESCRIPTION).config_type()(**{"urdf": manifest.body.text})
-    return {DESCRIPTION: _part(manifest, DESCRIPTION, DESCRIPTION, config, {}, ("body", "urdf"))}
 
 
 def mission_part(robot: Robot) -> Part:
@@ -96,68 +109,30 @@ def mission_part(robot: Robot) -> Part:
 
 def _own(manifest: RobotManifest, type_name: str, config: Mapping[str, object]) -> Part:
     """Return a part that is named like its type and stands where the manifest has the section of that name."""
-    return _part(manifest, type_name, type_name, component_type(type_name).config_type()(**config), {}, (type_name,))
+    return _part(manifest, WantedComponent(type_name, type_name, config, (type_name,)), {})
 
 
-def _part(
-    manifest: RobotManifest,
-    name: str,
-    type_name: str,
-    config: Config,
-    connect: Mapping[str, str],
-    path: tuple[str, ...],
-    options: ComponentOptions = NO_OPTIONS,
-) -> Part:
-    cls = component_type(type_name)
-    ends = ends_of(name, cls, config, manifest.bus.namespace or "", connect)
-    process = options.process or cls.process
-    log = LOG_LEVELS[options.log]
-    capabilities = require_declared(type_name, cls.capabilities(config), (end.name for end in ends), type(config))
-    after, restart = options.starts_after, options.restart
-    return Part(name, type_name, cls, config, process, after, ends, path, restart, log, capabilities)
-
-
-def _mux_sources(manifest: RobotManifest) -> dict[str, dict[str, str]]:
-    """Return the topics that muxes give to the outputs they take: component -> port -> topic."""
-    remaps: dict[str, dict[str, str]] = {}
-    for mux, entry in manifest.muxes.items():
-        for name, source in entry.inputs.items():
-            component, _, port = (source.source or "").partition(".")
-            written = manifest.components.get(component)
-            if written is not None and written.config is not None:
-                for output in _outputs(written, written.config, mux, port):
-                    remaps.setdefault(component, {})[output] = f"{mux}/{name}"
-    return remaps
-
-
-def _outputs(entry: ComponentEntry, config: Config, topic: str, port: str) -> list[str]:
-    """Return the output that a mux takes: the one that is named, else the one on the mux's topic, else the only one."""
-    ports = component_type(entry.type).ports(config)
-    outputs = {name: end.topic for name, end in ports.items() if isinstance(end, Out)}
-    if port:
-        return [port] if port in outputs else []
-    on_topic = [name for name, own in outputs.items() if topic in (own, entry.options.connect.get(name))]
-    return on_topic or (list(outputs) if len(outputs) == 1 else [])
-
-
-def _mux(manifest: RobotManifest, name: str, parts: Mapping[str, Part]) -> Part:
-    entry = manifest.muxes[name]
-    ends = [end for part in parts.values() for end in part.ends]
-    config: dict[str, object] = {
-        "output": name,
-        "message": _message(name, ends, manifest.bus.namespace or ""),
-        "inputs": {key: one.model_dump(exclude={"source"}, exclude_unset=True) for key, one in entry.inputs.items()},
-        "locks": {key: {"priority": one.priority, "timeout": one.timeout} for key, one in entry.locks.items()},
-    }
-    return _part(manifest, name, MUX, component_type(MUX).config_type()(**config), {}, ("muxes", name))
-
-
-def _message(mux: str, ends: list[End], namespace: str) -> str:
-    """Return the type that a mux forwards: that of who listens to it, else of its sources, else a twist."""
-    topic = resolve(mux, namespace)
-    heard = readers(ends, topic)
-    sources = [end for end in ends if isinstance(end.port, Out) and end.topic.startswith(f"{topic}/")]
-    return next((end.type_name for end in [*heard, *sources]), "geometry_msgs/msg/Twist")
+def _part(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[str, str]) -> Part:
+    """Return a component that is wanted as a part; `given` are topics of its ports that others give."""
+    cls, options = component_type(wanted.type_name), wanted.options
+    config = wanted.config if isinstance(wanted.config, Config) else cls.config_type()(**wanted.config)
+    ends = ends_of(wanted.name, cls, config, manifest.bus.namespace or "", {**options.connect, **given})
+    process, log = options.process or cls.process, LOG_LEVELS[options.log]
+    names = (end.name for end in ends)
+    capabilities = require_declared(wanted.type_name, cls.capabilities(config), names, type(config))
+    return Part(
+        wanted.name,
+        wanted.type_name,
+        cls,
+        config,
+        process,
+        options.starts_after,
+        ends,
+        wanted.path,
+        options.restart,
+        log,
+        capabilities,
+    )
 
 
 def values_of(manifest: RobotManifest, parts: Mapping[str, Part]) -> dict[str, ValueSource]:

@@ -13,10 +13,12 @@ from rbxcompose.diagnostics.levels import Level
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span
 from rbxcompose.manifest.models import RobotManifest
-from rbxcompose.manifest.tree import Mapping, Path, at, key_span, value_span
+from rbxcompose.manifest.registry import naming
+from rbxcompose.manifest.tree import Path, at, key_span, value_span
 from rbxcompose.missions.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource
 from rbxcompose.model.wiring import End
+from rbxcompose.references import COMPONENT
 from rbxcompose.restarts import DEFAULT, Restart
 from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.component import Component
@@ -89,9 +91,8 @@ class Robot:
 
     @cached_property
     def written(self) -> frozenset[str]:
-        """Return the names of all components and muxes that the manifest has, also of those with mistakes."""
-        sections = (self.manifest.root.get(section) for section in ("components", "muxes"))
-        return frozenset(name for one in sections if isinstance(one, Mapping) for name in one.entries)
+        """Return the names of all components that sections of the manifest ask for, also of those with mistakes."""
+        return frozenset(name for one in naming(COMPONENT) for name in one.names_in(self.manifest.root))
 
     @cached_property
     def writers(self) -> AnyMapping[str, list[End]]:

@@ -6,12 +6,12 @@ from collections.abc import Collection, Iterable, Mapping
 
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, choice_of, quantity_of
-from rbxcompose.manifest.models import Value as ValueEntry
 from rbxcompose.missions.sources import ValueSource
 from rbxcompose.model.robot import Part
 from rbxcompose.model.wiring import End, resolve
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.ports import In, Out
+from rbxcompose.sections.values import Value as ValueEntry
 from rbxcompose.units import UNITS
 
 # The message that carries data from outside, where nobody in the robot says which it is.

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rbxcompose.manifest.models import ComponentOptions
+from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping as MappingNode
 from rbxcompose.manifest.validate import to_plain

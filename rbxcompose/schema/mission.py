@@ -9,7 +9,7 @@ from typing import Any
 from rbxcompose.config import Name
 from rbxcompose.expressions.types import FLAG, TYPES
 from rbxcompose.manifest.arguments import ArgumentModel
-from rbxcompose.manifest.models import Header
+from rbxcompose.manifest.header import Header
 from rbxcompose.missions.goals import skill_of, topic_skill
 from rbxcompose.missions.history import HISTORY
 from rbxcompose.missions.machines import MACHINE_KEYS

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rbxcompose.manifest.models import OPTIONS
+from rbxcompose.manifest.options import OPTIONS
+from rbxcompose.manifest.registry import sections as all_sections
 from rbxcompose.schema.components import COMPONENT
 from rbxcompose.schema.scalars import Schema
 from rbxcompose.schema.settle import DEFINITIONS
+from rbxcompose.sections.components import components
 
 OVER = "overlay_"  # begins the name of a definition that an overlay uses
 REMOVED: Schema = {"enum": [None, ""], "description": "With the tag `!remove`: takes it out of what lies below."}
 _NOT_NEEDED = ("required", "minProperties", "minItems", "default")
-_SHORT = {"args": "the argument's value"}  # sections whose entries may be written as one word in an overlay
 
 
 def laid_over(
@@ -21,15 +22,16 @@ def laid_over(
 ) -> tuple[dict[str, Schema], dict[str, Schema]]:
     """Return the sections as an overlay may have them, and the definitions that those need."""
     schemas = {name: _over(one) for name, one in sections.items()}
-    for name, about in _SHORT.items():
-        entry = schemas[name]["additionalProperties"]
-        word = {"type": ["string", "number", "boolean", "array"], "description": about}
-        schemas[name] = {**schemas[name], "additionalProperties": {"anyOf": [word, entry]}}
-    schemas["components"] = _told(schemas["components"], definitions)
+    for section in all_sections():
+        if section.short and section.short.only_over:
+            entry = schemas[section.name]["additionalProperties"]
+            word = {"type": ["string", "number", "boolean", "array"], "description": section.short.only_over}
+            schemas[section.name] = {**schemas[section.name], "additionalProperties": {"anyOf": [word, entry]}}
+    schemas[components.name] = _told(schemas[components.name], definitions)
     return schemas, {f"{OVER}{name}": _over(one) for name, one in definitions.items()}
 
 
-def _told(components: Schema, definitions: Mapping[str, Schema]) -> Schema:
+def _told(section: Schema, definitions: Mapping[str, Schema]) -> Schema:
     """Return the section `components` with what the keys of an entry mean that does not repeat its type."""
     about: dict[str, list[str]] = {}
     for name in (one for one in definitions if one.startswith(COMPONENT)):
@@ -38,9 +40,9 @@ def _told(components: Schema, definitions: Mapping[str, Schema]) -> Schema:
                 about.setdefault(key, []).append(f"Of `{name.removeprefix(COMPONENT)}`: {schema['description']}")
     keys = {key: {"description": "\n\n".join(texts)} for key, texts in sorted(about.items())}
     changed = {"if": {"not": {"anyOf": [{"required": ["type"]}]}}, "then": {"properties": keys}}
-    entry, removed = components["additionalProperties"]["anyOf"]
+    entry, removed = section["additionalProperties"]["anyOf"]
     entry = {**entry, "allOf": [*entry["allOf"], changed]}
-    return {**components, "additionalProperties": {**components["additionalProperties"], "anyOf": [entry, removed]}}
+    return {**section, "additionalProperties": {**section["additionalProperties"], "anyOf": [entry, removed]}}
 
 
 def or_removed(schema: Schema) -> Schema:

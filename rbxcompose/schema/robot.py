@@ -6,44 +6,18 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rbxcompose.config import Config, Name
-from rbxcompose.manifest.arguments import ArgumentModel
-from rbxcompose.manifest.models import (
-    Body,
-    Bus,
-    Diagnostics,
-    Header,
-    IncludeModel,
-    MissionModel,
-    Mux,
-    Needs,
-    OverlayFile,
-    PartFile,
-    PlaceModel,
-    Provides,
-    RobotFile,
-    ValueModel,
-)
+from rbxcompose.manifest.file_models import file_model
+from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.registry import sections as all_sections
+from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
 from rbxcompose.schema.components import component_schemas
 from rbxcompose.schema.overlays import laid_over, or_removed
 from rbxcompose.schema.scalars import Schema
 from rbxcompose.schema.settle import opened, schemas_of
+from rbxcompose.sections.components import components
+from rbxcompose.sections.profiles import profiles
 
-SECTION_TYPES: Mapping[str, Any] = {
-    "args": dict[Name, ArgumentModel],
-    "include": dict[Name, IncludeModel],
-    "body": Body,
-    "bus": Bus,
-    "muxes": dict[Name, Mux],
-    "diagnostics": Diagnostics,
-    "places": dict[Name, PlaceModel],
-    "values": dict[Name, ValueModel],
-    "missions": dict[Name, MissionModel],
-    "start": Name,
-    "needs": Needs,
-    "provides": Provides,
-}
-"""What stands in each section, but for `components` and `profiles`, which are made of more than models."""
+MADE_OTHERWISE = (components, profiles)  # of more than one model
 
 NAMES: Schema = {"pattern": "^[a-z][a-z0-9_]*$", "maxLength": 60}
 
@@ -58,41 +32,41 @@ class Sections:
 
 def sections_of(types: Iterable[str]) -> Sections:
     """Return the sections of a robot that may use these types of components."""
-    schemas, definitions = schemas_of(SECTION_TYPES)
+    others = [one for one in all_sections() if one not in MADE_OTHERWISE]
+    schemas, definitions = schemas_of({one.name: one.type for one in others})
     entry, made = component_schemas(types)
-    schemas["components"] = {"type": "object", "propertyNames": NAMES, "additionalProperties": entry}
+    schemas[components.name] = {"type": "object", "propertyNames": NAMES, "additionalProperties": entry}
     return Sections({name: or_empty(opened(one, definitions)) for name, one in schemas.items()}, definitions | made)
 
 
 def robot_schema(types: Iterable[str]) -> Schema:
     """Return the schema of a robot's file."""
-    sections = sections_of(types)
-    overlay, over = laid_over(sections.schemas, sections.definitions)
-    profile = or_removed({"type": "object", "properties": described(overlay, RobotFile), "additionalProperties": False})
-    profiles = or_empty({"type": "object", "propertyNames": NAMES, "additionalProperties": profile})
-    own = described({**sections.schemas, "profiles": profiles}, RobotFile)
-    changing = described({**overlay, "profiles": profiles}, RobotFile)
-    return document("Robot", RobotFile, own, {**sections.definitions, **over}, changing)
+    made = sections_of(types)
+    overlay, over = laid_over(made.schemas, made.definitions)
+    profile = or_removed({"type": "object", "properties": described(overlay, ROBOT), "additionalProperties": False})
+    changes = {profiles.name: or_empty({"type": "object", "propertyNames": NAMES, "additionalProperties": profile})}
+    own, changing = described({**made.schemas, **changes}, ROBOT), described({**overlay, **changes}, ROBOT)
+    return document(ROBOT, file_model(ROBOT), own, {**made.definitions, **over}, changing)
 
 
 def part_schema(types: Iterable[str]) -> Schema:
     """Return the schema of a part's file."""
-    sections = sections_of(types)
-    overlay, over = laid_over(sections.schemas, sections.definitions)
-    own, changing = described(sections.schemas, PartFile), described(overlay, PartFile)
-    return document("Part", PartFile, own, {**sections.definitions, **over}, changing)
+    made = sections_of(types)
+    overlay, over = laid_over(made.schemas, made.definitions)
+    own, changing = described(made.schemas, PART), described(overlay, PART)
+    return document(PART, file_model(PART), own, {**made.definitions, **over}, changing)
 
 
 def overlay_schema(types: Iterable[str]) -> Schema:
     """Return the schema of an overlay's file."""
-    sections = sections_of(types)
-    overlay, over = laid_over(sections.schemas, sections.definitions)
-    return document("Overlay", OverlayFile, described(overlay, OverlayFile), over)
+    made = sections_of(types)
+    overlay, over = laid_over(made.schemas, made.definitions)
+    return document(OVERLAY, file_model(OVERLAY), described(overlay, OVERLAY), over)
 
 
 def document(
     kind: str,
-    model: type[Config],
+    model: type[Header],
     properties: Schema,
     definitions: Mapping[str, Schema],
     changing: Schema | None = None,
@@ -127,12 +101,10 @@ def header(kind: str) -> dict[str, Schema]:
     }
 
 
-def described(schemas: Mapping[str, Schema], model: type[Config]) -> dict[str, Schema]:
-    """Return sections with what the model of their file says they are for, in the model's order."""
-    fields = model.model_fields
-    return {
-        name: {**schemas[name], "description": field.description} for name, field in fields.items() if name in schemas
-    }
+def described(schemas: Mapping[str, Schema], kind: str) -> dict[str, Schema]:
+    """Return the sections that a kind of manifest has, in their order, with what they are for."""
+    made = [one for one in all_sections(kind) if one.name in schemas]
+    return {one.name: {**schemas[one.name], "description": one.doc} for one in made}
 
 
 def or_empty(schema: Schema) -> Schema:

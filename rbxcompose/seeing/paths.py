@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from rbxcompose.findings import Finding, kind
-from rbxcompose.manifest.models import RobotFile, RobotManifest
-from rbxcompose.manifest.overlay import INCLUDE, in_section
+from rbxcompose.manifest.file_models import robot_keys
+from rbxcompose.manifest.models import RobotManifest
+from rbxcompose.manifest.registry import naming
+from rbxcompose.manifest.section import Scope
+from rbxcompose.manifest.sets import in_section
 from rbxcompose.manifest.tree import Mapping, Node, Path, Sequence, at
 from rbxcompose.model.robot import Robot
 from rbxcompose.plain import plain
+from rbxcompose.references import COMPONENT
 from rbxcompose.schema.guide import Guide
+from rbxcompose.sections.include import include
 
 NO_SUCH_PATH = kind(
     "RBX9011",
@@ -27,14 +32,19 @@ def path_of(robot: Robot, text: str) -> Path:
     """Return the path from the root that a text means; an item of a list is counted from 0."""
     names: list[str | int] = list(text.strip().split("."))
     manifest = robot.manifest
-    if names[0] not in RobotFile.model_fields:
-        muxes = manifest.root.get("muxes")
-        names.insert(0, "muxes" if isinstance(muxes, Mapping) and str(names[0]) in muxes else "components")
+    if names[0] not in robot_keys():
+        names.insert(0, _section_of(manifest, str(names[0])))
     for index, name in enumerate(names):
         above = found_at(manifest, tuple(names[:index]))
         if isinstance(above, Sequence) and str(name).isdecimal():
             names[index] = int(name)
     return tuple(names)
+
+
+def _section_of(manifest: RobotManifest, name: str) -> str:
+    """Return the section in which something that runs has its name; that of the components, if nothing has it."""
+    running = sorted(naming(COMPONENT), key=lambda one: one.scope is Scope.BARE)
+    return next((one.name for one in running if name in one.names_in(manifest.root)), running[-1].name)
 
 
 def short(path: Path) -> str:
@@ -44,7 +54,7 @@ def short(path: Path) -> str:
 
 def tree_of(manifest: RobotManifest, path: Path) -> Mapping:
     """Return the tree that a path leads into: what is included is read before the rest, and kept beside it."""
-    return manifest.include if path[:1] == (INCLUDE,) else manifest.root
+    return manifest.include if path[:1] == (include.name,) else manifest.root
 
 
 def found_at(manifest: RobotManifest, path: Path) -> Node | None:
@@ -63,7 +73,7 @@ def no_such_path(robot: Robot, path: Path, guide: Guide) -> Finding:
     place = f"'{short(above)}'" if above else ""
     if above in ((), ("components",)):
         place = f"robot '{robot.manifest.name}'"
-        valid |= {*robot.parts, *(key for key in RobotFile.model_fields if key in robot.manifest.root)}
+        valid |= {*robot.parts, *(key for key in robot_keys() if key in robot.manifest.root)}
     elif len(above) == 2 and str(above[1]) in robot.parts:
         valid |= {end.name for end in robot.parts[str(above[1])].ends}
     if isinstance(node, Sequence):

@@ -13,6 +13,7 @@ from rbxcompose.model.wiring import ends_of
 from rbxcompose.msgs.types import Message
 from rbxcompose.plan.model import Instance, Plan, Wire
 from rbxcompose.qos import Qos
+from rbxcompose.references import PLACE
 from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
@@ -28,7 +29,7 @@ def instance(
 ) -> Instance:
     """Return an instance with its type's own topics; `config` is written as in a manifest (`{"runtime": "45 s"}`)."""
     cls = component_type(type_name)
-    context = {"places": {place.name: place for place in places}}
+    context = {PLACE: {place.name: place for place in places}}
     made = cls.config_type().model_validate(dict(config or {}), context=context)
     ends = ends_of(name, cls, made, "", {})
     wires = tuple(Wire(end.name, end.port.kind, end.topic, end.type_name) for end in ends)

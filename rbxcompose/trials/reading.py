@@ -11,8 +11,8 @@ from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import resolve, shown_name
+from rbxcompose.manifest.header import Header
 from rbxcompose.manifest.library import PREFIX
-from rbxcompose.manifest.models import Header
 from rbxcompose.manifest.tree import Entry, Node, Scalar
 from rbxcompose.manifest.tree import Mapping as Tree
 from rbxcompose.manifest.trials import SECTIONS, TEST, TrialFile

@@ -6,24 +6,13 @@ import re
 
 import pytest
 
+from docs.generating.robot import models_below
 from rbxcompose.config import Config
 from rbxcompose.expressions.functions import FUNCTIONS
 from rbxcompose.expressions.types import TYPES
-from rbxcompose.manifest.arguments import ArgumentModel
-from rbxcompose.manifest.models import (
-    Analyzer,
-    Bus,
-    ComponentOptions,
-    Include,
-    Mission,
-    MuxInput,
-    Needs,
-    PartFile,
-    PlaceModel,
-    Provides,
-    RobotFile,
-    Value,
-)
+from rbxcompose.manifest.file_models import FILES, file_model
+from rbxcompose.manifest.options import ComponentOptions
+from rbxcompose.manifest.registry import sections
 from rbxcompose.missions.header import INPUT_KEYS
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program import AFTERWARDS
@@ -49,10 +38,10 @@ def test_it_has_every_unit_type_and_function() -> None:
     assert [name for name in FUNCTIONS if f"`{name}(" not in PAGE] == []
 
 
-@pytest.mark.parametrize(
-    "model",
-    [RobotFile, ArgumentModel, Bus, MuxInput, Analyzer, PlaceModel, Value, Mission, Include, Needs, PartFile, Provides],
-)
+MODELS = [*map(file_model, FILES), *(model for one in sections() for _, model in models_below(one.type, ""))]
+
+
+@pytest.mark.parametrize("model", MODELS)
 def test_it_has_every_key_of_a_robot(model: type[Config]) -> None:
     keys = {field.alias or name for name, field in model.model_fields.items()}
     assert keys - WORDS == set()

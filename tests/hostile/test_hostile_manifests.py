@@ -13,9 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.findings import Report
-from rbxcompose.manifest.overlay import compose, read_sets
+from rbxcompose.manifest.overlay import compose
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.robot_file import load_robot
+from rbxcompose.manifest.sets import read_sets
 from rbxcompose.manifest.tree import Mapping
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.rendering.json_ import render_json

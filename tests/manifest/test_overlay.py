@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from rbxcompose.findings import Report, Span
 from rbxcompose.manifest.history import History, Step
-from rbxcompose.manifest.overlay import compose, read_sets, settled
+from rbxcompose.manifest.overlay import compose, settled
 from rbxcompose.manifest.reader import read_text
+from rbxcompose.manifest.sets import read_sets
 from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar, at, children, value_span
 from rbxcompose.manifest.validate import to_plain
 

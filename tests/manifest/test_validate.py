@@ -12,6 +12,7 @@ from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import BROKEN, Mapping
 from rbxcompose.manifest.validate import validate
+from rbxcompose.references import PLACE
 
 
 class Inner(Config):
@@ -41,7 +42,7 @@ class Needy(Config):
     warn: int = 0
 
 
-PLACES = {"places": {"dock": Place("dock", 0.0, 0.0, 0.0)}}
+PLACES = {PLACE: {"dock": Place("dock", 0.0, 0.0, 0.0)}}
 
 
 def check(text: str, model: type[Config] = Thing) -> tuple[Config | None, list[Finding]]:
@@ -105,7 +106,7 @@ def test_what_is_right_is_read() -> None:
     read, findings = check("max_speed: 1 km/h\nwords: [a, 7]\nparts: {a: {speed: 1 m/s}}\nhome: dock\ncount: 2")
     assert findings == []
     assert read == Thing(
-        max_speed=1 / 3.6, words=("a", "7"), parts={"a": Inner(speed=1.0)}, home=PLACES["places"]["dock"], count=2
+        max_speed=1 / 3.6, words=("a", "7"), parts={"a": Inner(speed=1.0)}, home=PLACES[PLACE]["dock"], count=2
     )
 
 

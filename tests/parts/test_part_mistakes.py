@@ -89,7 +89,7 @@ MISTAKES = [
     ("spare: {part: ../../parts/needy.yaml}", "RBX1206", "part 'spare' needs a value for its argument 'port'"),
     ("spare: {part: ../../parts/battery.yaml, conect: {}}", "RBX1001", "unknown key 'conect'"),
     ("spare: {part: robot.yaml}", "RBX1304", "this is no Part"),
-    ("spare: {with: {}}", "RBX1002", "'include.spare' needs the key 'part'"),
+    ("spare: {with: {}}", "RBX1002", "part 'spare' needs the key 'part'"),
     ('spare: {part: "${args.x}"}', "RBX1003", "the file of a part cannot be filled in"),
     ("Spare: {part: ../../parts/battery.yaml}", "RBX1006", "'Spare' is no name"),
     (

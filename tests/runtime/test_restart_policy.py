@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.compiler import compile_robot
-from rbxcompose.manifest.models import ComponentOptions
+from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.plan.dump import dump, load
 from rbxcompose.plan.model import Plan
 from rbxcompose.restarts import Restart, When

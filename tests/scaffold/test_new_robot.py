@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.expressions.functions import FUNCTIONS
-from rbxcompose.manifest.models import SECTIONS
+from rbxcompose.manifest.sections import reserved_names
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.registry import kinds
 from rbxcompose.scaffold.answers import AnswerError
@@ -43,7 +43,7 @@ def test_it_is_written_as_people_would_write_it(golden: Golden) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", sorted({*WORDS, *SECTIONS, *FUNCTIONS, *modifier_keys(), *kinds(), "go_to", "recharge"})
+    "name", sorted({*WORDS, *reserved_names(), *FUNCTIONS, *modifier_keys(), *kinds(), "go_to", "recharge"})
 )
 def test_a_place_with_an_odd_name_is_refused_or_fine(name: str, tmp_path: Path) -> None:
     assert findings(tmp_path, f"{name}=1,1") in ("", "RBX9102")

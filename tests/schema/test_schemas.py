@@ -12,7 +12,7 @@ from jsonschema import Draft7Validator
 
 from rbxcompose.cli.main import main as command
 from rbxcompose.config import Config
-from rbxcompose.manifest.models import OverlayFile, PartFile, RobotFile
+from rbxcompose.manifest.file_models import FILES, file_model
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.missions.registry import kinds
@@ -72,7 +72,7 @@ def test_every_property_has_a_description(name: str) -> None:
     assert [path for path, schema in properties(SCHEMAS[name]) if not schema.get("description")] == []
 
 
-@pytest.mark.parametrize(("name", "model"), [("robot", RobotFile), ("part", PartFile), ("overlay", OverlayFile)])
+@pytest.mark.parametrize(("name", "model"), [(kind.lower(), file_model(kind)) for kind in FILES])
 def test_every_section_has_a_schema(name: str, model: type[Config]) -> None:
     assert set(SCHEMAS[name]["properties"]) == set(model.model_fields)
 

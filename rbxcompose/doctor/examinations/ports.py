@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from rbxcompose.doctor.examining import examination
 from rbxcompose.doctor.facts import Facts, Listener, Running
 from rbxcompose.findings import Finding, Severity, kind
-from rbxcompose.manifest.models import Bus
 from rbxcompose.plain import plain
+from rbxcompose.sections.bus import Bus
 
 PORT_TAKEN = kind(
     "RBX9402",

@@ -1,0 +1,34 @@
+"""The keys of each kind of manifest that is made of sections."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from pydantic import Field, create_model
+
+from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
+
+FILES = {
+    ROBOT: "A robot: what it is made of and how that is connected.",
+    PART: "Something that robots are made of: sections of a robot with arguments of their own.",
+    OVERLAY: "Changes to a robot, given by `-f FILE`.",
+}
+
+
+def file_model(kind: str) -> type[Header]:
+    """Return the keys of a robot's, part's or overlay's file, with anything in each section."""
+    return _model(kind, tuple((one.name, one.doc) for one in sections(kind)))
+
+
+@cache
+def _model(kind: str, sections: tuple[tuple[str, str], ...]) -> type[Header]:
+    fields: dict[str, Any] = {name: (Any, Field(None, description=doc)) for name, doc in sections}
+    return create_model(f"{kind}File", __base__=Header, __doc__=FILES[kind], **fields)
+
+
+def robot_keys() -> list[str]:
+    """Return the keys of a robot's file, its header's first."""
+    return [*Header.model_fields, *(one.name for one in sections(ROBOT))]

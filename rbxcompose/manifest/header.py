@@ -1,0 +1,20 @@
+"""The keys that every manifest begins with."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from rbxcompose.config import Config, Name
+
+
+class Header(Config):
+    """The keys that every manifest begins with."""
+
+    rbx: Literal[1]
+    """Version of the language."""
+    kind: str
+    """What this file describes: `Robot`, `Part`, `Overlay`, `Mission` or `Test`."""
+    name: Name
+    """Its name: small letters, digits and underscores."""
+    about: str = ""
+    """What it is for, in a sentence."""

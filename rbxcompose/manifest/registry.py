@@ -1,0 +1,105 @@
+"""The sections of the manifest: each is one file in `sections/`, declared by one decorator, found by its name."""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from functools import cache
+from typing import Any, ParamSpec, TypeVar
+
+from rbxcompose.findings import Finding
+from rbxcompose.manifest.section import Declaration, Reading, Section
+from rbxcompose.manifest.validate import ENTRY_WORDS
+from rbxcompose.plugins import LEFT_OUT, BrokenPluginError, Plugins
+
+M = TypeVar("M")
+R = TypeVar("R")
+P = ParamSpec("P")
+
+PLUGINS = Plugins("section", "rbxcompose.sections")
+_EXAMPLE = "Example:"
+_SECTIONS: dict[str, Section[Any, Any]] = {}
+
+
+def _decorator(
+    declaration: Callable[P, Declaration[M]],
+) -> Callable[P, Callable[[Callable[[Reading[M]], R]], Section[M, R]]]:
+    """Return the decorator that takes what `declaration` takes."""
+
+    def section(*args: P.args, **keywords: P.kwargs) -> Callable[[Callable[[Reading[M]], R]], Section[M, R]]:
+        return lambda read: _declared(declaration(*args, **keywords), read)
+
+    return section
+
+
+section = _decorator(Declaration)
+"""Declare a section by the function that reads it: `@section("places", PlaceModel, names=PLACE)`.
+
+The docstring tells what the section is for; behind `Example:` it shows one. A ValueError is raised if there is no
+docstring, or another section has this name.
+"""
+
+
+def _declared(declaration: Declaration[M], read: Callable[[Reading[M]], R]) -> Section[M, R]:
+    about, _, example = (inspect.getdoc(read) or "").partition(_EXAMPLE)
+    if not about:
+        raise ValueError(f"the section '{declaration.name}' has no docstring, so nobody would know what it is for")
+    traits: dict[str, Any] = {one.name: getattr(declaration, one.name) for one in fields(declaration)}
+    about, example = " ".join(about.split()), textwrap.dedent(example.lstrip("\n"))
+    made: Section[M, R] = Section(**traits, doc=about, example=example, read=read)
+    register(made)
+    return made
+
+
+def register(made: Section[Any, Any]) -> None:
+    """Enter a section under its name.
+
+    Raises:
+        ValueError: if another one has it.
+    """
+    other = _SECTIONS.get(made.name)
+    if other is not None and other.read.__module__ != made.read.__module__:
+        raise ValueError(f"two sections are named '{made.name}': {other.read.__module__} and {made.read.__module__}")
+    ordered = sorted([*_SECTIONS.values(), made], key=lambda one: (one.order, one.name))
+    _SECTIONS.clear()
+    _SECTIONS.update({one.name: one for one in ordered})
+    if made.entry:
+        ENTRY_WORDS[made.name] = made.entry
+
+
+def sections(kind: str = "") -> list[Section[Any, Any]]:
+    """Return all sections in their order, or those that a kind of manifest may have."""
+    _problems()
+    return [one for one in _SECTIONS.values() if not kind or kind in one.files]
+
+
+def section_named(name: object) -> Section[Any, Any] | None:
+    """Return the section of a name, or None."""
+    _problems()
+    return _SECTIONS.get(str(name))
+
+
+def naming(kind: str) -> Iterator[Section[Any, Any]]:
+    """Yield the sections whose keys are names of a kind."""
+    return (one for one in sections() if one.has_names_of(kind))
+
+
+def broken_sections() -> list[Finding]:
+    """Return what to tell of sections of other packages that are left out."""
+    return [LEFT_OUT.at(None, told) for told in _problems()]
+
+
+@cache
+def _problems() -> tuple[str, ...]:
+    """Import all sections; return why some of other packages are left out."""
+    return tuple(told for name in PLUGINS.names() if (told := _problem(name)))
+
+
+def _problem(name: str) -> str:
+    try:
+        PLUGINS.load(name)
+    except BrokenPluginError as error:
+        return str(error)
+    return PLUGINS.overshadowed(name)

@@ -1,0 +1,304 @@
+"""What is known of a section of the manifest, and what is read from it.
+
+Composition, renaming of parts, editors, schemas, the reference and the robot's components ask the descriptor, so that
+none of them knows a section by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Mapping as AnyMapping
+from dataclasses import KW_ONLY, dataclass, replace
+from enum import Enum
+from functools import cache, cached_property
+from pathlib import Path as FilePath
+from types import GenericAlias
+from typing import Annotated, Any, Generic, TypeVar, cast
+
+from pydantic import BeforeValidator
+
+from rbxcompose.config import Name
+from rbxcompose.findings import Report
+from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.renames import Renames
+from rbxcompose.manifest.shapes import below, kinds_of, with_references
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, at
+from rbxcompose.manifest.validate import WRONG_TYPE, is_valid, label_of, validate
+from rbxcompose.manifest.wanted import WantedComponent, Wiring
+from rbxcompose.references import COMPONENT, Refers
+
+M = TypeVar("M")
+R = TypeVar("R")
+T = TypeVar("T")
+
+ROBOT, PART, OVERLAY = "Robot", "Part", "Overlay"
+EVERYWHERE = (ROBOT, PART, OVERLAY)
+ANY = "*"
+"""Any key, in a path of `Section.shared`."""
+
+
+class Scope(Enum):
+    """What a path of `--set` may name in a section."""
+
+    NOTHING = "nothing"
+    ANYTHING = "an entry as a whole, or what stands in it"
+    KEYS = "what stands in an entry"
+    BARE = "what stands in an entry, whose name may come first in the path, without the section"
+
+
+@dataclass(frozen=True, slots=True)
+class Short:
+    """One word in place of an entry with one key: `patrol: FILE` is `{file: FILE}`."""
+
+    key: str
+    is_merged: bool = True
+    """Whether layers may change a part of such an entry; else they replace it as a whole."""
+    only_over: str = ""
+    """What the word is, where only an overlay may be so short."""
+
+
+@cache
+def _short_type(model: Any, key: str) -> Any:
+    return Annotated[(str, *(Refers(kind, is_told=True) for kind in kinds_of(next(below(model, key)))))]
+
+
+@cache  # each type is compiled once
+def _entry_type(model: Any, short: Short) -> Any:
+    word = _short_type(model, short.key)
+    read = BeforeValidator(
+        lambda value: {short.key: value} if isinstance(value, str) else value, json_schema_input_type=model | word
+    )
+    return Annotated[model, read]
+
+
+@dataclass(frozen=True, slots=True)
+class Declaration(Generic[M]):
+    """What a section says of itself; `M` is the model of an entry, or of the whole section if its keys are fixed."""
+
+    name: str
+    model: type[M]
+    _: KW_ONLY
+    files: tuple[str, ...] = EVERYWHERE
+    """Kinds of manifests in which it may stand."""
+    order: int = 95
+    """Its place among the others: in schemas, in the reference, and when components are made."""
+
+    names: str = ""
+    """The kind of name that its keys are; empty if they are fixed."""
+    runs: bool = False
+    """Whether each entry is a component that runs under the entry's name."""
+    at: tuple[str, ...] = ()
+    """Where in the section these keys stand, if not directly below it."""
+    entry: str = ""
+    """What findings call an entry."""
+    short: Short | None = None
+    needs: str = ""
+    """The key that a new entry must have in an overlay; without it, it was to change an old one."""
+    scope: Scope = Scope.ANYTHING
+
+    is_composed: bool = True
+    """Whether it is part of the composed robot; else composition itself is what reads it."""
+    shared: tuple[tuple[str, ...], ...] | None = None
+    """Maps to which several parts may add, as paths below the section, with `ANY` for any key; `()` is the section.
+
+    Without it, they may add to a section whose keys are names."""
+    has_topics: bool = False
+    """Whether its keys are topics, which get no prefix when a part brings them."""
+    clash: Callable[[Sequence[str]], tuple[str, str] | None] = lambda names: None
+    """Tells of what two parts bring under a path in the section: what it is, and what helps."""
+    models: Callable[[Node], Iterable[Any]] | None = None
+    """The models of one entry, where they depend on what stands in it."""
+    rename: Callable[[Renames, str, Node], Node] = lambda renames, name, node: node
+    """What else changes in an entry of a part, whose references have been renamed."""
+    topics: Callable[[str, Node], Iterable[str]] = lambda name, node: ()
+    """The topics that an entry has, as `connect:` of an instance may name them."""
+
+    brings: tuple[str, ...] = ()
+    """Names of components that it brings, where it is written."""
+    components: Callable[[Contents, Wiring], Iterable[WantedComponent]] = lambda contents, wiring: ()
+    """The components that it becomes."""
+    connects: Callable[[Contents], AnyMapping[str, AnyMapping[str, str]]] = lambda contents: {}
+    """Topics that it gives to the ports of components: component -> port -> topic."""
+    details: Callable[[Any], AnyMapping[str, str]] = lambda read: {}
+    """A few words on each of its names, for editors; it is given what was read."""
+
+    @property
+    def is_map(self) -> bool:
+        """Tell whether its keys are names that the user gives."""
+        return bool(self.names) and not self.at
+
+    def types_of(self, entry: Node) -> Iterable[Any]:
+        """Return the types that tell what stands in an entry."""
+        if isinstance(entry, Scalar):
+            return (self.short_type,)
+        return self.models(entry) if self.models else (self.model,)
+
+    def has_names_of(self, kind: str) -> bool:
+        """Tell whether its keys are names of a kind; what runs is a component as well."""
+        return kind == self.names or (kind == COMPONENT and self.runs)
+
+    def is_shared(self, path: Path) -> bool:
+        """Tell whether several parts may add to the map at a path below it."""
+        patterns = self.shared if self.shared is not None else [()] if self.is_map else []
+        return any(
+            len(pattern) == len(path) and all(one in (ANY, key) for one, key in zip(pattern, path, strict=True))
+            for pattern in patterns
+        )
+
+    @property
+    def entry_type(self) -> Any:
+        """Return what an entry may be: the model, or the word that stands for it."""
+        model: Any = self.model
+        return _entry_type(model, self.short) if self.short and not self.short.only_over else model
+
+    @property
+    def short_type(self) -> Any:
+        """Return what the word is that stands for an entry."""
+        model: Any = self.model
+        return _short_type(model, self.short.key) if self.short else str
+
+    @property
+    def type(self) -> Any:
+        """Return what stands below its name."""
+        return GenericAlias(dict, (Name, self.entry_type)) if self.is_map else self.model
+
+    def with_references(self, node: Node, change: Callable[[str, Node], Node]) -> Node:
+        """Return what stands below its name with `change(kind, value)` in the place of each name of something."""
+        if not self.is_map or not isinstance(node, Mapping):
+            return with_references(node, self.type, change)
+        entries = {}
+        for name, entry in node.entries.items():
+            value = entry.value
+            for hint in self.types_of(value):
+                value = with_references(value, hint, change)
+            entries[name] = Entry(entry.key, value)
+        return replace(node, entries=entries)
+
+    def names_in(self, root: Mapping) -> Iterable[str]:
+        """Return the names that a tree gives in this section."""
+        named = at(root, (self.name, *self.at)) if self.names else None
+        return named.entries if isinstance(named, Mapping) else ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section(Declaration[M], Generic[M, R]):
+    """A section of the manifest; `R` is what is read from it."""
+
+    doc: str
+    """What it is for: shown by editors and the reference."""
+    example: str
+    """YAML for the reference; a test compiles it within the patrol robot."""
+    read: Callable[[Reading[M]], R]
+
+    def described(self, contents: Contents) -> AnyMapping[str, str]:
+        """Return the names of what was read, each with a few words; none of a section that composition reads."""
+        if not self.is_composed:
+            return {}
+        read = contents.of(self)
+        return self.details(read) or dict.fromkeys(read if isinstance(read, AnyMapping) else (), self.entry)
+
+
+class Contents:
+    """What the sections of a filled tree say: each is read when it is first asked for."""
+
+    def __init__(
+        self, root: Mapping, file: FilePath, documents: Documents, sections: Iterable[Section[Any, Any]] = ()
+    ) -> None:
+        self.root, self.file, self.documents = root, file, documents
+        self._naming = [one for one in sections if one.names]
+        self._read: dict[str, object] = {}
+
+    def of(self, section: Section[Any, R]) -> R:
+        """Return what a section says; mistakes go into the report of the documents."""
+        if section.name not in self._read:
+            self._read[section.name] = section.read(Reading(section, self))
+        return cast(R, self._read[section.name])
+
+    @cached_property
+    def known(self) -> dict[str, AnyMapping[str, object]]:
+        """Return the names of each kind, also those of entries with mistakes: what refers to them is not wrong."""
+        kinds = {COMPONENT, *(one.names for one in self._naming)}
+        return {kind: _Names(self, [one for one in self._naming if one.has_names_of(kind)]) for kind in kinds}
+
+
+class _Names(AnyMapping[str, object]):
+    """The names of a kind; what one stands for is read when it is asked for."""
+
+    def __init__(self, contents: Contents, sections: Iterable[Section[Any, Any]]) -> None:
+        self._contents = contents
+        self._section = {name: one for one in sections for name in one.names_in(contents.root)}
+
+    def __getitem__(self, name: str) -> object:
+        read = self._contents.of(self._section[name])
+        return read.get(name, name) if isinstance(read, AnyMapping) else name
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._section
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._section)
+
+    def __len__(self) -> int:
+        return len(self._section)
+
+
+@dataclass(frozen=True, slots=True)
+class Reading(Generic[M]):
+    """One section that is being read."""
+
+    section: Section[M, Any]
+    contents: Contents
+
+    @property
+    def report(self) -> Report:
+        """Return what takes the findings."""
+        return self.contents.documents.report
+
+    @property
+    def node(self) -> Node | None:
+        """Return what stands below the section's name; None if there is nothing."""
+        node = self.contents.root.get(self.section.name)
+        return None if node is None or is_empty(node) else node
+
+    def writer(self, node: Node) -> FilePath:
+        """Return the file that a value was written in."""
+        return self.contents.documents.writer(node.span, self.contents.file)
+
+    def named(self) -> Iterator[tuple[str, Entry]]:
+        """Yield the entries by name, after a finding for each bad name."""
+        return named_entries(self.contents.root, (self.section.name, *self.section.at), self.report)
+
+    def valid(self, model: type[T], name: str, node: Node) -> T | None:
+        """Return an entry as `model`, or None after its findings."""
+        path = (self.section.name, *self.section.at, name)
+        return validate(model, node, path, self.report, self.contents.known)
+
+    def entries(self) -> dict[str, M]:
+        """Return the entries without mistakes, by name."""
+        found = ((name, self.valid(self.section.entry_type, name, entry.value)) for name, entry in self.named())
+        return {name: read for name, read in found if read is not None}
+
+    def whole(self) -> M | None:
+        """Return a section of fixed keys; None if it is missing or has mistakes."""
+        if self.node is None:
+            return None
+        return validate(self.section.model, self.node, (self.section.name,), self.report, self.contents.known)
+
+
+def is_empty(node: Node) -> bool:
+    """Tell whether there is nothing behind the name of a section."""
+    return isinstance(node, Scalar) and node.plain and not node.text
+
+
+def named_entries(root: Mapping, path: tuple[str, ...], report: Report) -> Iterator[tuple[str, Entry]]:
+    """Yield the entries of a section by name, after a finding for each bad name."""
+    node = at(root, path)
+    if node is None or is_empty(node):
+        return
+    if not isinstance(node, Mapping):
+        message = f"'{path[-1]}' must be a map from names to what they are"
+        report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
+        return
+    for name, entry in node.entries.items():
+        if is_valid(Name, name) or validate(Name, replace(entry.key, plain=False), (*path, name), report) is not None:
+            yield name, entry

@@ -1,0 +1,88 @@
+"""Fields that name something of the robot: which kind of name stands in them, and whether there is such a thing.
+
+A section of the manifest tells which names of a kind there are. A field says that it takes one by its type:
+`joint: Annotated[Name, Refers("joint")]`. Renaming of parts, completion, definitions and schemas follow from that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+COMPONENT, PLACE, VALUE, MISSION = "component", "place", "value", "mission"
+ANALYZER, ARGUMENT, INSTANCE = "analyzer", "argument", "instance"
+PORT = "port"
+"""A component, or `component.port`."""
+RUNNING = "running"
+"""Everything that runs: what users wrote, and what every robot has."""
+TOPIC, FILE, ANYTHING = "topic", "file", "anything"
+"""A topic; a path relative to the file that writes it; a word that may be a name of any kind."""
+
+NAMES = "x-names"
+"""The keyword of schemas that says of what the name stands there."""
+_HIDDEN = (TOPIC, ANYTHING)  # kinds of which editors know no names
+
+Known = Mapping[str, Mapping[str, object]]
+"""The context of a validation: kind of name -> name -> what it stands for."""
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Refers:
+    """Marks a field that takes the name of something: `kind` is of what.
+
+    A name that does not exist is a finding, if the context of the validation knows names of that kind. It is none
+    where a check `is_told`, which has more to say. A field that is no text holds what the name stands for.
+    """
+
+    kind: str
+    is_told: bool = False
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        if self.is_told:
+            return handler(source)
+        if isinstance(source, type) and not issubclass(source, str):
+            word = core_schema.str_schema()
+            return core_schema.with_info_before_validator_function(
+                self._thing(source), core_schema.is_instance_schema(source), json_schema_input_schema=word
+            )
+        return core_schema.with_info_after_validator_function(self._name, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        made = handler(schema)
+        return made if self.kind in _HIDDEN else {**made, NAMES: self.kind}
+
+    def _name(self, name: str, info: ValidationInfo) -> str:
+        """Return a name that there is."""
+        known: Known = info.context or {}
+        if self.kind in known and name not in known[self.kind]:
+            raise self._unknown(name, known[self.kind])
+        return name
+
+    def _thing(self, wanted: type[T]) -> Callable[[object, ValidationInfo], object]:
+        """Return what gives the thing that a name stands for."""
+
+        def find(value: object, info: ValidationInfo) -> object:
+            if isinstance(value, wanted):
+                return value
+            if not isinstance(value, str):
+                raise PydanticCustomError(self.kind, "must be the name of a {kind}", {"kind": self.kind})
+            there = (info.context or {}).get(self.kind, {})
+            if value not in there:
+                raise self._unknown(value, there)
+            return there[value]
+
+        return find
+
+    def _unknown(self, name: str, there: Mapping[str, object]) -> PydanticCustomError:
+        context = {"kind": self.kind, "name": name, "valid": list(there), "what": f"{plural(self.kind)} of this robot"}
+        return PydanticCustomError(self.kind, "there is no {kind} '{name}'", context)
+
+
+def plural(kind: str) -> str:
+    """Return what several things of a kind are called."""
+    return f"{kind}{'es' if kind.endswith(('s', 'x', 'ch')) else 's'}"

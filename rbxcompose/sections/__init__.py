@@ -1,0 +1,1 @@
+"""The sections of robots, parts and overlays: one file each."""

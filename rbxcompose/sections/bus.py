@@ -1,0 +1,42 @@
+"""The section `bus`: how messages travel."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from rbxcompose.config import Config
+from rbxcompose.manifest.fields import TopicName
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.section import OVERLAY, ROBOT, Reading
+
+
+class Bus(Config):
+    """How the robot's messages travel."""
+
+    domain: int = Field(0, ge=0, le=232)
+    """ROS domain; robots of different domains do not hear each other."""
+    namespace: TopicName | None = None
+    """Prefix of all relative topics."""
+    port: int = Field(7447, ge=1, le=65535)
+    """TCP port of the robot's router; the next free one is taken if it is in use."""
+    wire: Literal["jazzy"] = "jazzy"
+    """The ROS 2 distribution whose wire format is spoken."""
+    router: str | None = None
+    """An existing router to use instead of an own one, such as `tcp/192.168.0.2:7447`."""
+    clock: Literal["own", "external"] = "own"
+    """Whose time the robot follows: its own, or that of a simulator outside, which publishes it on `/clock`."""
+
+
+@section("bus", Bus, order=100, files=(ROBOT, OVERLAY))
+def bus(reading: Reading[Bus]) -> Bus:
+    """How its messages travel.
+
+    Example:
+        bus:
+          domain: 7
+          namespace: robot_1
+          port: 7447
+    """
+    return reading.whole() or Bus()

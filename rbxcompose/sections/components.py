@@ -1,0 +1,209 @@
+"""The section `components`: each entry's type, options and configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Mapping as AnyMapping
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from typing import Any
+
+from rbxcompose.config import Config
+from rbxcompose.findings import SIMILAR, Report, Span, kind
+from rbxcompose.manifest.options import OPTIONS, ComponentOptions
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.renames import Renames
+from rbxcompose.manifest.section import Contents, Reading, Scope
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, at
+from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, label_of, validate
+from rbxcompose.manifest.wanted import WantedComponent, Wiring
+from rbxcompose.plain import plain
+from rbxcompose.plugins import BROKEN, LEFT_OUT, BrokenPluginError
+from rbxcompose.references import COMPONENT
+from rbxcompose.sdk import registry
+from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.ports import Port
+
+UNKNOWN_TYPE = kind(
+    "RBX3004",
+    """Unknown type of component
+
+No component type has this name, neither of those that ship with the project nor of those that are installed.
+
+Bad:
+```yaml
+components:
+  base:
+    type: diff_drive_simm
+```
+Good:
+```yaml
+components:
+  base:
+    type: diff_drive_sim
+```
+""",
+    is_fixable=True,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentEntry:
+    """A component that the user wrote; `config` is None if it has mistakes."""
+
+    name: str
+    type: str
+    options: ComponentOptions
+    config: Config | None
+    span: Span
+
+
+def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
+    for name, one in contents.of(components).items():
+        if one.config is not None:
+            yield WantedComponent(name, one.type, one.config, ("components", name), one.options)
+
+
+def _models(node: Node) -> Iterator[type[Config]]:
+    """Yield the options of every component and the configuration of the type, if that is written down and known."""
+    yield ComponentOptions
+    if (cls := component_class(node)) is not None:
+        yield cls.config_type()
+
+
+def _rename(renames: Renames, name: str, node: Node) -> Node:
+    """Return a component with `connect:` for each port whose own topic gets another name."""
+    written = at(node, ("connect",))
+    if not isinstance(node, Mapping) or (written is not None and not isinstance(written, Mapping)):
+        return node
+    entries = dict(written.entries) if written else {}
+    for port, topic in _own_topics(node).items():
+        if port not in entries and (changed := renames.topic(topic)) != topic:
+            given = renames.written(topic)
+            entries[port] = Entry(Scalar(port, given.key_span), Scalar(changed, given.span))
+    if not entries:
+        return node
+    span = next(iter(entries.values())).key.span
+    key = node.entries["connect"].key if written else Scalar("connect", span)
+    connect = Mapping(entries, written.span if written else span)
+    return replace(node, entries={**node.entries, "connect": Entry(key, connect)})
+
+
+def _topics(name: str, node: Node) -> Iterable[str]:
+    connect = at(node, ("connect",))
+    written = connect.entries.items() if isinstance(connect, Mapping) else ()
+    given = {port: entry.value.text for port, entry in written if isinstance(entry.value, Scalar)}
+    return {**_own_topics(node), **given}.values()
+
+
+def _own_topics(node: Node) -> dict[str, str]:
+    """Return the topics of the ports that a component's class declares; others are not known yet."""
+    cls = component_class(node)
+    ports = ((name, getattr(cls, name)) for name in dir(cls)) if cls else ()
+    return {name: port.topic for name, port in ports if isinstance(port, Port) and port.topic}
+
+
+def _details(read: AnyMapping[str, ComponentEntry]) -> dict[str, str]:
+    return {name: one.type for name, one in read.items()}
+
+
+@section(
+    "components",
+    ComponentOptions,
+    order=40,
+    names=COMPONENT,
+    runs=True,
+    entry="component",
+    needs="type",
+    scope=Scope.BARE,
+    models=_models,
+    rename=_rename,
+    topics=_topics,
+    components=_components,
+    details=_details,
+)
+def components(reading: Reading[ComponentOptions]) -> dict[str, ComponentEntry]:
+    """What runs, by name: a `type`, the settings of that type, and options that every type takes.
+
+    Example:
+        components:
+          base:
+            type: diff_drive_sim
+            max_speed: 0.5 m/s            # a setting of the type
+            connect:
+              odom: wheels/odom           # its port `odom` writes on this topic
+          go_to:
+            type: go_to
+            process: driving
+            starts_after: [base]
+    """
+    found = ((name, _component(reading, name, entry)) for name, entry in reading.named())
+    return {name: one for name, one in found if one is not None}
+
+
+def component_class(node: Node) -> type[Component[Any]] | None:
+    """Return the class of a component, if its type is written down and known."""
+    written = at(node, ("type",))
+    if not isinstance(written, Scalar) or written.text not in registry.component_names():
+        return None
+    try:
+        return registry.component_type(written.text)
+    except BrokenPluginError:  # told where the section is read
+        return None
+
+
+def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> ComponentEntry | None:
+    """Return one component; None if it has no known type, without a `config` if there are mistakes in that."""
+    report = reading.report
+    node, path = entry.value, ("components", name)
+    if is_broken(node):
+        return None
+    if not isinstance(node, Mapping):
+        message = f"component '{name}' must be a map with a 'type:' and its configuration"
+        report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
+        return None
+    # A missing key is shown at the component's name, not at whatever its first key is.
+    options_node = replace(_part(node, OPTIONS), span=entry.key.span)
+    options = validate(ComponentOptions, options_node, path, report) or ComponentOptions()
+    type_name = _type_name(name, entry, node, report)
+    if type_name is None:
+        return None
+    model = registry.component_type(type_name).config_type()
+    keys = [key for key in node.entries if key not in (*OPTIONS, "type")]
+    config_node = replace(_part(node, keys), span=entry.key.span)
+    config = validate(model, config_node, path, report, reading.contents.known, also=[*OPTIONS, "type"])
+    return ComponentEntry(name, type_name, options, config, entry.key.span)
+
+
+def _part(node: Mapping, keys: Collection[str]) -> Mapping:
+    return replace(node, entries={name: entry for name, entry in node.entries.items() if name in keys})
+
+
+def _type_name(name: str, entry: Entry, node: Mapping, report: Report) -> str | None:
+    """Return the type of a component, or None after a finding if there is none of that name."""
+    written = node.get("type")
+    if written is None:
+        misspelt = get_close_matches("type", [key for key in node.entries if key not in OPTIONS], n=1, cutoff=SIMILAR)
+        if misspelt:
+            key, message = node.entries[misspelt[0]].key, f"unknown key '{misspelt[0]}' in component '{name}'"
+            report.add(UNKNOWN_KEY.misspelt(key.span, message, key.text, ["type"]))
+        else:
+            report.add(MISSING_KEY.at(entry.key.span, f"component '{name}' needs the key 'type'"))
+        return None
+    if not isinstance(written, Scalar):
+        report.add(WRONG_TYPE.at(written.span, "'type' must be the name of a type", label=label_of(written)))
+        return None
+    if is_broken(written):
+        return None
+    if told := registry.PLUGINS.overshadowed(written.text):
+        report.add(LEFT_OUT.at(written.span, told))
+    if written.text not in registry.component_names():
+        message = f"component '{name}' is of a type that does not exist: '{plain(written.text, 60)}'"
+        report.add(UNKNOWN_TYPE.misspelt(written.span, message, written.text, registry.component_names(), "types"))
+        return None
+    try:
+        registry.component_type(written.text)
+    except BrokenPluginError as error:
+        report.add(BROKEN.at(written.span, str(error)))
+        return None
+    return written.text

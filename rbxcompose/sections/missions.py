@@ -1,0 +1,89 @@
+"""The section `missions`: what the robot can be asked to do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as AnyMapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from rbxcompose.config import Config, Name, Secret
+from rbxcompose.findings import Finding, Report, Span
+from rbxcompose.manifest.data import is_moderate
+from rbxcompose.manifest.fields import FileName
+from rbxcompose.manifest.files import resolve
+from rbxcompose.manifest.fill import SHOWN_SECRET
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.section import Reading, Short
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, children
+from rbxcompose.references import ANYTHING, MISSION, Refers
+
+INPUT = "input"
+"""An input of the mission that an entry names."""
+
+
+class Mission(Config):
+    """A mission that the robot has."""
+
+    file: FileName
+    """The mission's file, relative to this one."""
+    with_: dict[Annotated[Name, Refers(INPUT, is_told=True)], Annotated[Any, Refers(ANYTHING, is_told=True)]] = Field(
+        {}, alias="with"
+    )
+    """Values of its inputs, by name."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionEntry:
+    """A mission of the robot: its file, and the values for its inputs as nodes."""
+
+    name: str
+    path: Path
+    with_: Mapping
+    span: Span
+
+
+def _details(read: AnyMapping[str, MissionEntry]) -> dict[str, str]:
+    return dict.fromkeys(read, "mission")
+
+
+@section("missions", Mission, order=90, names=MISSION, entry="mission", short=Short("file"), details=_details)
+def missions(reading: Reading[Mission]) -> dict[str, MissionEntry]:
+    """Missions that the robot has, by name: their files, and the values of their inputs.
+
+    Example:
+        missions:
+          patrol:
+            file: ../../missions/patrol.yaml
+            with:
+              rounds: 3
+    """
+    found = ((name, _mission(reading, name, entry)) for name, entry in reading.named())
+    return {name: one for name, one in found if one is not None}
+
+
+def _mission(reading: Reading[Mission], name: str, entry: Entry) -> MissionEntry | None:
+    node = entry.value
+    read = reading.valid(Mission, name, node)
+    if read is None or not isinstance(node, Mapping):
+        return None
+    _refuse_secrets(node, reading.report)
+    inputs = node.get("with")
+    if not is_moderate(inputs, "input", reading.report):
+        return None
+    written = node.entries["file"].value
+    path = resolve(read.file, reading.writer(written), written.span)
+    if isinstance(path, Finding):
+        reading.report.add(path)
+        return None
+    return MissionEntry(name, path, inputs if isinstance(inputs, Mapping) else Mapping(), entry.key.span)
+
+
+def _refuse_secrets(node: Node, report: Report) -> None:
+    """Add a finding for each secret that would go into a mission, where it would be shown."""
+    if isinstance(node, Scalar) and isinstance(node.filled, Secret):
+        report.add(SHOWN_SECRET.at(node.span, "a mission cannot hold a secret: what it does is logged"))
+    for _, inner in children(node):
+        _refuse_secrets(inner, report)

@@ -1,0 +1,160 @@
+"""The section `muxes`: who may command."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from pydantic import Field
+
+from rbxcompose.config import Config, Frequency, Name, Time
+from rbxcompose.manifest.fields import PortName
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.renames import Renames
+from rbxcompose.manifest.section import ANY, Contents, Reading, Scope
+from rbxcompose.manifest.tree import Entry, Node, at
+from rbxcompose.manifest.tree import Mapping as MappingNode
+from rbxcompose.manifest.wanted import WantedComponent, Wiring
+from rbxcompose.sdk.ports import Out
+from rbxcompose.sdk.registry import component_type
+from rbxcompose.sections.components import ComponentEntry, components
+
+MUX = "mux"
+_BELOW_TOPIC = ("inputs", "locks")  # keys whose keys are topics below that of the mux
+_TWIST = "geometry_msgs/msg/Twist"  # what a mux forwards whose type nothing tells
+
+
+class MuxInput(Config):
+    """One source of a mux."""
+
+    priority: int
+    """The larger one wins."""
+    timeout: Time = Field(gt=0)
+    """It has lost its turn after this long without a message."""
+    source: PortName | None = Field(None, alias="from")
+    """The component, or `component.port`, whose output this is; without it the input is open to the outside."""
+    max_rate: Frequency | None = Field(None, gt=0)
+    """More is not taken from one publisher elsewhere: it is dropped, and told in diagnostics. 1000 Hz if left out."""
+
+
+class MuxLock(Config):
+    """A heartbeat that locks when it is silent."""
+
+    priority: int
+    """Inputs of a lower priority are locked."""
+    timeout: Time = Field(gt=0)
+    """Silence that locks."""
+
+
+class Mux(Config):
+    """Lets one of several sources command an output."""
+
+    inputs: dict[Name, MuxInput] = Field(min_length=1)
+    """Sources by name."""
+    locks: dict[Name, MuxLock] = {}
+    """Locks by name."""
+
+
+def _rename(renames: Renames, name: str, node: Node) -> Node:
+    """Return a mux whose inputs and locks follow its topics."""
+    if not isinstance(node, MappingNode):
+        return node
+    changed = {
+        key: Entry(one.key, renames.topics(one.value, f"{name}/")) if key in _BELOW_TOPIC else one
+        for key, one in node.entries.items()
+    }
+    return MappingNode(changed, node.span, node.tag)
+
+
+def _topics(name: str, node: Node) -> Iterator[str]:
+    yield name
+    for key in _BELOW_TOPIC:
+        named = at(node, (key,))
+        yield from (f"{name}/{one}" for one in (named.entries if isinstance(named, MappingNode) else ()))
+
+
+def _clash(names: Sequence[str]) -> tuple[str, str] | None:
+    if len(names) < 2:
+        return None
+    mux, *_, name = names
+    help_text = f"give one of them another topic: 'connect: {{{mux}/{name}: {mux}/ANOTHER_NAME}}'"
+    return f"'{name}' of mux '{mux}'", help_text
+
+
+def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
+    for name, one in contents.of(muxes).items():
+        config: dict[str, object] = {
+            "output": name,
+            "message": wiring.message_of(name) or _TWIST,
+            "inputs": {
+                key: each.model_dump(exclude={"source"}, exclude_unset=True) for key, each in one.inputs.items()
+            },
+            "locks": {key: {"priority": each.priority, "timeout": each.timeout} for key, each in one.locks.items()},
+        }
+        yield WantedComponent(name, MUX, config, ("muxes", name))
+
+
+def _connects(contents: Contents) -> dict[str, dict[str, str]]:
+    """Return the topics that muxes give to the outputs they take."""
+    found: dict[str, dict[str, str]] = {}
+    for mux, one in contents.of(muxes).items():
+        for name, source in one.inputs.items():
+            component, _, port = (source.source or "").partition(".")
+            if (written := contents.of(components).get(component)) is not None:
+                for output in _outputs(written, mux, port):
+                    found.setdefault(component, {})[output] = f"{mux}/{name}"
+    return found
+
+
+def _outputs(entry: ComponentEntry, topic: str, port: str) -> list[str]:
+    """Return the output that a mux takes: the one that is named, else the one on the mux's topic, else the only one."""
+    if entry.config is None:
+        return []
+    ports = component_type(entry.type).ports(entry.config)
+    outputs = {name: end.topic for name, end in ports.items() if isinstance(end, Out)}
+    if port:
+        return [port] if port in outputs else []
+    on_topic = [name for name, own in outputs.items() if topic in (own, entry.options.connect.get(name))]
+    return on_topic or (list(outputs) if len(outputs) == 1 else [])
+
+
+def _details(read: Iterable[str]) -> Mapping[str, str]:
+    return dict.fromkeys(read, MUX)
+
+
+@section(
+    "muxes",
+    Mux,
+    order=50,
+    names=MUX,
+    runs=True,
+    entry="mux",
+    scope=Scope.KEYS,
+    has_topics=True,
+    shared=((), (ANY,), *((ANY, key) for key in _BELOW_TOPIC)),
+    clash=_clash,
+    rename=_rename,
+    topics=_topics,
+    components=_components,
+    connects=_connects,
+    details=_details,
+)
+def muxes(reading: Reading[Mux]) -> dict[str, Mux]:
+    """Who may command, by the topic that is commanded: the live input of the largest priority is let through.
+
+    Example:
+        muxes:
+          cmd_vel:
+            inputs:
+              teleop:
+                priority: 100
+                timeout: 0.5 s
+              navigation:
+                from: go_to
+                priority: 10
+                timeout: 0.5 s
+            locks:
+              door:
+                priority: 200
+                timeout: 0.3 s
+    """
+    return reading.entries()

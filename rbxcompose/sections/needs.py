@@ -1,0 +1,21 @@
+"""The section `needs`: what must be there outside of a part."""
+
+from __future__ import annotations
+
+from rbxcompose.config import Config
+from rbxcompose.manifest.fields import InterfaceName, TopicName
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.section import PART, Reading, Scope
+
+
+class Needs(Config):
+    """What must be there outside of a part."""
+
+    ports: dict[TopicName, InterfaceName] = {}
+    """Topics with their types, such as `cmd_vel: geometry_msgs/Twist`."""
+
+
+@section("needs", Needs, order=130, files=(PART,), scope=Scope.NOTHING, is_composed=False)
+def needs(reading: Reading[Needs]) -> Needs:
+    """What must be there outside of the part; `check` sees to it."""
+    return reading.whole() or Needs()

@@ -1,0 +1,43 @@
+"""The section `places`: poses with names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rbxcompose.config import Angle, Config, Length, Place
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.section import Reading
+from rbxcompose.references import PLACE
+
+
+class PlaceModel(Config):
+    """A named pose in `map`."""
+
+    x: Length
+    """Position along x."""
+    y: Length
+    """Position along y."""
+    heading: Angle = 0.0
+    """Direction, counted from x towards y: 90 deg looks along y."""
+    colour: str = ""
+    """How viewers draw it."""
+
+
+def _details(read: Mapping[str, Place]) -> dict[str, str]:
+    return {name: f"({place.x:g} m, {place.y:g} m)" for name, place in read.items()}
+
+
+@section("places", PlaceModel, order=70, names=PLACE, entry="place", details=_details)
+def places(reading: Reading[PlaceModel]) -> dict[str, Place]:
+    """Places by name: poses in `map`, to which missions refer.
+
+    Example:
+        places:
+          window: {x: 2 m, y: -50 cm, heading: 90 deg, colour: blue}
+    """
+    found = {}
+    for name, entry in reading.named():
+        # One with mistakes stands in the origin, so that what names it is not wrong as well.
+        read = reading.valid(PlaceModel, name, entry.value) or PlaceModel(x=0.0, y=0.0)
+        found[name] = Place(name, read.x, read.y, read.heading)
+    return found

@@ -1,0 +1,25 @@
+"""The section `provides`: what a part gives to the rest of the robot."""
+
+from __future__ import annotations
+
+from rbxcompose.config import Config, Name
+from rbxcompose.manifest.fields import InterfaceName, TopicName
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.section import PART, Reading, Scope
+
+
+class Provides(Config):
+    """What a part gives to the rest of the robot, by the names that its file has for it."""
+
+    ports: dict[TopicName, InterfaceName] = {}
+    """Topics with their types."""
+    skills: tuple[Name, ...] = ()
+    """Skills of missions."""
+    values: tuple[Name, ...] = ()
+    """Values that missions read."""
+
+
+@section("provides", Provides, order=140, files=(PART,), scope=Scope.NOTHING, is_composed=False)
+def provides(reading: Reading[Provides]) -> Provides:
+    """What the part gives to the rest of the robot, by the part's own names; `check` sees to it."""
+    return reading.whole() or Provides()

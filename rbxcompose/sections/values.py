@@ -1,0 +1,38 @@
+"""The section `values`: short names for data."""
+
+from __future__ import annotations
+
+from rbxcompose.config import Config
+from rbxcompose.manifest.fields import DottedName, PortName, TopicName
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.section import Reading, Short
+from rbxcompose.references import VALUE
+
+
+class Value(Config):
+    """A short name for data that missions read: `port` of a component, or `topic` and `field` from outside."""
+
+    port: PortName | None = None
+    """`component.port`."""
+    topic: TopicName | None = None
+    """Topic of data from outside."""
+    field: DottedName | None = None
+    """Field of its message; without it, `data`."""
+    type: str | None = None
+    """What it is: a dimension, `number`, `text`, `flag`, ..."""
+    unit: str | None = None
+    """Unit of the message, where it is another than that of the type."""
+
+
+@section("values", Value, order=80, names=VALUE, entry="value", short=Short("port", is_merged=False))
+def values(reading: Reading[Value]) -> dict[str, Value]:
+    """Short names for data that missions read by `$NAME`.
+
+    Example:
+        values:
+          battery: battery.battery_level
+          door:
+            topic: door/state
+            type: text
+    """
+    return reading.entries()

@@ -1,0 +1,29 @@
+"""The toy section, as long as one test runs."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from typing import Any, cast
+
+import pytest
+
+from rbxcompose.manifest import registry
+from rbxcompose.manifest.section import Section
+from rbxcompose.manifest.validate import ENTRY_WORDS
+from rbxcompose.schema.documents import installed_schema
+from rbxcompose.sdk import registry as types
+
+
+@pytest.fixture
+def lamps(monkeypatch: pytest.MonkeyPatch) -> Iterator[Section[Any, Any]]:
+    """Declare the section `lamps`, and forget it when the test ends."""
+    types.usable_names()
+    monkeypatch.setattr(registry, "_SECTIONS", {one.name: one for one in registry.sections()})
+    monkeypatch.setattr(types, "_TYPES", dict(types._TYPES))
+    monkeypatch.setitem(ENTRY_WORDS, "lamps", "lamp")
+    monkeypatch.delitem(sys.modules, "tests.sections.toy", raising=False)
+    installed_schema.cache_clear()
+    yield cast(Section[Any, Any], importlib.import_module("tests.sections.toy").lamps)
+    installed_schema.cache_clear()

@@ -1,0 +1,65 @@
+"""A section of somebody else in one file: lamps, each of which becomes a component."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated
+
+from rbxcompose.config import Config, Name, PlaceName
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.section import Contents, Reading, Short
+from rbxcompose.manifest.wanted import WantedComponent, Wiring
+from rbxcompose.references import COMPONENT, Refers
+from rbxcompose.sdk import Component, component
+
+LAMP = "lamp"
+LampName = Annotated[Name, Refers(LAMP)]
+
+
+class Lamp(Config):
+    """A lamp on the robot."""
+
+    driver: Annotated[Name, Refers(COMPONENT)]
+    """The component that switches it."""
+    after: tuple[LampName, ...] = ()
+    """Lamps that shine before this one."""
+    place: PlaceName | None = None
+    """Where it hangs."""
+
+
+class ToyLampConfig(Config):
+    """What a lamp is told."""
+
+    after: int = 0
+    """How many lamps shine before it."""
+
+
+@component("toy_lamp")
+class ToyLamp(Component[ToyLampConfig]):
+    """Shines."""
+
+
+def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
+    for name, lamp in contents.of(lamps).items():
+        yield WantedComponent(name, "toy_lamp", {"after": len(lamp.after)}, ("lamps", name))
+
+
+@section(
+    "lamps",
+    Lamp,
+    names=LAMP,
+    runs=True,
+    entry="lamp",
+    short=Short("driver"),
+    needs="driver",
+    components=_components,
+)
+def lamps(reading: Reading[Lamp]) -> dict[str, Lamp]:
+    """Lamps of the robot, by name.
+
+    Example:
+        lamps:
+          front: base
+          rear: {driver: base, after: [front]}
+    """
+    return reading.entries()
