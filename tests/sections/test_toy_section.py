@@ -223,7 +223,7 @@ def test_the_reference_has_it_with_its_keys_and_example() -> None:
     page = whole_page()
     about = page[page.index("## `lamps`") :]
     assert about.startswith("## `lamps`\nLamps of the robot, by name. *In a file of the kind Robot, Part, Overlay.*")
-    assert "| `driver` | name of a component | *must be there* | The component that switches it. |" in about
+    assert "| `driver` | name of a component | *required* | The component that switches it. |" in about
     assert "| `after` | list of names of a lamp |  | Lamps that shine before this one. |" in about
     assert "lamps:\n  front: base\n" in about
 
