@@ -26,7 +26,7 @@ from rbxcompose.manifest.models import (
 )
 from rbxcompose.schema.components import component_schemas
 from rbxcompose.schema.overlays import laid_over, or_removed
-from rbxcompose.schema.scalars import Schema
+from rbxcompose.schema.scalars import DEFINITIONS, Schema, quantities
 from rbxcompose.schema.settle import opened, schemas_of
 
 SECTION_TYPES: Mapping[str, Any] = {
@@ -45,6 +45,7 @@ SECTION_TYPES: Mapping[str, Any] = {
 }
 """What stands in each section, but for `components` and `profiles`, which are made of more than models."""
 
+CHANGES = "changes"  # the definition of what may be laid over the sections of a file
 NAMES: Schema = {"pattern": "^[a-z][a-z0-9_]*$", "maxLength": 60}
 
 
@@ -67,27 +68,32 @@ def sections_of(types: Iterable[str]) -> Sections:
 def robot_schema(types: Iterable[str]) -> Schema:
     """Return the schema of a robot's file."""
     sections = sections_of(types)
-    overlay, over = laid_over(sections.schemas, sections.definitions)
-    profile = or_removed({"type": "object", "properties": described(overlay, RobotFile), "additionalProperties": False})
+    changes, definitions = _changes(sections, RobotFile)
+    keys = {name: {"$ref": f"{DEFINITIONS}{CHANGES}/properties/{name}"} for name in changes["properties"]}
+    profile = or_removed({"type": "object", "properties": keys, "additionalProperties": False})
     profiles = or_empty({"type": "object", "propertyNames": NAMES, "additionalProperties": profile})
-    own = described({**sections.schemas, "profiles": profiles}, RobotFile)
-    changing = described({**overlay, "profiles": profiles}, RobotFile)
-    return document("Robot", RobotFile, own, {**sections.definitions, **over}, changing)
+    always = described({"profiles": profiles}, RobotFile)
+    return document("Robot", RobotFile, described(sections.schemas, RobotFile), definitions, always, may_change=True)
 
 
 def part_schema(types: Iterable[str]) -> Schema:
     """Return the schema of a part's file."""
     sections = sections_of(types)
-    overlay, over = laid_over(sections.schemas, sections.definitions)
-    own, changing = described(sections.schemas, PartFile), described(overlay, PartFile)
-    return document("Part", PartFile, own, {**sections.definitions, **over}, changing)
+    _, definitions = _changes(sections, PartFile)
+    return document("Part", PartFile, described(sections.schemas, PartFile), definitions, may_change=True)
 
 
 def overlay_schema(types: Iterable[str]) -> Schema:
     """Return the schema of an overlay's file."""
-    sections = sections_of(types)
-    overlay, over = laid_over(sections.schemas, sections.definitions)
-    return document("Overlay", OverlayFile, described(overlay, OverlayFile), over)
+    changes, definitions = _changes(sections_of(types), OverlayFile)
+    return document("Overlay", OverlayFile, changes["properties"], definitions)
+
+
+def _changes(sections: Sections, model: type[Config]) -> tuple[Schema, dict[str, Schema]]:
+    """Return what may be laid over the sections of a file, and all definitions, that one among them."""
+    overlay, definitions = laid_over(sections.schemas, sections.definitions)
+    changes = {"properties": described(overlay, model)}
+    return changes, {**definitions, CHANGES: changes}
 
 
 def document(
@@ -95,26 +101,29 @@ def document(
     model: type[Config],
     properties: Schema,
     definitions: Mapping[str, Schema],
-    changing: Schema | None = None,
+    always: Mapping[str, Schema] | None = None,
+    *,
+    may_change: bool = False,
 ) -> Schema:
-    """Return the schema of a file of some kind: its header, then its own keys.
+    """Return the schema of a file of some kind: its header, then its own keys, of which `always` have one schema.
 
-    `changing` are the keys of a file that includes parts: there it may write of an entry only what it changes.
+    A file that includes parts writes of an entry only what it changes, if it `may_change` what they bring.
     """
     made = {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": f"rbxcompose {kind}",
         "description": model.__doc__ or "",
         "type": "object",
-        "properties": {**header(kind), **properties},
+        "properties": {**header(kind), **properties, **(always or {})},
         "required": ["rbx", "kind", "name"],
         "additionalProperties": False,
     }
-    if changing is not None:
+    if may_change:
         told = {name: {"description": schema["description"]} for name, schema in properties.items()}
-        made["properties"] = {**header(kind), **told}
-        made |= {"if": {"required": ["include"]}, "then": {"properties": changing}, "else": {"properties": properties}}
-    return {**made, "definitions": reached({"own": properties, "changing": changing}, definitions)}
+        made["properties"] = {**header(kind), **told, **(always or {})}
+        changed = {"$ref": f"{DEFINITIONS}{CHANGES}"}
+        made |= {"if": {"required": ["include"]}, "then": changed, "else": {"properties": properties}}
+    return {**made, "definitions": reached(made, {**quantities(), **definitions})}
 
 
 def header(kind: str) -> dict[str, Schema]:
@@ -154,7 +163,7 @@ def reached(schema: Schema, definitions: Mapping[str, Schema]) -> dict[str, Sche
 def _references(schema: Any) -> Iterable[str]:
     match schema:
         case {"$ref": str(reference)}:
-            yield reference.rpartition("/")[2]
+            yield reference.removeprefix(DEFINITIONS).partition("/")[0]
         case dict():
             for inner in schema.values():
                 yield from _references(inner)
