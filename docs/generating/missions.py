@@ -23,6 +23,7 @@ from rbxcompose.missions.registry import Kind, kinds
 from rbxcompose.schema.asking import Asking, first_line
 from rbxcompose.schema.mission import mission_schema
 from rbxcompose.schema.scalars import Schema
+from rbxcompose.schema.settle import referred
 from rbxcompose.sdk.ports import ServesAction, ServesTopic
 from rbxcompose.sdk.registry import PLUGINS, component_type
 
@@ -141,6 +142,7 @@ class Told(Asking):
 def whole_page() -> str:
     """Return the page."""
     schema = mission_schema(sorted(PLUGINS.shipped))
+    states = {key: referred(one, schema) for key, one in schema["definitions"]["state"]["properties"].items()}
     interrupt = schema["properties"]["interrupts"]["additionalProperties"]["properties"]
     return page(
         "Missions",
@@ -149,7 +151,7 @@ def whole_page() -> str:
         f"### An interrupt\n{described({key: interrupt[key] for key in INTERRUPT_KEYS}, ['when'])}",
         NODES,
         *(of_kind(kind) for kind in kinds().values()),
-        f"### States of a machine\n{described(schema['definitions']['state']['properties'], [])}",
+        f"### States of a machine\n{described(states, [])}",
         ORDER,
         *(of_modifier(name) for name in modifiers()),
         SKILLS + table(("skill", "arguments", "component", "action or topic"), skills()),

@@ -9,7 +9,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from rbxcompose.cli.output.console import FINDINGS, tell, tell_report
+from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
 from rbxcompose.replacing import replace_file
@@ -17,6 +17,7 @@ from rbxcompose.seeing.diagram import diagram_of
 from rbxcompose.seeing.graph_dot import dot
 from rbxcompose.seeing.graph_html import html
 from rbxcompose.seeing.graph_mermaid import mermaid
+from rbxcompose.seeing.layout import NotDrawnError
 
 USAGE = 2
 FORMATS = {"mermaid": mermaid, "dot": dot, "html": html}
@@ -35,7 +36,10 @@ def run(arguments: argparse.Namespace) -> int:
     compilation = compile_robot(arguments.path, **layers_of(arguments))
     tell_report(compilation.report, compilation.sources)
     if compilation.robot is not None:
-        text = FORMATS[arguments.format](diagram_of(compilation.robot))
+        try:
+            text = FORMATS[arguments.format](diagram_of(compilation.robot))
+        except NotDrawnError as error:
+            return refuse(error.finding)
         if arguments.out is None:
             tell(text.rstrip("\n"))
         elif problem := _write(Path(arguments.out), text):

@@ -18,8 +18,7 @@ from rbxcompose.missions.moments import Moments
 from rbxcompose.missions.node_reader import NodeReader
 from rbxcompose.missions.registry import Kind
 from rbxcompose.missions.value_reader import UNREADABLE
-from rbxcompose.schema.scalars import Schema, computed
-from rbxcompose.schema.settle import DEFINITIONS
+from rbxcompose.schema.scalars import DEFINITIONS, Schema, computed
 
 NODE: Schema = {"$ref": f"{DEFINITIONS}node"}
 STEPS: Schema = {"$ref": f"{DEFINITIONS}steps"}
@@ -157,7 +156,7 @@ def kind_schema(kind: Kind) -> tuple[dict[str, Schema], list[str]]:
     asking = Asking(kind.name)
     kind.read(asking)
     about = {kind.name: first_line(kind.__doc__), **kind.options}
-    made = {key: {**_beside(schema), "description": about.get(key, "")} for key, schema in asking.schemas.items()}
+    made = {key: {**schema, "description": about.get(key, "")} for key, schema in asking.schemas.items()}
     return made, sorted(set(made) - asking.optional)
 
 
@@ -175,7 +174,7 @@ def modifier_schema(key: str, cls: type[Modifier]) -> dict[str, Schema]:
     asking = Asking(key)
     cls.read(asking, key)
     about = {key: first_line(cls.__doc__), **cls.keys}
-    return {name: {**_beside(schema), "description": about[name]} for name, schema in asking.schemas.items()}
+    return {name: {**schema, "description": about[name]} for name, schema in asking.schemas.items()}
 
 
 def argument_schema(wanted: Type) -> Schema:
@@ -190,7 +189,3 @@ def argument_schema(wanted: Type) -> Schema:
 def first_line(doc: str | None) -> str:
     """Return the first line of a docstring."""
     return (doc or "").strip().partition("\n")[0]
-
-
-def _beside(schema: Schema) -> Schema:
-    return {"allOf": [schema]} if "$ref" in schema else dict(schema)

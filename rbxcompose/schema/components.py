@@ -11,11 +11,12 @@ from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping as MappingNode
 from rbxcompose.manifest.validate import to_plain
-from rbxcompose.schema.scalars import Schema
-from rbxcompose.schema.settle import DEFINITIONS, opened, schemas_of
+from rbxcompose.schema.scalars import DEFINITIONS, Schema
+from rbxcompose.schema.settle import opened, schemas_of
 from rbxcompose.sdk.registry import component_type
 
 TYPE_HELP = "What runs: the name of a component type."
+TYPE = "type"
 COMPONENT = "component_"  # begins the name of the definition of a type
 _EXAMPLE = "Example:"
 
@@ -28,7 +29,8 @@ def component_schemas(types: Iterable[str]) -> tuple[Schema, dict[str, Schema]]:
     options = opened(schemas.pop(""), definitions)["properties"]
     for name, schema in schemas.items():
         definitions[f"{COMPONENT}{name}"] = _component(name, opened(schema, definitions), options)
-    return _entry(names, options), definitions
+    word = {"enum": names, "enumDescriptions": [about_type(name) for name in names]}
+    return _entry(names, options), {**definitions, TYPE: word}
 
 
 def _entry(names: list[str], options: Schema) -> Schema:
@@ -39,23 +41,22 @@ def _entry(names: list[str], options: Schema) -> Schema:
         }
         for name in names
     ]
-    about = [about_type(name) for name in names]
-    word = {"description": TYPE_HELP, "enum": names, "enumDescriptions": about}
+    word = {"anyOf": [{"$ref": f"{DEFINITIONS}{TYPE}"}], "description": TYPE_HELP}
     return {
         "description": "What runs under this name: its `type`, and the configuration of that type.",
         "type": "object",
         "required": ["type"],
-        "properties": {"type": word, **options},
+        "properties": {TYPE: word, **options},
         "allOf": chosen,
     }
 
 
 def _component(name: str, config: Schema, options: Mapping[str, Any]) -> Schema:
-    word = {"description": TYPE_HELP, "const": name}
+    """Return the schema of a type: its own settings, and the names of what every entry may have."""
     return {
         "description": about_type(name),
         "type": "object",
-        "properties": {"type": word, **config.get("properties", {}), **options},
+        "properties": {TYPE: True, **config.get("properties", {}), **dict.fromkeys(options, True)},
         "required": ["type", *config.get("required", [])],
         "additionalProperties": False,
         "examples": examples_of(name),

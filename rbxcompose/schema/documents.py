@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from rbxcompose.replacing import replace_file
 from rbxcompose.schema.mission import mission_schema
@@ -27,6 +28,8 @@ MAKERS: Mapping[str, Callable[[Iterable[str]], Schema]] = {
 }
 """How the schema of a kind is made from the names of component types."""
 
+_WIDTH = 120  # of a line in a file
+
 
 @cache
 def installed_schema(kind: str) -> Schema:
@@ -35,8 +38,22 @@ def installed_schema(kind: str) -> Schema:
 
 
 def as_text(schema: Schema) -> str:
-    """Return a schema as the text of its file."""
-    return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
+    """Return a schema as the text of its file: what fits stands on one line, so that changes are short."""
+    return _text(schema, 0) + "\n"
+
+
+def _text(value: Any, depth: int) -> str:
+    flat = json.dumps(value, ensure_ascii=False)
+    if len(flat) + depth <= _WIDTH or not value or not isinstance(value, dict | list):
+        return flat
+    depth += 1
+    if isinstance(value, dict):
+        items = [f"{json.dumps(key)}: {_text(one, depth)}" for key, one in value.items()]
+    else:
+        items = [_text(one, depth) for one in value]
+    opening, closing = "{}" if isinstance(value, dict) else "[]"
+    inside = f",\n{' ' * depth}".join(items)
+    return f"{opening}\n{' ' * depth}{inside}\n{' ' * (depth - 1)}{closing}"
 
 
 def files() -> dict[str, str]:

@@ -8,7 +8,7 @@ from typing import Any
 from rbxcompose.manifest.tree import Mapping as MappingNode
 from rbxcompose.manifest.tree import Node, Path, Scalar, at
 from rbxcompose.schema.scalars import DIMENSION, Schema
-from rbxcompose.schema.settle import DEFINITIONS
+from rbxcompose.schema.settle import referred
 from rbxcompose.units import DIMENSIONS, Dimension
 
 _DEEPEST = 12  # references and choices inside each other
@@ -29,7 +29,22 @@ class Guide:
         """Return what the map at `path` may have, by key; names that the user gives are not among them."""
         shapes = [one for one in self._shapes(path) if "properties" in one]
         closed = [one for one in shapes if one.get("additionalProperties") is False]
-        return {name: schema for one in closed or shapes for name, schema in one["properties"].items()}
+        names = dict.fromkeys(name for one in closed or shapes for name in one["properties"])
+        # What is only allowed here, `true`, is described beside it.
+        told = {
+            name: schema
+            for one in [*shapes, *closed]
+            for name, schema in one["properties"].items()
+            if schema is not True
+        }
+        return {name: self._whole(told[name]) for name in names}
+
+    def _whole(self, schema: Schema) -> Schema:
+        """Return a schema with what holds beside it; what it says itself comes first."""
+        whole: Schema = {}
+        for one in self._opened(schema, None, ()):
+            whole = {**one, **whole}
+        return whole
 
     def describe(self, path: Path) -> str:
         """Return what the value at `path` is for."""
@@ -51,8 +66,12 @@ class Guide:
             above = path[:length]
             node = at(self.root, above)
             opened = [one for schema in found for one in self._opened(schema, node, above)]
-            found = [inner for one in opened for inner in _below(one, key)]
+            found = [self._meant(inner) for one in opened for inner in _below(one, key)]
         return found
+
+    def _meant(self, schema: Schema) -> Schema:
+        """Return the key of a definition for which a schema stands, or the schema itself."""
+        return referred(schema, self.schema) if "/properties/" in schema.get("$ref", "") else schema
 
     def _opened(self, schema: Schema, node: Node | None, path: Path, depth: int = 0) -> Iterator[Schema]:
         """Yield a schema, and all that it stands for or that holds beside it."""
@@ -61,7 +80,7 @@ class Guide:
         yield schema
         inner = [*schema.get("allOf", ()), *schema.get("anyOf", ())]
         if "$ref" in schema:
-            inner.append(self.schema["definitions"][schema["$ref"].removeprefix(DEFINITIONS)])
+            inner.append(referred(schema, self.schema))
         if "if" in schema:
             branch = "then" if self._holds(schema["if"], node, path) else "else"
             inner.extend([schema[branch]] if branch in schema else [])
@@ -91,7 +110,8 @@ def _below(schema: Schema, key: str | int) -> Iterator[Schema]:
         if isinstance(items, dict):
             yield items
     elif key in schema.get("properties", {}):
-        yield schema["properties"][key]
+        if schema["properties"][key] is not True:
+            yield schema["properties"][key]
     elif isinstance(others, dict):
         yield others
 

@@ -33,11 +33,12 @@ from rbxcompose.schema.asking import (
     modifier_schemas,
 )
 from rbxcompose.schema.robot import document
-from rbxcompose.schema.scalars import Schema, computed
-from rbxcompose.schema.settle import DEFINITIONS, schemas_of
+from rbxcompose.schema.scalars import DEFINITIONS, Schema, computed
+from rbxcompose.schema.settle import schemas_of
 from rbxcompose.sdk.ports import ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
 
+KIND = "kind_"  # begins the name of the definition of a kind of node
 ANY_NODE = "What is done: a skill, a kind of node with its settings, or a list of nodes, which is a sequence."
 NODE_NAME: Schema = {
     **ITEM_NAME,
@@ -82,8 +83,8 @@ def mission_schema(types: Iterable[str]) -> Schema:
         "interrupts": {"type": ["object", "null"], "propertyNames": ITEM_NAME, "additionalProperties": _interrupt()},
         "rate": computed(TYPES["frequency"]),
         "outputs": {"type": ["object", "null"], "propertyNames": ITEM_NAME, "additionalProperties": EXPRESSION},
-        "do": {"allOf": [NODE]},
-        "machine": {"allOf": [MACHINE]},
+        "do": NODE,
+        "machine": MACHINE,
     }
     made = {key: {**properties[key], "description": _ABOUT[key]} for key in KEYS if key in properties}
     schema = document("Mission", MissionFile, made, definitions | _nodes(types))
@@ -94,7 +95,7 @@ def mission_schema(types: Iterable[str]) -> Schema:
 def _interrupt() -> Schema:
     properties = {
         "when": {**computed(FLAG), "description": _ABOUT["when"]},
-        "do": {"allOf": [NODE], "description": _ABOUT["reaction"]},
+        "do": {**NODE, "description": _ABOUT["reaction"]},
         "afterwards": {
             "type": ["string", "object"],
             "pattern": "|".join(f"^{word}$" for word in AFTERWARDS),
@@ -119,13 +120,15 @@ def _nodes(types: Iterable[str]) -> dict[str, Schema]:
     """Return the definitions of a node and of a list of nodes."""
     anywhere = {"name": NODE_NAME, **modifier_schemas()}
     known = {name: _skill(skill, about) for name, (skill, about) in skills_of(types).items()}
-    words: dict[str, Schema] = {}
-    chosen = []
+    closed: dict[str, Schema] = {}
     for name, kind in kinds().items():
         keys, needed = kind_schema(kind)
-        words[name] = keys[name]
-        closed = {"properties": {**keys, **anywhere}, "required": needed, "additionalProperties": False}
-        chosen.append({"if": {"required": [name]}, "then": closed})
+        allowed = {**keys, **dict.fromkeys(anywhere, True)}
+        closed[name] = {"properties": allowed, "required": needed, "additionalProperties": False}
+    words = {name: _key_of(f"{KIND}{name}", name) for name in closed}
+    chosen: list[Schema] = [
+        {"if": {"required": [name]}, "then": {"$ref": f"{DEFINITIONS}{KIND}{name}"}} for name in closed
+    ]
     # What may be chosen stands apart, so that editors do not propose a second step beside the one that is there.
     is_open = {"not": {"anyOf": [one["if"] for one in chosen]}}
     chosen.append({"if": is_open, "then": {"properties": {**words, **known}}})
@@ -135,14 +138,18 @@ def _nodes(types: Iterable[str]) -> dict[str, Schema]:
     # One schema with several types, not a choice of schemas: editors then tell the mistake of the type that is there.
     node = {**word, **steps, **mapping, "type": ["string", "array", "object"], "description": ANY_NODE}
     listed = {**steps, "description": "Nodes, one after the other."}
-    return {"node": node, "steps": listed, "deeds": _deeds(), "machine": _machine(), "state": _state(anywhere)}
+    shared = {"node": node, "steps": listed, "deeds": _deeds(), "machine": _machine(), "state": _state(anywhere)}
+    return {**shared, **{f"{KIND}{name}": one for name, one in closed.items()}}
+
+
+def _key_of(definition: str, key: str) -> Schema:
+    """Return a reference to what stands for a key in a definition."""
+    return {"$ref": f"{DEFINITIONS}{definition}/properties/{key}"}
 
 
 def _deeds() -> Schema:
     """Return the schema of what a hook does."""
-    keys: dict[str, Schema] = {}
-    for word in DEEDS:
-        keys |= kind_schema(kinds()[word])[0]
+    keys = {key: _key_of(f"{KIND}{word}", key) for word in DEEDS for key in kind_schema(kinds()[word])[0]}
     return {"type": "object", "minProperties": 1, "properties": keys, "additionalProperties": False}
 
 
@@ -168,10 +175,10 @@ def _machine() -> Schema:
 def _state(anywhere: dict[str, Schema]) -> Schema:
     """Return the schema of a state: its body, its transitions, and what any node may have."""
     to = {"type": ["string", "object"], "minLength": 1, "minProperties": 1, "additionalProperties": ITEM_NAME}
-    own: dict[str, Schema] = {"do": {"allOf": [NODE]}, "machine": {"allOf": [MACHINE]}, "next": to}
+    own: dict[str, Schema] = {"do": NODE, "machine": MACHINE, "next": to}
     described = {key: {**schema, "description": _STATE[key]} for key, schema in own.items()}
     hooks = modifier_schema(ON_ENTER, modifiers()[ON_ENTER])
-    inside = {key: schema for key, schema in anywhere.items() if key != "name"}
+    inside = {key: _key_of("node", key) for key in anywhere if key != "name"}
     return {"type": "object", "properties": {**described, **hooks, **inside}, "additionalProperties": False}
 
 

@@ -8,27 +8,33 @@ from typing import Any
 from rbxcompose.manifest.options import OPTIONS
 from rbxcompose.manifest.registry import sections as all_sections
 from rbxcompose.schema.components import COMPONENT
-from rbxcompose.schema.scalars import Schema
-from rbxcompose.schema.settle import DEFINITIONS
+from rbxcompose.schema.scalars import DEFINITIONS, Schema
 from rbxcompose.sections.components import components
 
-OVER = "overlay_"  # begins the name of a definition that an overlay uses
-REMOVED: Schema = {"enum": [None, ""], "description": "With the tag `!remove`: takes it out of what lies below."}
+OVER = "overlay_"  # begins the name of a definition that is another one in an overlay
+REMOVED = "removed"
+_REMOVED: Schema = {"enum": [None, ""], "description": "With the tag `!remove`: takes it out of what lies below."}
 _NOT_NEEDED = ("required", "minProperties", "minItems", "default")
+_NOTES = ("description", "x-names", "x-dimension")  # what editors look for at the key itself
 
 
 def laid_over(
     sections: Mapping[str, Schema], definitions: Mapping[str, Schema]
 ) -> tuple[dict[str, Schema], dict[str, Schema]]:
-    """Return the sections as an overlay may have them, and the definitions that those need."""
-    schemas = {name: _over(one) for name, one in sections.items()}
+    """Return the sections as an overlay may have them, and all definitions, those among them that overlays need."""
+    over = _Overlay(definitions)
+    schemas = {name: over.of(one) for name, one in sections.items()}
     for section in all_sections():
         if section.short and section.short.only_over:
-            entry = schemas[section.name]["additionalProperties"]
             word = {"type": ["string", "number", "boolean", "array"], "description": section.short.only_over}
-            schemas[section.name] = {**schemas[section.name], "additionalProperties": {"anyOf": [word, entry]}}
+            choice = schemas[section.name]["additionalProperties"]
+            schemas[section.name] = {
+                **schemas[section.name],
+                "additionalProperties": {"anyOf": [word, *choice["anyOf"]]},
+            }
     schemas[components.name] = _told(schemas[components.name], definitions)
-    return schemas, {f"{OVER}{name}": _over(one) for name, one in definitions.items()}
+    changed = {f"{OVER}{name}": over.of(definitions[name]) for name in over.changed}
+    return schemas, {**definitions, **changed, REMOVED: _REMOVED}
 
 
 def _told(section: Schema, definitions: Mapping[str, Schema]) -> Schema:
@@ -47,24 +53,40 @@ def _told(section: Schema, definitions: Mapping[str, Schema]) -> Schema:
 
 def or_removed(schema: Schema) -> Schema:
     """Return the schema of something that an overlay may also take out."""
-    notes: Schema = {key: schema[key] for key in ("description", "x-names", "x-dimension") if key in schema}
-    return {"anyOf": [schema, REMOVED], **notes}
+    notes = {key: schema[key] for key in _NOTES if key in schema}
+    rest = {key: value for key, value in schema.items() if key not in notes}
+    choices = rest["anyOf"] if rest.keys() == {"anyOf"} else rest["allOf"] if rest.keys() == {"allOf"} else [rest]
+    return {"anyOf": [*choices, {"$ref": f"{DEFINITIONS}{REMOVED}"}], **notes}
 
 
-def _over(schema: Schema) -> Schema:
-    made: dict[str, Any] = {}
-    for key, value in schema.items():
-        match key:
-            case "$ref":
-                made[key] = DEFINITIONS + OVER + value.removeprefix(DEFINITIONS)
-            case "properties":
-                made[key] = {name: or_removed(_over(one)) for name, one in value.items()}
-            case "additionalProperties" if isinstance(value, dict):
-                made[key] = or_removed(_over(value))
-            case "allOf" | "anyOf":
-                made[key] = [_over(one) for one in value]
-            case "then" | "items" if isinstance(value, dict):
-                made[key] = _over(value)
-            case _ if key not in _NOT_NEEDED:
-                made[key] = value
-    return made
+class _Overlay:
+    """Turns schemas into those of an overlay; definitions that are the same there are shared with the robot's."""
+
+    def __init__(self, definitions: Mapping[str, Schema]) -> None:
+        self.changed: set[str] = set()
+        while found := {
+            name for name, one in definitions.items() if name not in self.changed and self._is_changed(one)
+        }:
+            self.changed |= found
+
+    def _is_changed(self, schema: Schema) -> bool:
+        return self.of(schema) != schema
+
+    def of(self, schema: Schema) -> Schema:
+        """Return a schema as an overlay has it."""
+        made: dict[str, Any] = {}
+        for key, value in schema.items():
+            match key:
+                case "$ref" if value.removeprefix(DEFINITIONS) in self.changed:
+                    made[key] = DEFINITIONS + OVER + value.removeprefix(DEFINITIONS)
+                case "properties":
+                    made[key] = {name: one if one is True else or_removed(self.of(one)) for name, one in value.items()}
+                case "additionalProperties" if isinstance(value, dict):
+                    made[key] = or_removed(self.of(value))
+                case "allOf" | "anyOf":
+                    made[key] = [self.of(one) for one in value]
+                case "then" | "items" if isinstance(value, dict):
+                    made[key] = self.of(value)
+                case _ if key not in _NOT_NEEDED:
+                    made[key] = value
+        return made

@@ -12,13 +12,14 @@ from rbxcompose.manifest.registry import sections as all_sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
 from rbxcompose.schema.components import component_schemas
 from rbxcompose.schema.overlays import laid_over, or_removed
-from rbxcompose.schema.scalars import Schema
+from rbxcompose.schema.scalars import DEFINITIONS, Schema, quantities
 from rbxcompose.schema.settle import opened, schemas_of
 from rbxcompose.sections.components import components
 from rbxcompose.sections.profiles import profiles
 
 MADE_OTHERWISE = (components, profiles)  # of more than one model
 
+CHANGES = "changes"  # the definition of what may be laid over the sections of a file
 NAMES: Schema = {"pattern": "^[a-z][a-z0-9_]*$", "maxLength": 60}
 
 
@@ -42,26 +43,33 @@ def sections_of(types: Iterable[str]) -> Sections:
 def robot_schema(types: Iterable[str]) -> Schema:
     """Return the schema of a robot's file."""
     made = sections_of(types)
-    overlay, over = laid_over(made.schemas, made.definitions)
-    profile = or_removed({"type": "object", "properties": described(overlay, ROBOT), "additionalProperties": False})
-    changes = {profiles.name: or_empty({"type": "object", "propertyNames": NAMES, "additionalProperties": profile})}
-    own, changing = described({**made.schemas, **changes}, ROBOT), described({**overlay, **changes}, ROBOT)
-    return document(ROBOT, file_model(ROBOT), own, {**made.definitions, **over}, changing)
+    changes, definitions = _changes(made, ROBOT)
+    keys = {name: {"$ref": f"{DEFINITIONS}{CHANGES}/properties/{name}"} for name in changes["properties"]}
+    profile = or_removed({"type": "object", "properties": keys, "additionalProperties": False})
+    entries = or_empty({"type": "object", "propertyNames": NAMES, "additionalProperties": profile})
+    always = described({profiles.name: entries}, ROBOT)
+    own = described(made.schemas, ROBOT)
+    return document(ROBOT, file_model(ROBOT), own, definitions, always, may_change=True)
 
 
 def part_schema(types: Iterable[str]) -> Schema:
     """Return the schema of a part's file."""
     made = sections_of(types)
-    overlay, over = laid_over(made.schemas, made.definitions)
-    own, changing = described(made.schemas, PART), described(overlay, PART)
-    return document(PART, file_model(PART), own, {**made.definitions, **over}, changing)
+    _, definitions = _changes(made, PART)
+    return document(PART, file_model(PART), described(made.schemas, PART), definitions, may_change=True)
 
 
 def overlay_schema(types: Iterable[str]) -> Schema:
     """Return the schema of an overlay's file."""
-    made = sections_of(types)
-    overlay, over = laid_over(made.schemas, made.definitions)
-    return document(OVERLAY, file_model(OVERLAY), described(overlay, OVERLAY), over)
+    changes, definitions = _changes(sections_of(types), OVERLAY)
+    return document(OVERLAY, file_model(OVERLAY), changes["properties"], definitions)
+
+
+def _changes(made: Sections, kind: str) -> tuple[Schema, dict[str, Schema]]:
+    """Return what may be laid over the sections of a file, and all definitions, that one among them."""
+    overlay, definitions = laid_over(made.schemas, made.definitions)
+    changes = {"properties": described(overlay, kind)}
+    return changes, {**definitions, CHANGES: changes}
 
 
 def document(
@@ -69,26 +77,29 @@ def document(
     model: type[Header],
     properties: Schema,
     definitions: Mapping[str, Schema],
-    changing: Schema | None = None,
+    always: Mapping[str, Schema] | None = None,
+    *,
+    may_change: bool = False,
 ) -> Schema:
-    """Return the schema of a file of some kind: its header, then its own keys.
+    """Return the schema of a file of some kind: its header, then its own keys, of which `always` have one schema.
 
-    `changing` are the keys of a file that includes parts: there it may write of an entry only what it changes.
+    A file that includes parts writes of an entry only what it changes, if it `may_change` what they bring.
     """
     made = {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": f"rbxcompose {kind}",
         "description": model.__doc__ or "",
         "type": "object",
-        "properties": {**header(kind), **properties},
+        "properties": {**header(kind), **properties, **(always or {})},
         "required": ["rbx", "kind", "name"],
         "additionalProperties": False,
     }
-    if changing is not None:
+    if may_change:
         told = {name: {"description": schema["description"]} for name, schema in properties.items()}
-        made["properties"] = {**header(kind), **told}
-        made |= {"if": {"required": ["include"]}, "then": {"properties": changing}, "else": {"properties": properties}}
-    return {**made, "definitions": reached({"own": properties, "changing": changing}, definitions)}
+        made["properties"] = {**header(kind), **told, **(always or {})}
+        changed = {"$ref": f"{DEFINITIONS}{CHANGES}"}
+        made |= {"if": {"required": ["include"]}, "then": changed, "else": {"properties": properties}}
+    return {**made, "definitions": reached(made, {**quantities(), **definitions})}
 
 
 def header(kind: str) -> dict[str, Schema]:
@@ -126,7 +137,7 @@ def reached(schema: Schema, definitions: Mapping[str, Schema]) -> dict[str, Sche
 def _references(schema: Any) -> Iterable[str]:
     match schema:
         case {"$ref": str(reference)}:
-            yield reference.rpartition("/")[2]
+            yield reference.removeprefix(DEFINITIONS).partition("/")[0]
         case dict():
             for inner in schema.values():
                 yield from _references(inner)

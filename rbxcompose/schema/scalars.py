@@ -6,10 +6,11 @@ import re
 from typing import Any
 
 from rbxcompose.expressions.types import Type, TypeKind
-from rbxcompose.units import NUMBER_TEXT, UNITS, Dimension, bare_number_help, example
+from rbxcompose.units import DIMENSIONS, NUMBER_TEXT, UNITS, Dimension, bare_number_help, example
 
 Schema = dict[str, Any]
 
+DEFINITIONS = "#/definitions/"
 DIMENSION = "x-dimension"  # a keyword of ours: what a value measures
 FILLED = r"\$\{"  # text with this in it gets its value when the files are put together
 FILL: Schema = {"type": "string", "pattern": FILLED}
@@ -20,11 +21,7 @@ _NOTES = ("description", "default", "examples", "x-names")
 
 def quantity(dimension: Dimension) -> Schema:
     """Return the schema of a number with a unit of `dimension`, or a bare number where that means SI."""
-    return {
-        "type": _types(dimension),
-        "pattern": f"{_number_with_unit(dimension)}|{FILLED}",
-        **_told(dimension),
-    }
+    return {"$ref": f"{DEFINITIONS}{dimension.name}"}
 
 
 def computed(wanted: Type, what: str = "") -> Schema:
@@ -35,9 +32,7 @@ def computed(wanted: Type, what: str = "") -> Schema:
         message = f"must be {what}" if what else "must be a whole number"
         return {"type": ["integer", "string"], "pattern": COMPUTED, **_complaint(message), "minimum": 0}
     if wanted.kind is TypeKind.QUANTITY and wanted.dimension:
-        dimension = wanted.dimension
-        pattern = f"{_number_with_unit(dimension)}|{COMPUTED}"
-        return {"type": _types(dimension), "pattern": pattern, **_told(dimension)}
+        return {"$ref": f"{DEFINITIONS}{_expression(wanted.dimension)}"}
     return {"type": ["string", "number", "boolean"]}
 
 
@@ -46,14 +41,25 @@ def units_of(dimension: Dimension) -> list[str]:
     return [name for name, unit in UNITS.items() if unit.dimension == dimension]
 
 
-def _types(dimension: Dimension) -> list[str]:
-    return ["string"] if bare_number_help(dimension) else ["string", "number"]
+def quantities() -> dict[str, Schema]:
+    """Return the definition of each quantity, as a setting and as an expression."""
+    settings = {one.name: _quantity(one, FILLED) for one in DIMENSIONS.values()}
+    return settings | {_expression(one): _quantity(one, COMPUTED) for one in DIMENSIONS.values()}
 
 
-def _told(dimension: Dimension) -> Schema:
+def _expression(dimension: Dimension) -> str:
+    return f"{dimension.name}_expression"
+
+
+def _quantity(dimension: Dimension, otherwise: str) -> Schema:
     sample = example(dimension)
-    message = f"must be {dimension.phrase}, such as '{sample}'"
-    return {**_complaint(message), "examples": [sample], DIMENSION: dimension.name}
+    return {
+        "type": ["string"] if bare_number_help(dimension) else ["string", "number"],
+        "pattern": f"{_number_with_unit(dimension)}|{otherwise}",
+        **_complaint(f"must be {dimension.phrase}, such as '{sample}'"),
+        "examples": [sample],
+        DIMENSION: dimension.name,
+    }
 
 
 def _complaint(message: str) -> Schema:

@@ -7,10 +7,9 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
-from rbxcompose.schema.scalars import DIMENSION, Schema, or_filled, quantity
+from rbxcompose.schema.scalars import DEFINITIONS, DIMENSION, Schema, or_filled, quantities, quantity
 from rbxcompose.units import DIMENSIONS, format_quantity
 
-DEFINITIONS = "#/definitions/"
 _SIDE: Literal["validation"] = "validation"
 _NOTHING: tuple[Any, ...] = (None, {}, [], "")
 
@@ -25,8 +24,15 @@ def schemas_of(types: Mapping[str, Any]) -> tuple[dict[str, Schema], dict[str, S
 
 def opened(schema: Schema, definitions: Mapping[str, Schema]) -> Schema:
     """Return the definition that a schema refers to, or the schema itself."""
-    name = schema.get("$ref", "").removeprefix(DEFINITIONS)
-    return definitions[name] if name else schema
+    return definitions.get(schema.get("$ref", "").removeprefix(DEFINITIONS), schema)
+
+
+def referred(schema: Schema, document: Schema) -> Schema:
+    """Return what a schema refers to in its document, with the notes beside the reference, or the schema itself."""
+    found: Any = document if "$ref" in schema else schema
+    for key in schema.get("$ref", "").split("/")[1:]:
+        found = found[key]
+    return {**found, **{key: value for key, value in schema.items() if key != "$ref"}}
 
 
 def settled(raw: Schema) -> Schema:
@@ -38,9 +44,8 @@ def settled(raw: Schema) -> Schema:
         return _quantity(raw)
     if "anyOf" in raw:
         return _any_of(raw)
-    if "$ref" in raw:  # draft 7 sees nothing of what stands beside a reference
-        notes = {key: value for key, value in raw.items() if key != "$ref"}
-        return {"allOf": [{"$ref": raw["$ref"]}], **notes} if notes else raw
+    if "$ref" in raw:  # editors see what stands beside it, validators need not
+        return raw
     match raw.get("type"):
         case "object" if "properties" in raw:
             return {**raw, "properties": {name: settled(one) for name, one in raw["properties"].items()}}
@@ -55,11 +60,10 @@ def settled(raw: Schema) -> Schema:
 
 def _quantity(raw: Schema) -> Schema:
     dimension = DIMENSIONS[raw[DIMENSION]]
-    made = quantity(dimension)
-    made |= {key: raw[key] for key in ("description",) if key in raw}
+    notes = {key: raw[key] for key in ("description",) if key in raw}
     if "default" in raw:
-        made["default"] = format_quantity(raw["default"], dimension)
-    return made
+        notes["default"] = format_quantity(raw["default"], dimension)
+    return {**quantity(dimension), **notes}
 
 
 def _any_of(raw: Schema) -> Schema:
@@ -67,8 +71,8 @@ def _any_of(raw: Schema) -> Schema:
     members = [settled(one) for one in raw["anyOf"] if one != {"type": "null"}]
     rest = {key: value for key, value in raw.items() if key != "anyOf"}
     is_optional = len(members) < len(raw["anyOf"])
-    if is_optional and len(members) == 1 and "type" in members[0]:
-        return {**members[0], "type": [*_listed(members[0]["type"]), "null"], **rest}
+    if is_optional and len(members) == 1 and "type" in (only := opened(members[0], quantities())):
+        return {**only, "type": [*_listed(only["type"]), "null"], **rest}
     return {"anyOf": [*members, *([{"type": "null"}] if is_optional else [])], **rest}
 
 

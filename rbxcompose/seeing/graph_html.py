@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from html import escape
 
 from rbxcompose.seeing.diagram import Box, Diagram, Line, Shape, Tip, Wire
-from rbxcompose.seeing.layering import Edge, order_of
-from rbxcompose.seeing.layout import Item, Layout, Point, Rect, lay_out
+from rbxcompose.seeing.layout import Edge, Item, Layout, Rect, lay_out
 from rbxcompose.seeing.page import SCRIPT, STYLE
 
 _BOX_HEIGHT, _WIRE_HEIGHT = 46.0, 34.0
@@ -60,9 +59,9 @@ def _picture(diagram: Diagram) -> Iterator[str]:
     yield '<defs><marker id="arrow" viewBox="0 0 8 8" refX="7.5" refY="4" markerWidth="9" markerHeight="9" '
     yield 'markerUnits="userSpaceOnUse" orient="auto">'
     yield '<path d="M0 0L8 4L0 8z" fill="context-stroke"/></marker></defs>'
-    for band, rect in layout.bands.items():
+    for group, rect in layout.groups.items():
         yield f"{_rect(rect, 'group', 10)}"
-        yield f'<text class="process" x="{rect.x + 12:.0f}" y="{rect.y + 18:.0f}">process {diagram.groups[band]}</text>'
+        yield f'<text class="process" x="{rect.x + 12:.0f}" y="{rect.y + 18:.0f}">process {group}</text>'
     for executive, program in diagram.runs:
         yield from _line(layout, executive, _run(program), "run", f"{executive} {program}", has_arrow=False)
         yield from _line(layout, _run(program), program, "run", f"{executive} {program}", has_arrow=False)
@@ -80,30 +79,22 @@ def _run(program: str) -> str:
 
 def _layout(diagram: Diagram) -> Layout:
     """Return the places of boxes, and of wires, which stand between those that they connect."""
-    band = {box.key: diagram.groups.index(box.group) for box in diagram.boxes}
-    items = {box.key: Item(box.key, _width(box.name, box.type), _BOX_HEIGHT, band[box.key]) for box in diagram.boxes}
+    groups = {box.key: box.group for box in diagram.boxes}
+    items = [
+        Item(box.key, _width(box.name, box.type), _BOX_HEIGHT, box.group, is_round=box.shape is Shape.PROGRAM)
+        for box in diagram.boxes
+    ]
     edges: list[Edge] = []
-    beside: dict[str, list[Item]] = {}  # what stands behind a box, so that it is near to where it comes from
-    ahead: list[Item] = []
     for executive, program in diagram.runs:
-        beside.setdefault(executive, []).append(Item(_run(program), 30.0, 16.0, band[program]))
+        items.append(Item(_run(program), 30.0, 16.0, groups[program], is_round=True))
         edges += [(executive, _run(program)), (_run(program), program)]
     for number, wire in enumerate(diagram.wires):
         key = f"w{number}"
         width = max(_SMALL * len(text) for text in (wire.name, _second_line(wire))) + 20
-        item = Item(key, width, _WIRE_HEIGHT, band[(wire.sources or wire.targets)[0].box])
-        (beside.setdefault(wire.sources[0].box, []) if wire.sources else ahead).append(item)
+        group = groups[(wire.sources or wire.targets)[0].box]
+        items.append(Item(key, width, _WIRE_HEIGHT, group, is_round=True))
         edges += [(tip.box, key) for tip in wire.sources] + [(key, tip.box) for tip in wire.targets]
-    order = order_of(list(items), _between_boxes(diagram))
-    placed = [*ahead, *(item for key in order for item in (items[key], *beside.get(key, ())))]
-    return lay_out(placed, list(dict.fromkeys(edges)))
-
-
-def _between_boxes(diagram: Diagram) -> list[Edge]:
-    """Return what leads from box to box; look-ups are left out, so that commands lead to the right."""
-    wires = [wire for wire in diagram.wires if wire.kind is not Line.LOOK_UP]
-    links = [(one.box, other.box) for wire in wires for one in wire.sources for other in wire.targets]
-    return list(dict.fromkeys([*diagram.runs, *links]))
+    return lay_out(items, list(dict.fromkeys(edges)))
 
 
 def _width(name: str, type_: str) -> float:
@@ -143,26 +134,7 @@ def _names(tips: tuple[Tip, ...]) -> str:
 
 def _line(layout: Layout, begin: str, end: str, style: str, boxes: str, *, has_arrow: bool = True) -> Iterator[str]:
     arrow = ' marker-end="url(#arrow)"' if has_arrow else ""
-    path = _curve(layout.paths[begin, end])
-    yield f'<path class="line {style}" data-boxes="{escape(boxes)}" d="{path}"{arrow}/>'
-
-
-def _curve(points: tuple[Point, ...]) -> str:
-    """Return a path that leaves and arrives level, and goes straight where it passes between others.
-
-    Each path turns at another place between two layers, so that lines that go far up or down stay apart.
-    """
-    x, y = points[0]
-    turn = 0.3 + 0.4 * ((sum(y for _, y in points) * 0.0618) % 1.0)
-    parts = [f"M{x:.1f} {y:.1f}"]
-    for number, (x2, y2) in enumerate(points[1:]):
-        if number % 2:
-            parts.append(f"L{x2:.1f} {y2:.1f}")
-        else:
-            middle = x + (x2 - x) * turn
-            parts.append(f"C{middle:.1f} {y:.1f} {middle:.1f} {y2:.1f} {x2:.1f} {y2:.1f}")
-        x, y = x2, y2
-    return "".join(parts)
+    yield f'<path class="line {style}" data-boxes="{escape(boxes)}" d="{layout.paths[begin, end]}"{arrow}/>'
 
 
 def _box(rect: Rect, box: Box, is_start: bool) -> Iterator[str]:

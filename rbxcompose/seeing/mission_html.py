@@ -8,7 +8,7 @@ from html import escape
 from rbxcompose.missions.look import Form
 from rbxcompose.missions.picture import Drawn, Picture
 from rbxcompose.missions.statuses import IDLE, NAMES
-from rbxcompose.seeing.layout import Item, Layout, Point, lay_out
+from rbxcompose.seeing.layout import Item, Layout, lay_out
 from rbxcompose.seeing.mission_style import STYLE
 from rbxcompose.seeing.mission_text import MARKS, status_of
 
@@ -90,8 +90,8 @@ def _states(machine: Drawn, statuses: Sequence[int]) -> Iterator[str]:
     yield '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="8" markerHeight="8" orient="auto">'
     yield '<path d="M0 0L8 4L0 8z" fill="context-stroke"/></marker></defs>'
     for (begin, to), key in pills.items():
-        yield f'<path class="line" d="{_curve(layout.paths[begin, key])}"/>'
-        yield f'<path class="line" d="{_curve(layout.paths[key, to])}" marker-end="url(#tip)"/>'
+        yield f'<path class="line" d="{layout.paths[begin, key]}"/>'
+        yield f'<path class="line" d="{layout.paths[key, to]}" marker-end="url(#tip)"/>'
         yield _shape(layout, key, "pill", ", ".join(joined[begin, to]))
     for name in [*states, *dict.fromkeys(ends)]:
         status = NAMES[status_of(states[name], statuses)] if name in states else "end"
@@ -105,12 +105,9 @@ def _layout(
 ) -> tuple[Layout, dict[tuple[str, str], str]]:
     """Return the places of states and of the labels between them, and the keys of these."""
     pills = {ends: f"{ends[0]} > {ends[1]}" for ends in joined}
-    items = []
-    for name in names:
-        items.append(Item(name, _LETTER * len(name) + 26, _BOX, 0))
-        for ends, key in pills.items():
-            if ends[0] == name:
-                items.append(Item(key, _SMALL * len(", ".join(joined[ends])) + 18, _PILL, 0))
+    items = [Item(name, _LETTER * len(name) + 26, _BOX, is_round=True) for name in names]
+    for ends, key in pills.items():
+        items.append(Item(key, _SMALL * len(", ".join(joined[ends])) + 18, _PILL, is_round=True))
     edges = [edge for (begin, to), key in pills.items() for edge in ((begin, key), (key, to))]
     return lay_out(items, edges), pills
 
@@ -123,17 +120,3 @@ def _shape(layout: Layout, key: str, style: str, text: str) -> str:
         f'height="{rect.height:.0f}" rx="{rect.height / 2:.0f}"/>'
         f'<text x="{x:.0f}" y="{y:.0f}">{escape(text)}</text></g>'
     )
-
-
-def _curve(points: tuple[Point, ...]) -> str:
-    """Return a path that leaves and arrives level, and goes straight where it passes between others."""
-    x, y = points[0]
-    parts = [f"M{x:.1f} {y:.1f}"]
-    for number, (x2, y2) in enumerate(points[1:]):
-        if number % 2:
-            parts.append(f"L{x2:.1f} {y2:.1f}")
-        else:
-            middle = (x + x2) / 2
-            parts.append(f"C{middle:.1f} {y:.1f} {middle:.1f} {y2:.1f} {x2:.1f} {y2:.1f}")
-        x, y = x2, y2
-    return "".join(parts)

@@ -9,6 +9,7 @@ import pytest
 
 from rbxcompose.cli import main as command
 from rbxcompose.plan.dump import load
+from rbxcompose.seeing import layout
 
 TURTLEBOT = "robots/turtlebot"
 BROKEN = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  base:\n    type: diff_drive_sim\n    max_sped: 1 m/s\n"
@@ -72,6 +73,18 @@ def test_a_graph_goes_to_a_file_or_to_stdout(
     assert shown.startswith(begin)
     assert output(capsys, "graph", TURTLEBOT, "--format", form, "--out", str(tmp_path / "graph")) == ""
     assert (tmp_path / "graph").read_text(encoding="utf-8") == shown
+
+
+def test_without_graphviz_a_page_is_refused_and_texts_are_not(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(layout, "find_spec", lambda name: None)
+    assert command.main(["graph", TURTLEBOT, "--format", "html"]) == 1
+    said = capsys.readouterr()
+    assert "error[RBX9013]" in said.err
+    assert "pip install 'rbxcompose[graph]'" in said.err
+    assert said.out == ""
+    assert output(capsys, "graph", TURTLEBOT, "--format", "dot").startswith("digraph")
 
 
 def test_a_graph_that_cannot_be_written_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

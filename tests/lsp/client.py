@@ -6,18 +6,20 @@ import json
 import subprocess
 import sys
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from tests.conftest import ROOT
 
+OURS = (sys.executable, "-m", "rbxcompose", "lsp", "--stdio")
+
 
 class Client:
-    """Starts the server in a folder; leaving the context shuts it down and waits for its end."""
+    """Starts a server, ours or another, in a folder; leaving the context shuts it down and waits for its end."""
 
-    def __init__(self, folder: Path) -> None:
-        words = [sys.executable, "-m", "rbxcompose", "lsp", "--stdio"]
+    def __init__(self, folder: Path, words: Sequence[str] = OURS) -> None:
         self.process = subprocess.Popen(
             words, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
         )
@@ -53,8 +55,12 @@ class Client:
         """Send a request and return its result."""
         self.number += 1
         self._send({"jsonrpc": "2.0", "id": self.number, "method": method, "params": params or None})
-        while "id" not in (message := self._receive()):
-            self.told.append(message)
+        while "id" not in (message := self._receive()) or "method" in message:
+            if "id" in message:  # a question of the server
+                settings = [None for _ in message["params"].get("items", ())]
+                self._send({"jsonrpc": "2.0", "id": message["id"], "result": settings})
+            else:
+                self.told.append(message)
         assert message["id"] == self.number
         assert "error" not in message, message
         return message["result"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from difflib import ndiff
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,15 @@ import pytest
 from jsonschema import Draft7Validator
 
 from rbxcompose.cli.main import main as command
-from rbxcompose.config import Config
+from rbxcompose.config import Config, Length, Time
 from rbxcompose.manifest.file_models import FILES, file_model
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.missions.registry import kinds
 from rbxcompose.schema.asking import kind_schema
-from rbxcompose.schema.documents import MAKERS, files
+from rbxcompose.schema.documents import MAKERS, as_text, files
+from rbxcompose.schema.settle import referred
+from rbxcompose.sdk import Component, component
 from tests.conftest import ROOT
 
 SCHEMAS: dict[str, Any] = {name.partition(".")[0]: json.loads(text) for name, text in files().items()}
@@ -54,22 +57,101 @@ def test_a_schema_is_one_of_draft_7(name: str) -> None:
     Draft7Validator.check_schema(SCHEMAS[name])
 
 
-def properties(schema: object, path: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield every property that a schema declares, but for those that a condition names."""
+def maps(schema: object) -> Iterator[dict[str, Any]]:
+    """Yield the properties of every map that a schema declares, but for those that a condition names."""
     if isinstance(schema, dict):
         for key, value in schema.items():
             if key == "properties" and isinstance(value, dict):
-                yield from ((f"{path}.{name}", one) for name, one in value.items())
+                yield value
             if key != "if":
-                yield from properties(value, f"{path}.{key}")
+                yield from maps(value)
     elif isinstance(schema, list):
-        for index, value in enumerate(schema):
-            yield from properties(value, f"{path}[{index}]")
+        for value in schema:
+            yield from maps(value)
 
 
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_every_property_has_a_description(name: str) -> None:
-    assert [path for path, schema in properties(SCHEMAS[name]) if not schema.get("description")] == []
+    root = SCHEMAS[name]
+    declared = [(key, schema) for keys in maps(root) for key, schema in keys.items()]
+    told = {key for key, schema in declared if schema is not True and schema.get("description")}
+    for key, schema in declared:
+        if schema is True:  # what is only allowed here is described for all such maps
+            assert key in told
+        else:
+            assert schema.get("description") or referred(schema, root)["description"]
+
+
+def entries(kind: str) -> Iterator[dict[str, Any]]:
+    """Yield each entry of `components`: that of a file alone, and that of a file that changes others."""
+    root = SCHEMAS[kind]
+    sections = [root.get("else", root)["properties"], root["definitions"].get("changes", root)["properties"]]
+    for section in sections:
+        entry = section["components"]["additionalProperties"]
+        yield entry.get("anyOf", [entry])[0]
+
+
+@pytest.mark.parametrize("kind", ["robot", "part", "overlay"])
+def test_what_every_component_may_have_is_described_at_the_entry(kind: str) -> None:
+    for entry in entries(kind):
+        for chosen in entry["allOf"]:
+            if "$ref" in chosen["then"]:
+                keys = referred(chosen["then"], SCHEMAS[kind])["properties"]
+                assert {key for key, schema in keys.items() if schema is True} == set(entry["properties"])
+
+
+class OneConfig(Config):
+    """What can be set."""
+
+    size: Length = 0.3
+    """How large it is."""
+
+
+class TwoConfig(OneConfig):
+    """What can be set."""
+
+    pause: Time
+    """How long it rests, which is told here in about as many words as most settings need."""
+
+
+@component("toy_one")
+class One(Component[OneConfig]):
+    """A toy, for schemas."""
+
+
+@component("toy_two")
+class Two(Component[TwoConfig]):
+    """A toy, for schemas."""
+
+
+@pytest.mark.parametrize("kind", ["Robot", "Part", "Overlay"])
+def test_a_type_and_a_setting_cost_few_lines(kind: str) -> None:
+    nothing, one, two = (
+        as_text(MAKERS[kind](types)).replace("toy_two", "toy_one").splitlines()
+        for types in (["charger"], ["charger", "toy_one"], ["charger", "toy_two"])
+    )
+    assert more(nothing, one) <= 48
+    assert more(one, two) <= 12
+
+
+def more(before: list[str], after: list[str]) -> int:
+    """Return how many lines there are that were not there before."""
+    return sum(line[0] == "+" for line in ndiff(before, after))
+
+
+def references(schema: object) -> Iterator[dict[str, Any]]:
+    """Yield every schema that refers to another one."""
+    inner = schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ()
+    for one in inner:
+        yield from references(one)
+    if isinstance(schema, dict) and isinstance(schema.get("$ref"), str):
+        yield schema
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_beside_a_reference_stand_only_notes_because_nothing_else_there_counts(name: str) -> None:
+    notes = {"$ref", "description", "default"}
+    assert [one for one in references(SCHEMAS[name]) if not one.keys() <= notes] == []
 
 
 @pytest.mark.parametrize(("name", "model"), [(kind.lower(), file_model(kind)) for kind in FILES])
@@ -114,6 +196,67 @@ def test_a_mistake_in_a_robot_is_refused_at_its_place(right: str, wrong: str, pl
     found = mistakes(ROBOT.replace(right, wrong))
     assert found
     assert all(place.startswith(one) for one in found), found
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "place"),
+    [
+        ("runtime: 45 s ", "runtime: ", "runtime"),
+        ("runtime: 45 s ", "process: World\n    runtime: 45 s ", "process"),
+        ("runtime: 45 s ", "restart: sometimes\n    runtime: 45 s ", "restart"),
+        ("runtime: 45 s ", "restart: {wen: always}\n    runtime: 45 s ", "restart"),
+        ("runtime: 45 s ", "log: loud\n    runtime: 45 s ", "log"),
+        ("runtime: 45 s ", "connect: {Level: charge}\n    runtime: 45 s ", "connect"),
+        ("runtime: 45 s ", "starts_after: base\n    runtime: 45 s ", "starts_after"),
+    ],
+)
+def test_a_mistake_in_what_every_component_may_have_is_refused(right: str, wrong: str, place: str) -> None:
+    found = mistakes(ROBOT.replace(right, wrong))
+    assert found
+    assert all(one.startswith(f"components.battery.{place}") for one in found), found
+
+
+CHANGES = [
+    ("components: {battery: {type: battery_sim, runtime: 45 m}}", "components.battery"),
+    ("components: {battery: {type: battery_sim, runtme: 45 s}}", "components.battery"),
+    ("components: {battery: {type: batery_sim}}", "components.battery"),
+    ("components: {battery: {restart: sometimes}}", "components.battery"),
+    ("components: {battery: {process: World}}", "components.battery"),
+    ("components: {Battery: {runtime: 45 s}}", "components"),
+    ("places: {dock: {x: 4 deg}}", "places.dock"),
+    ("values: {level: {topik: level}}", "values.level"),
+    ("muxes: {cmd_vel: {inputs: {teleop: {priority: high}}}}", "muxes.cmd_vel"),
+    ("component: {}", ""),
+]
+
+
+@pytest.mark.parametrize(("text", "place"), CHANGES)
+@pytest.mark.parametrize("kind", ["Overlay", "Robot", "Part", "profile"])
+def test_a_mistake_in_what_is_laid_over_others_is_refused(kind: str, text: str, place: str) -> None:
+    head = f"rbx: 1\nkind: {kind}\nname: changed\n"
+    if kind == "profile":
+        robot = f"rbx: 1\nkind: Robot\nname: changed\nprofiles:\n  other:\n    {text}\n"
+        (found,) = mistakes(robot)
+        assert f"profiles.other.{place}".startswith(found)
+        return
+    include = "" if kind == "Overlay" else "include: {base: {part: base.yaml}}\n"
+    found, *others = mistakes(f"{head}{include}{text}\n")
+    assert not others
+    assert place.startswith(found)
+
+
+@pytest.mark.parametrize("kind", ["Overlay", "Robot", "Part"])
+def test_what_is_laid_over_others_may_take_out_and_leave_out(kind: str) -> None:
+    text = """
+components:
+  battery: ""  # what editors see of `!remove`
+  base: {max_speed: null, process: "", restart: {max: null}}
+  charger: {type: charger, reach: ""}
+places: {dock: {x: 1 m}}
+muxes: {cmd_vel: {inputs: {teleop: null}}}
+"""
+    include = "" if kind == "Overlay" else "include: {base: {part: base.yaml}}\n"
+    assert mistakes(f"rbx: 1\nkind: {kind}\nname: changed\n{include}{text}") == []
 
 
 @pytest.mark.parametrize(
@@ -186,7 +329,9 @@ def test_a_mistake_in_a_mission_is_refused_at_its_place(text: str, place: str) -
 @pytest.mark.parametrize("name", sorted(SCHEMAS["robot"]["definitions"]))
 def test_the_examples_of_a_definition_are_right(name: str) -> None:
     schema = SCHEMAS["robot"]["definitions"][name]
-    validator = Draft7Validator({**schema, "definitions": SCHEMAS["robot"]["definitions"]})
+    entry, over = entries("robot")
+    whole = over if name.startswith("overlay_component_") else entry if name.startswith("component_") else schema
+    validator = Draft7Validator({**whole, "definitions": SCHEMAS["robot"]["definitions"]})
     for sample in schema.get("examples", []):
         validator.validate(sample)
 
@@ -196,6 +341,7 @@ def test_a_component_type_has_its_docstring_as_description_and_its_example() -> 
     assert battery["description"].startswith("A battery that drains evenly")
     assert battery["examples"] == [{"type": "battery_sim", "runtime": "45 s", "warn": "50 %", "error": "20 %"}]
     assert battery["properties"]["warn"]["default"] == "50 %"
+    assert referred(battery["properties"]["warn"], SCHEMAS["robot"])["x-dimension"] == "ratio"
 
 
 @pytest.mark.parametrize("kind", MAKERS)

@@ -24,6 +24,7 @@ from rbxcompose.missions.statuses import IDLE, NAMES
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.skills import python_skills
 from rbxcompose.sdk.skills import skill_names
+from rbxcompose.seeing.layout import NotDrawnError
 from rbxcompose.seeing.mission_graphs import mission_dot, mission_mermaid
 from rbxcompose.seeing.mission_html import mission_html
 from rbxcompose.seeing.mission_text import mission_text
@@ -69,9 +70,9 @@ def show(arguments: argparse.Namespace) -> int:
             if robot is None:
                 return FINDINGS
             picture = picture_of(mission_in(robot, arguments.name), robot.names)
-    except NotDoneError as error:
+        text = FORMATS[arguments.format](picture, statuses)
+    except (NotDoneError, NotDrawnError) as error:
         return refuse(error.finding)
-    text = FORMATS[arguments.format](picture, statuses)
     if arguments.out is None:
         tell(text.rstrip("\n"))
         return 0
