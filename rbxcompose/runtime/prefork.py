@@ -24,6 +24,7 @@ import setproctitle
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.channel import Channel
+from rbxcompose.runtime.folder import title
 from rbxcompose.runtime.log import LogFile
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.processes import Process, end_with
@@ -46,7 +47,7 @@ class Launch:
 
     def title(self, process: str) -> str:
         """Return the title under which `ps` of the system shows a process."""
-        return f"rbxcompose {self.plan.robot}: {process}"
+        return title(self.plan.robot, process)
 
     def output(self, process: str) -> Path:
         """Return the file that takes what a process prints."""

@@ -8,6 +8,7 @@ import select
 import signal
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,6 +48,23 @@ class Process:
     def is_stopped(self) -> bool:
         """Tell whether a signal has stopped it, so that it can hear no other but SIGKILL."""
         return self._state() in ("T", "t")
+
+    def is_titled(self, prefix: str) -> bool:
+        """Tell whether it is a process of this user whose title starts with `prefix`."""
+        folder = Path(f"/proc/{self.pid}")
+        try:
+            return folder.stat().st_uid == os.getuid() and folder.joinpath("cmdline").read_bytes().startswith(
+                prefix.encode()
+            )
+        except (OSError, ValueError):  # it has ended
+            return False
+
+    def holds_file_of(self, folder: Path) -> bool:
+        """Tell whether it has a file open that lies in `folder`, or lay there before it was removed."""
+        try:
+            return any(os.readlink(one).startswith(f"{folder}/") for one in Path(f"/proc/{self.pid}/fd").iterdir())
+        except OSError:  # it has ended, or closes one meanwhile
+            return False
 
     @property
     def usage(self) -> tuple[float, int] | None:
@@ -137,16 +155,11 @@ def boot_id() -> str:
 
 def titled(prefix: str) -> Iterator[Process]:
     """Yield the processes of this user whose title starts with `prefix`."""
-    for folder in Path("/proc").iterdir():
-        if not folder.name.isdigit():
-            continue
-        try:
-            if folder.stat().st_uid == os.getuid() and folder.joinpath("cmdline").read_bytes().startswith(
-                prefix.encode()
-            ):
-                yield Process.of(int(folder.name))
-        except (FileNotFoundError, ProcessLookupError):
-            continue  # it ended while we looked
+    for number in (folder.name for folder in Path("/proc").iterdir() if folder.name.isdigit()):
+        with suppress(ProcessLookupError):  # it ended while we looked
+            process = Process.of(int(number))
+            if process.is_titled(prefix):
+                yield process
 
 
 def describe_exit(status: int) -> str:

@@ -23,6 +23,7 @@ BASE = {
     "plain",
     "plugins",
     "qos",
+    "regular_files",
     "replacing",
     "restarts",
     "rules",

@@ -73,6 +73,7 @@ def test_a_stopped_process_that_was_left_behind_is_killed(
     child: subprocess.Popen[bytes], tmp_path: os.PathLike[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr(Process, "is_titled", lambda self, prefix: prefix == "rbxcompose toys: ")
     folder = RobotFolder.of("toys")
     folder.make()
     process = Process.of(child.pid)
@@ -81,3 +82,15 @@ def test_a_stopped_process_that_was_left_behind_is_killed(
     wait_until_stopped(process)
     assert end_leftovers(folder) == ["processes left behind were killed: robot"]
     assert not process.is_running
+
+
+def test_a_process_that_only_a_file_calls_ours_is_not_signalled(
+    child: subprocess.Popen[bytes], tmp_path: os.PathLike[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    folder = RobotFolder.of("evil")
+    folder.make()
+    process = Process.of(child.pid)
+    folder.write_state(State("evil", "", process, {"robot": process}, (), None, boot_id()))
+    assert end_leftovers(folder) == []
+    assert process.is_running
