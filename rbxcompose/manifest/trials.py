@@ -11,6 +11,7 @@ from rbxcompose.config import Config, Name, Time
 from rbxcompose.manifest.models import Header, TopicName
 
 TEST = "Test"
+LONGEST_TEST = 3600.0  # [s] of robot time
 
 
 def _given(value: bool) -> bool:
@@ -92,8 +93,8 @@ class Expect(Config):
 
     outcome: Name | None = None
     """How the mission ends: `success`, `failure`, an end of its own, or `running`, together with `for`."""
-    for_: Time | None = Field(None, gt=0, alias="for")
-    """How long it is watched."""
+    for_: Time | None = Field(None, gt=0, le=LONGEST_TEST, alias="for")
+    """How long it is watched, an hour at most."""
     steps: tuple[Any, ...] = ()
     """What is done, in this order; other steps may lie between."""
     never: tuple[Any, ...] = ()
