@@ -141,8 +141,7 @@ def near_misses(pattern: re.Pattern[Any]) -> Iterator[tuple[str, str, str]]:
     found = {(before[-60:], pump) for before, pump in starts(parser.parse(pattern.pattern, pattern.flags & ~re.DEBUG))}
     befores = {before for before, _ in found} | {f"{before}{pump}" for before, pump in found} | {""}
     pumps = {pump for _, pump in found if pump} | {" ", "a", "\n", "a ", "- "}
-    for before, pump, end in itertools.product(sorted(befores), sorted(pumps), ("\x00", "a:", "")):
-        yield before, pump, end
+    yield from itertools.product(sorted(befores), sorted(pumps), ("\x00", "a:", ""))
 
 
 def seconds(call: Callable[[Any], object], text: Any) -> float:
