@@ -26,10 +26,10 @@ from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, descri
 from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.requests import Requests
 from rbxcompose.runtime.silence import DEAD, LOOK
+from rbxcompose.runtime.watchdog import MARK
 from rbxcompose.scheduler import Scheduler
 
 _TAIL = 8000  # [B] of what a process printed that go into the log
-_HANG_MARK = "Timeout (0:00:"  # what the self-watchdog of a process prints before the place where it hung
 _LONGEST_WAIT = 60.0  # [s]
 _ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _OWNER = "supervisor"
@@ -228,7 +228,7 @@ class Supervisor:
         if child.descriptor is not None:
             os.close(child.descriptor)
         printed = self._printed(name)
-        how = "hung and ended itself" if _HANG_MARK in printed else how
+        how = "hung and ended itself" if MARK in printed else how
         if printed and self.conductor.is_going_down:
             self.log(Level.OK, f"process '{name}' {how}; what it had printed is in the log file", printed)
         self.conductor.exited(name, how, printed)
