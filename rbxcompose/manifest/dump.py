@@ -17,6 +17,7 @@ from rbxcompose.manifest.models import RobotManifest
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, Sequence
 from rbxcompose.manifest.validate import BROKEN
+from rbxcompose.plain import FORBIDDEN, escaped
 from rbxcompose.units import UNITS, Dimension, Quantity, UnitError, format_quantity, to_si
 
 Note = Callable[[Path, Node], str]
@@ -105,9 +106,9 @@ def _scalar(scalar: Scalar) -> str:
 
 
 def _text(text: str, plain: bool) -> str:
-    if plain and (not text or _PLAIN.fullmatch(text)):
+    if plain and (not text or (_PLAIN.fullmatch(text) and not FORBIDDEN.search(text))):
         return text
-    return json.dumps(text, ensure_ascii=False)
+    return escaped(json.dumps(text, ensure_ascii=False))
 
 
 def exact(value: float, dimension: Dimension) -> str:

@@ -27,7 +27,7 @@ from rbxcompose.runtime.channel import Channel
 from rbxcompose.runtime.folder import title
 from rbxcompose.runtime.log import LogFile
 from rbxcompose.runtime.options import RunOptions
-from rbxcompose.runtime.processes import Process, end_with
+from rbxcompose.runtime.processes import Process, end_with, give_back_large_memory
 from rbxcompose.sdk.registry import component_type
 
 ROUTER = "router"  # the process that is in no plan
@@ -149,6 +149,7 @@ def _run_parent(launch: Launch, connection: socket.socket, supervisor: int) -> N
     setproctitle.setproctitle(launch.title("parent"))
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _HELD_BACK)
+    give_back_large_memory()
     _import_what_is_common(launch.plan)
     gc.collect()
     gc.freeze()  # so that collections in the children do not copy these pages

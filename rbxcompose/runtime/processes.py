@@ -14,6 +14,8 @@ from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
+_M_MMAP_THRESHOLD = -3  # of mallopt(3)
+_LARGE = 1 << 20  # [B]
 _LIBC = ctypes.CDLL(None, use_errno=True)
 _STATE, _USER_TIME, _SYSTEM_TIME, _START_TIME, _RESIDENT = 0, 11, 12, 19, 21
 """Fields of /proc/<pid>/stat, counted after the last bracket."""
@@ -146,6 +148,14 @@ def adopt_orphans() -> None:
     """Become the parent of descendants whose own parent ends, so that they can be waited for."""
     if _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) != 0:
         raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER) failed")
+
+
+def give_back_large_memory() -> None:
+    """Have memory of large messages given back to the system when it is free, now and in all forked processes.
+
+    Else the C library takes the size of what was freed last for usual, and keeps as much.
+    """
+    _LIBC.mallopt(_M_MMAP_THRESHOLD, _LARGE)
 
 
 def boot_id() -> str:

@@ -112,6 +112,16 @@ def test_a_stop_cancels_the_goal_and_refuses_new_ones() -> None:
     assert [end.outcome for end in driver.ended] == [Outcome.CANCELED, Outcome.REJECTED]
 
 
+@pytest.mark.parametrize("x", [math.inf, math.nan, 1e300, -1e6])
+def test_a_goal_that_no_robot_can_reach_is_refused(x: float) -> None:
+    robot = bench()
+    driver = Driver(robot)
+    robot.advance(0.1)
+    driver.send(goal(x, 0.0))
+    robot.advance(0.1)
+    assert [end.outcome for end in driver.ended] == [Outcome.REJECTED]
+
+
 def test_charging_is_refused_away_from_the_dock_and_done_at_it() -> None:
     robot = bench()
     driver = Driver(robot)

@@ -94,3 +94,26 @@ def test_a_process_that_only_a_file_calls_ours_is_not_signalled(
     folder.write_state(State("evil", "", process, {"robot": process}, (), None, boot_id()))
     assert end_leftovers(folder) == []
     assert process.is_running
+
+
+ALLOCATES = """
+import sys
+from rbxcompose.runtime.processes import Process, give_back_large_memory
+import os
+
+if sys.argv[1] == "gives back":
+    give_back_large_memory()
+before = Process.of(os.getpid()).usage[1]
+for _ in range(4):
+    data = b"x" * 20_000_000
+    del data
+print(Process.of(os.getpid()).usage[1] - before)
+"""
+
+
+def test_memory_of_large_messages_is_given_back() -> None:
+    words = [sys.executable, "-c", ALLOCATES]
+    kept, given_back = (
+        int(subprocess.run([*words, mode], capture_output=True, check=True).stdout) for mode in ("keeps", "gives back")
+    )
+    assert given_back < 4_000_000 < kept
