@@ -32,6 +32,11 @@ def plain(text: str, limit: int = 200) -> str:
     return f"{shown}... ({len(text) - limit:,} more characters)" if len(text) > limit else shown
 
 
+def escaped(json: str) -> str:
+    """Return a JSON text, in whose strings nothing can move the cursor, hide or reorder text."""
+    return FORBIDDEN.sub(lambda match: f"\\u{ord(match.group()):04x}", json)
+
+
 def columns(text: str) -> int:
     """Return how many columns of a terminal a text takes."""
     return sum(map(_columns, text))

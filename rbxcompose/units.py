@@ -191,7 +191,7 @@ _OTHER_NAMES: Mapping[str, str] = {
     }.items()
     for name in names.split()
 }
-_QUANTITY = re.compile(rf"\s*([+-]?{NUMBER_TEXT})\s*(.*?)\s*", re.DOTALL)
+_QUANTITY = re.compile(rf"([+-]?{NUMBER_TEXT})\s*(.*)", re.DOTALL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,7 +246,7 @@ def parse_quantity(text: str) -> Quantity:
     Raises:
         UnitError: if the text is not a number with a unit of the list.
     """
-    match = _QUANTITY.fullmatch(text)
+    match = _QUANTITY.fullmatch(text.strip())
     if not match:
         raise UnitError("not a number with a unit, such as '0.3 m/s'")
     number, unit = match.groups()

@@ -14,6 +14,7 @@ from rbxcompose.bus.local import Node
 from rbxcompose.bus.names import ActionNames
 from rbxcompose.bus.services import Client, Services
 from rbxcompose.bus.topics import Subscription, Topics
+from rbxcompose.bus.transport import EXPIRED
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo
 from rbxcompose.msgs.types import Action, Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
@@ -61,7 +62,9 @@ class SentGoal(Generic[R]):
 
     def resulted(self, reply: Reply[Any]) -> None:
         """Hear how it ended."""
-        if reply.response is None:
+        if reply.error == EXPIRED:
+            self._client.ask_for_result(self)  # a goal may take longer than any question
+        elif reply.response is None:
             self._end(Ended(Outcome.LOST, message=reply.error))
         elif reply.response.status in OUTCOMES:
             self._end(Ended(OUTCOMES[reply.response.status], reply.response.result))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
+from rbxcompose.bus.allowance import Allowance
+from rbxcompose.bus.gate import BURST, GOALS
 from rbxcompose.bus.goals import Goal, Goals, GoalState
 from rbxcompose.bus.local import Node
 from rbxcompose.bus.names import ActionNames
@@ -15,6 +17,11 @@ from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.types import Action, Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
 from rbxcompose.qos import Qos
+from rbxcompose.scheduler import Event
+
+STATUS_PERIOD = 0.1  # [s] between two publications of the states of goals in a flood of them
+LOG_PERIOD = 1.0  # [s] between two lines of the log on a flood of goals
+LOG_BURST = 10.0  # [s]; as many lines as this would allow may come at once
 
 G = TypeVar("G", bound=Message)
 R = TypeVar("R", bound=Message)
@@ -76,12 +83,25 @@ class ActionServer(Generic[G, R, F]):
         self._process, self._owner = node.process, node.owner
         self._goals: Goals[G, R] = Goals()
         self._asked: dict[bytes, list[Request[Any, Any]]] = {}  # for the results of goals that have not ended
+        self._may_tell = Allowance(1 / STATUS_PERIOD, BURST)
+        self._will_tell: Event | None = None
+        self._may_log, self._unlogged = Allowance(1 / LOG_PERIOD, LOG_BURST), 0
+        self._will_log: Event | None = None
         self._feedback = Publisher(topics, node, names.feedback, action.FeedbackMessage, Qos.STATE)
         self._status = Publisher(topics, node, names.status, GoalStatusArray, Qos.LATCHED)
         self._servers: list[Server[Any, Any]] = [
-            Server(services, node, names.cancel_goal, CancelGoal, self._on_cancel),
+            Server(services, node, names.cancel_goal, CancelGoal, self._on_cancel, rate=GOALS),
             Server(services, node, names.get_result, action.GetResult, self._on_get_result),
-            Server(services, node, names.send_goal, action.SendGoal, self._on_send, self._on_client_left, waits=waits),
+            Server(
+                services,
+                node,
+                names.send_goal,
+                action.SendGoal,
+                self._on_send,
+                self._on_client_left,
+                waits=waits,
+                rate=GOALS,
+            ),
         ]
 
     def cancel_all(self) -> None:
@@ -110,7 +130,10 @@ class ActionServer(Generic[G, R, F]):
         if self._goals.current is not None:
             # Its client must not take this for the goal's own failure, so the result is not sent.
             self._goals.end(self._goals.current, GoalState.ABORTED, self._action.Result(), self._now)
-            self._tell_status()
+            self._publish_status()
+        for timer in (self._will_tell, self._will_log):
+            if timer is not None:
+                timer.cancel()
         self.current = None
         while self._servers:
             self._servers.pop().close()
@@ -122,7 +145,18 @@ class ActionServer(Generic[G, R, F]):
         return self._process.clock.now()
 
     def _log(self, text: str) -> None:
-        self._process.log(self._owner, f"{self._name}: {text}")
+        if self._may_log.takes(self._now):
+            self._process.log(self._owner, f"{self._name}: {text}")
+            return
+        self._unlogged += 1
+        if self._will_log is None:
+            due = self._process.scheduler.now + LOG_PERIOD
+            self._will_log = self._process.scheduler.at(due, self._owner, self._log_rest)
+
+    def _log_rest(self) -> None:
+        """Tell how much of a flood was not logged."""
+        self._process.log(self._owner, f"{self._name}: {self._unlogged} more goals were refused, aborted or replaced")
+        self._unlogged, self._will_log = 0, None
 
     def _on_send(self, request: Request[Any, Any]) -> None:
         response, id_ = self._action.SendGoal.Response, request.message.goal_id.uuid
@@ -171,6 +205,16 @@ class ActionServer(Generic[G, R, F]):
         request.reply(self._action.GetResult.Response(status=goal.state, result=goal.result))
 
     def _tell_status(self) -> None:
+        """Publish the states of all goals: at once, in a flood of goals soon."""
+        if self._will_tell is None:
+            if self._may_tell.takes(self._now):
+                self._publish_status()
+            else:
+                due = self._process.scheduler.now + STATUS_PERIOD
+                self._will_tell = self._process.scheduler.at(due, self._owner, self._publish_status)
+
+    def _publish_status(self) -> None:
+        self._will_tell = None
         statuses = (GoalStatus(goal_info=_info(goal), status=goal.state) for goal in self._goals)
         self._status(GoalStatusArray(status_list=tuple(statuses)))
 

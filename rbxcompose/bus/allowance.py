@@ -12,9 +12,9 @@ QUIET = 1.0  # [s] of silence after which a source makes room for another one
 class Allowance:
     """A token bucket: at most `rate` messages a second [Hz] in the long run."""
 
-    def __init__(self, rate: float) -> None:
+    def __init__(self, rate: float, burst: float = BURST) -> None:
         self.rate = rate
-        self._most = max(1.0, rate * BURST)
+        self._most = max(1.0, rate * burst)
         self._left = self._most
         self._filled = -math.inf
 
@@ -38,9 +38,9 @@ class Allowances:
     Beyond `MOST_SOURCES`, those that are new share one: else a name for each message would be a way around it.
     """
 
-    def __init__(self, rate: float) -> None:
-        self._rate = rate
-        self._strangers = Allowance(rate)
+    def __init__(self, rate: float, burst: float = BURST) -> None:
+        self._rate, self._burst = rate, burst
+        self._strangers = Allowance(rate, burst)
         self._own: dict[bytes, Allowance] = {}
 
     def takes(self, source: bytes, now: float) -> bool:
@@ -52,4 +52,4 @@ class Allowances:
             self._own = {name: one for name, one in self._own.items() if not one.is_quiet(now)}
         if len(self._own) >= MOST_SOURCES:
             return self._strangers
-        return self._own.setdefault(source, Allowance(self._rate))
+        return self._own.setdefault(source, Allowance(self._rate, self._burst))

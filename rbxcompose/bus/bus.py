@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from rbxcompose.bus.action_client import ActionClient
 from rbxcompose.bus.action_server import ActionServer
 from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import Node, Process
+from rbxcompose.bus.local import Node, Process, Refusing
 from rbxcompose.bus.orders import OrderPublisher
 from rbxcompose.bus.services import Client, Request, Server, Services
 from rbxcompose.bus.tokens import publishers_pattern
@@ -141,6 +141,11 @@ class Bus:
     def subscriptions(self) -> Sequence[Subscription[Any]]:
         """Return all that is subscribed to."""
         return list(self._topics.subscriptions)
+
+    @property
+    def gates(self) -> Sequence[Refusing]:
+        """Return where other processes ask."""
+        return list(self._process.gates)
 
     def watch_writers(self, owner: str) -> Writers:
         """Follow who publishes in other processes."""

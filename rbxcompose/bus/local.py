@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain, count
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from rbxcompose.bus.names import data_key, dds_type, resolve
+from rbxcompose.bus.refusals import Refusals
 from rbxcompose.bus.tokens import EntityKind, NodeToken, endpoint_pattern, gid
 from rbxcompose.bus.transport import Closable, Transport
 from rbxcompose.bus.wire import RosQos, WireProfile
@@ -47,6 +48,14 @@ class Registry(Generic[T]):
             del self._ends[route]
 
 
+class Refusing(Protocol):
+    """Where requests of other processes are refused: whose it is, its name, and how many."""
+
+    owner: str
+    name: str
+    refusals: Refusals
+
+
 @dataclass(frozen=True, slots=True)
 class Process:
     """What all ends of a process have in common."""
@@ -59,6 +68,7 @@ class Process:
     namespace: str  # empty, or with a leading slash
     log: Callable[[str, str], None]  # owner, text
     ids: count[int] = field(default_factory=count)
+    gates: dict[Refusing, None] = field(default_factory=dict)  # an ordered set
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,9 +41,9 @@ class Refusals:
         return {reason: number for reason, number in new.items() if number > 0}
 
 
-def sentence(topic: str, news: dict[Refusal, int]) -> str:
-    """Say what has been refused on a topic."""
+def sentence(name: str, news: dict[Refusal, int], what: str = "message") -> str:
+    """Say what has been refused on a topic, or at a service."""
     total = sum(news.values())
-    messages = "1 message was" if total == 1 else f"{total} messages were"
+    messages = f"1 {what} was" if total == 1 else f"{total} {what}s were"
     reasons = [reason if len(news) == 1 else f"{number} {reason}" for reason, number in news.items()]
-    return f"{messages} refused on {topic}: {', '.join(reasons)}"
+    return f"{messages} refused on {name}: {', '.join(reasons)}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from rbxcompose.bus.transport import Answer, Arrival, Closable, Question, RemotePublisher, Transport
+from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Arrival, Closable, Question, RemotePublisher, Transport
 from rbxcompose.qos import Qos
 
 RENEWED = "the session on the bus was opened anew"
@@ -67,12 +67,19 @@ class RenewableTransport:
         return self._keep(_Entry(self._entries, lambda transport: transport.serve(key, asked)))
 
     def ask(
-        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        answered: Callable[[Answer], None],
+        *,
+        of_all: bool = True,
+        within: float = LONGEST_WAIT,
     ) -> Closable:
         """Send a request. It is never sent twice: with its session gone, it ends with an error."""
 
         def declare(transport: Transport) -> Closable:
-            return transport.ask(key, payload, attachment, answered, of_all=of_all)
+            return transport.ask(key, payload, attachment, answered, of_all=of_all, within=within)
 
         request = _Request(self._entries, declare, answered)
         if self._transport is None:

@@ -11,6 +11,7 @@ from typing import Any, Generic, TypeVar
 
 from rbxcompose.bus.attachment import Attachment, decode_attachment
 from rbxcompose.bus.classes import SERVICE_QOS
+from rbxcompose.bus.gate import REQUESTS, Gate
 from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.local import Node, Registry
 from rbxcompose.bus.tokens import EntityKind, gid, session_of
@@ -85,8 +86,9 @@ class Server(Generic[Q, R]):
         client_left: Callable[[bytes], None] | None = None,
         *,
         waits: bool = False,
+        rate: float = REQUESTS,
     ) -> None:
-        """With `waits`, requests wait until the node is open."""
+        """With `waits`, requests wait until the node is open; of each asker elsewhere, `rate` [Hz] are taken."""
         endpoint = node.endpoint(EntityKind.SERVER, name, service, SERVICE_QOS)
         self.route = endpoint.route
         self.malformed = 0  # requests that could not be read
@@ -99,9 +101,8 @@ class Server(Generic[Q, R]):
         if waits:
             self._inbox.hold()
             node.when_open(self._inbox.go_on)
-        self._declared: list[Closable] = [
-            transport.serve(endpoint.key, lambda asked: self._inbox.put(asked, transport.wake))
-        ]
+        gate = Gate(node, endpoint.route[0], rate, lambda asked: self._inbox.put(asked, transport.wake))
+        self._declared: list[Closable] = [gate, transport.serve(endpoint.key, gate)]
         if client_left is not None:
             clients = node.peers(EntityKind.CLIENT, name, service)
             self._declared.append(transport.watch(clients, self._client_changed))

@@ -11,6 +11,9 @@ from typing import Protocol
 
 from rbxcompose.qos import Qos
 
+LONGEST_WAIT = 600.0  # [s] of real time for an answer; the transport keeps a little of each request for so long
+EXPIRED = "no answer in time"
+
 
 class Closable(Protocol):
     """Something that was declared and can be withdrawn."""
@@ -89,11 +92,18 @@ class Transport(Protocol):
         ...
 
     def ask(
-        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        answered: Callable[[Answer], None],
+        *,
+        of_all: bool = True,
+        within: float = LONGEST_WAIT,
     ) -> Closable:
         """Send a request. An answer or an error comes once the server has one or is gone; closing forgets it.
 
-        Unless it is asked `of_all` servers, the nearest gets it.
+        Unless it is asked `of_all` servers, the nearest gets it. After `within` [s] of real time it is `EXPIRED`.
         """
         ...
 
@@ -133,7 +143,14 @@ class Nowhere:
         return self
 
     def ask(
-        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        answered: Callable[[Answer], None],
+        *,
+        of_all: bool = True,
+        within: float = LONGEST_WAIT,
     ) -> Nowhere:
         """Refuse: no token of a server was ever seen."""
         raise RuntimeError(f"no server of {key} can be reached")

@@ -11,9 +11,10 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
+from rbxcompose.bus.gate import QUESTIONS, Gate
 from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.local import Node
-from rbxcompose.bus.transport import Question
+from rbxcompose.bus.transport import Closable, Question
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Refused
 
@@ -32,7 +33,8 @@ class Window:
         self._asked_at: float | None = None  # [s]
         self._remote = transport.publisher(key, Qos.STATE)  # a viewer that is slow must not hold us up
         inbox: Inbox[Question] = Inbox(node.owner, None, self._asked, process.scheduler.post)
-        self._server = transport.serve(key, lambda question: inbox.put(question, transport.wake))
+        gate = Gate(node, key, QUESTIONS, lambda question: inbox.put(question, transport.wake))
+        self._declared: list[Closable] = [gate, transport.serve(key, gate), self._remote]
 
     @property
     def is_watched(self) -> bool:
@@ -48,8 +50,8 @@ class Window:
 
     def close(self) -> None:
         """Withdraw it."""
-        self._server.close()
-        self._remote.close()
+        for one in self._declared:
+            one.close()
 
     def _asked(self, question: Question) -> None:
         self._asked_at = self._clock.now()

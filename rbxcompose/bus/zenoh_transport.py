@@ -12,11 +12,11 @@ from zenoh.handlers import Callback
 from rbxcompose.bus.classes import SERVICE_SENDING, Sending, sending
 from rbxcompose.bus.inbox import Post
 from rbxcompose.bus.threads import keep_attached
-from rbxcompose.bus.transport import Answer, Arrival, Closable, Question, RemotePublisher
+from rbxcompose.bus.transport import EXPIRED, LONGEST_WAIT, Answer, Arrival, Closable, Question, RemotePublisher
 from rbxcompose.qos import Qos
 
 HEARTBEAT = 0.5  # [s] after a latched message, its sequence number is told again
-FOREVER = 1e9  # [s]; requests have deadlines in robot time, of which Zenoh knows nothing
+ZENOH_EXPIRED = "Timeout"  # what Zenoh answers in the place of a server
 GONE = "the server went away"
 
 
@@ -71,7 +71,14 @@ class ZenohTransport:
         )
 
     def ask(
-        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        answered: Callable[[Answer], None],
+        *,
+        of_all: bool = True,
+        within: float = LONGEST_WAIT,
     ) -> Closable:
         """Send a request. An answer or an error comes once the server has one or is gone; closing forgets it."""
         token = zenoh.CancellationToken()
@@ -84,7 +91,7 @@ class ZenohTransport:
             attachment=attachment,
             target=zenoh.QueryTarget.ALL_COMPLETE if of_all else zenoh.QueryTarget.BEST_MATCHING,
             consolidation=zenoh.ConsolidationMode.NONE,
-            timeout=FOREVER,
+            timeout=within,  # Zenoh keeps some 800 B of each query until then, also of one that was answered
             cancellation_token=token,
             **_options(SERVICE_SENDING, "reliability"),
         )
@@ -202,7 +209,8 @@ class _Asked:
 def _answer(reply: zenoh.Reply) -> Answer:
     if reply.ok is not None:
         return Answer(reply.ok.payload.to_bytes())
-    return Answer(error=reply.err.payload.to_string() if reply.err is not None else GONE)
+    error = reply.err.payload.to_string() if reply.err is not None else GONE
+    return Answer(error=EXPIRED if error == ZENOH_EXPIRED else error)
 
 
 def _direct(callback: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Callback[Any]:

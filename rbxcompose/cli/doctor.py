@@ -17,7 +17,7 @@ from rbxcompose.cli.bus.guest import Guest, Heard
 from rbxcompose.cli.bus.messages import to_json
 from rbxcompose.cli.bus.place import place_of
 from rbxcompose.cli.output.console import FINDINGS, has_colour, refuse, tell, tell_report
-from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, find_robot
+from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, find_robot, robots_up
 from rbxcompose.compiler import compile_robot
 from rbxcompose.doctor import machine
 from rbxcompose.doctor.examining import Answer, examine_all, has_errors
@@ -26,7 +26,7 @@ from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.model.robot import Robot
 from rbxcompose.rendering.text import render_text
-from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, all_folders, base_folder
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, base_folder
 
 _LISTENING = 1.0  # [s] to messages, for their stamps
 _NANOSECONDS = 1e9
@@ -73,7 +73,7 @@ def _meant(wanted: str | None) -> tuple[list[RobotFolder], str | None]:
         NotDoneError: if what is wanted is neither.
     """
     if wanted is None:
-        return all_folders(), None
+        return robots_up(), None
     try:
         return [find_robot(wanted)], None
     except NotDoneError:

@@ -8,9 +8,9 @@ import json
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.robots.lookup import NO_ANSWER, NotDoneError, add_robot_option, find_robot, known_state
 from rbxcompose.requests import Refused
-from rbxcompose.runtime.control import NoAnswerError, ask
+from rbxcompose.runtime.control import NoAnswerError, ask, supervisor_of
 from rbxcompose.runtime.folder import RobotFolder
-from rbxcompose.runtime.processes import wait_until_ended
+from rbxcompose.runtime.processes import Process, wait_until_ended
 from rbxcompose.runtime.requests import BringDown
 from rbxcompose.runtime.supervision.leftovers import end_leftovers, kill_supervisor
 
@@ -47,19 +47,23 @@ def _end(folder: RobotFolder) -> list[str]:
     Raises:
         NotDoneError: if someone else holds the robot and cannot be found.
     """
-    state = known_state(folder)
     told: list[str] = []
-    if state is not None and state.is_supervised:
-        if not state.supervisor.is_stopped and _asked(folder) and not wait_until_ended([state.supervisor], _ORDERLY):
+    if (supervisor := _supervisor(folder)) is not None:
+        if not supervisor.is_stopped and _asked(folder) and not wait_until_ended([supervisor], _ORDERLY):
             return told
         told.append("the supervisor did not answer and was killed")
-        kill_supervisor(state.supervisor)
+        kill_supervisor(supervisor)
     lock = folder.lock()
     if lock is None:
         raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' is held by a process that cannot be found"))
     told += end_leftovers(folder)
     folder.clear()
     return told
+
+
+def _supervisor(folder: RobotFolder) -> Process | None:
+    state = known_state(folder)
+    return state.supervisor if state is not None and state.is_supervised else supervisor_of(folder)
 
 
 def _asked(folder: RobotFolder) -> bool:

@@ -12,6 +12,7 @@ import json
 from rbxcompose.cli.output.console import FINDINGS, tell, tell_report
 from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
+from rbxcompose.plain import escaped
 from rbxcompose.seeing.expand import expand, expand_data
 
 
@@ -30,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     if compilation.robot is not None:
         manifest = compilation.robot.manifest
         if arguments.json:
-            tell(json.dumps(expand_data(manifest), indent=2, ensure_ascii=False))
+            tell(escaped(json.dumps(expand_data(manifest), indent=2, ensure_ascii=False)))
         else:
             tell(expand(manifest, has_origins=not arguments.no_origins).rstrip("\n"))
     return FINDINGS if compilation.report.has_errors else 0

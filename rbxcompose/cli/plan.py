@@ -17,6 +17,7 @@ from rbxcompose.manifest.limits import ALL_BYTES
 from rbxcompose.plan.diff import difference
 from rbxcompose.plan.dump import PlanTextError, dump, load
 from rbxcompose.plan.model import Plan
+from rbxcompose.regular_files import read_regular
 from rbxcompose.seeing.plan_text import plan_text
 
 NO_PLAN = kind(
@@ -72,11 +73,7 @@ def _other(written: str, arguments: argparse.Namespace) -> Plan | Finding | None
     if not written.endswith(SAVED):
         return _compiled(written, arguments, is_layered=False)
     try:
-        with Path(written).open("rb") as file:
-            text = file.read(ALL_BYTES + 1)
-        if len(text) > ALL_BYTES:
-            return NO_PLAN.at(None, f"'{written}' is larger than {ALL_BYTES:,} bytes")
-        return load(text.decode("utf-8"))
+        return load(read_regular(Path(written), ALL_BYTES).decode("utf-8"))
     except (OSError, UnicodeDecodeError, PlanTextError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         return NO_PLAN.at(None, f"'{written}' cannot be read as a plan: {reason}")

@@ -42,6 +42,7 @@ from rbxcompose.recording.reader import NotARecordingError, RecordingReader
 from rbxcompose.recording.schedule import playlist
 from rbxcompose.recording.summary import Summary, summary_of
 from rbxcompose.recording.topics import Selection, Topic, by_name, is_replayable
+from rbxcompose.regular_files import NotRegularError, open_regular
 
 _PAUSE = 0.05  # [s] before a recording begins anew
 
@@ -112,10 +113,10 @@ def _look_through(path: Path) -> Summary:
 @contextmanager
 def _opened(path: Path) -> Iterator[RecordingReader]:
     try:
-        if path.exists() and not path.is_file():
-            raise NotARecordingError("it is no file")
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             yield RecordingReader(file)
+    except NotRegularError as error:
+        raise NotDoneError(UNREADABLE.at(None, f"'{plain(str(path))}' is no recording: it is no file")) from error
     except OSError as error:
         reason = plain(error.strerror or str(error))
         raise NotDoneError(UNREADABLE.at(None, f"'{plain(str(path))}' cannot be read: {reason}")) from error

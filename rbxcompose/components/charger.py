@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from pydantic import Field
 
 from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
@@ -25,6 +27,7 @@ from rbxcompose.sdk import (
 
 FULL = 100.0  # [%]
 NEARLY_FULL = 99.0  # [%] from here on a level counts as full: the battery drains while it is told
+PATIENCE = 10.0  # [s] for the battery to tell its level
 
 
 class ChargerConfig(Config):
@@ -59,7 +62,9 @@ class Charger(Component[ChargerConfig]):
     def configure(self) -> None:
         """Nothing is being charged."""
         self.charging: object = None  # the goal for which the level was set
-        self.is_full = False
+        self.deadline = 0.0  # [s] of robot time
+        self.is_set = False  # the battery has answered that it is full
+        self.is_full = False  # and has told a level since, however much has drained meanwhile
         self.error = ""
 
     def accept_recharge(self, goal: Recharge.Goal) -> str:
@@ -73,24 +78,28 @@ class Charger(Component[ChargerConfig]):
         return ""
 
     def on_battery_level(self, message: Float32) -> None:
-        """See whether the battery is full."""
-        self.is_full = message.data >= NEARLY_FULL
+        """See whether the battery is full, or has been since the goal came."""
+        self.is_full = self.is_full or self.is_set or message.data >= NEARLY_FULL
 
     def step(self, dt: float) -> None:
-        """Carry the goal on: set the level, then wait until a full one was published."""
+        """Carry the goal on: set the level, then wait until the battery has told it."""
         goal = self.recharge.current
         if goal is None:
             return
         if goal.cancel_requested:
             goal.canceled()
         elif goal is not self.charging:
-            self.charging, self.is_full, self.error = goal, False, ""
-            self.set_battery_level(SetBatteryLevel.Request(value=FULL), self.answered)
+            self.charging, self.deadline = goal, self.now + PATIENCE
+            self.is_set, self.is_full, self.error = False, False, ""
+            self.set_battery_level(SetBatteryLevel.Request(value=FULL), partial(self.answered, goal))
         elif self.error:
             goal.aborted(self.error)
         elif self.is_full and self.battery_level.value is not None:
             goal.succeeded(Recharge.Result(level=self.battery_level.value.data))
+        elif self.now >= self.deadline:
+            goal.aborted(f"the battery told no level for {PATIENCE:.0f} s")
 
-    def answered(self, reply: Reply[SetBatteryLevel.Response]) -> None:
-        """Take the battery's answer."""
-        self.error = reply.error
+    def answered(self, goal: object, reply: Reply[SetBatteryLevel.Response]) -> None:
+        """Take the battery's answer, unless it is about a goal that has ended."""
+        if goal is self.charging:
+            self.error, self.is_set = reply.error, not reply.error

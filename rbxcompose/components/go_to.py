@@ -31,6 +31,7 @@ from rbxcompose.sdk import (
 )
 
 MAP = "map"
+FARTHEST = 100_000.0  # [m] from the origin; no map is as large
 
 
 class GoToConfig(Config):
@@ -80,7 +81,9 @@ class GoTo(Component[GoToConfig]):
         frame, at = goal.pose.header.frame_id, goal.pose.pose.position
         if frame not in ("", MAP):
             return f"a goal must be given in '{MAP}', not in '{frame}'"
-        return "" if math.isfinite(at.x) and math.isfinite(at.y) else "the goal is not a finite pose"
+        if not (math.isfinite(at.x) and math.isfinite(at.y)):
+            return "the goal is not a finite pose"
+        return "" if math.hypot(at.x, at.y) <= FARTHEST else f"the goal is farther than {FARTHEST / 1000:g} km away"
 
     def step(self, dt: float) -> None:
         """Drive on towards the goal."""

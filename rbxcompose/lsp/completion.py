@@ -20,7 +20,7 @@ from rbxcompose.units import NUMBER_TEXT, Dimension
 _FILL = re.compile(r"\$\{\s*([A-Za-z0-9_.]*)$")
 _VARIABLE = re.compile(r"\$([A-Za-z0-9_]*)$")
 _WORD_CHARACTERS = f"{string.ascii_letters}{string.digits}_."
-_QUANTITY = re.compile(rf"\s*[+-]?{NUMBER_TEXT}(?P<space>\s*)(?P<unit>[A-Za-z%/^0-9]*)")
+_QUANTITY = re.compile(rf"\s*[+-]?{NUMBER_TEXT}(?P<space>\s*)(?P<unit>(?:[A-Za-z%/^][A-Za-z%/^0-9]*)?)")
 
 
 @dataclass(frozen=True, slots=True)

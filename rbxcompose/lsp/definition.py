@@ -14,7 +14,7 @@ from rbxcompose.manifest.tree import Path, at, key_span
 from rbxcompose.references import COMPONENT, FILE, PLACE, PORT, RUNNING
 from rbxcompose.sections.args import args
 
-_FRONT = re.compile(r"(\$\{?\s*)?[A-Za-z0-9_.]*$")
+_FRONT = re.compile(r"[A-Za-z0-9_.]*+(\s*+\{?\$)?+")  # read backwards from the position
 _BACK = re.compile(r"[A-Za-z0-9_.]*")
 _SERVING = ("serves_action", "serves", "serves_topic")  # kinds of ports that are skills
 
@@ -30,8 +30,8 @@ def define(document: Document, line: int, column: int) -> Span | None:
 
 def word_at(spot: Spot) -> str:
     """Return the name at a position, with `$` or `${` before it."""
-    front, back = _FRONT.search(spot.cursor.before), _BACK.match(spot.cursor.after)
-    return f"{front[0] if front else ''}{back[0] if back else ''}"
+    front, back = _FRONT.match(spot.cursor.before[::-1]), _BACK.match(spot.cursor.after)
+    return f"{front[0][::-1] if front else ''}{back[0] if back else ''}"
 
 
 def _here(spot: Spot, span: Span) -> Span:

@@ -19,6 +19,7 @@ from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.section import ROBOT
 from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar, Sequence
 from rbxcompose.manifest.validate import to_plain
+from rbxcompose.plain import FORBIDDEN, escaped
 from rbxcompose.references import FILE
 from rbxcompose.units import UNITS, Dimension, Quantity, UnitError, format_quantity, to_si
 
@@ -110,9 +111,9 @@ def _scalar(scalar: Scalar) -> str:
 
 
 def _text(text: str, plain: bool) -> str:
-    if plain and (not text or _PLAIN.fullmatch(text)):
+    if plain and (not text or (_PLAIN.fullmatch(text) and not FORBIDDEN.search(text))):
         return text
-    return json.dumps(text, ensure_ascii=False)
+    return escaped(json.dumps(text, ensure_ascii=False))
 
 
 def exact(value: float, dimension: Dimension) -> str:

@@ -82,6 +82,8 @@ def _absolute(written: str, folder: Path) -> Path | None:
 
 
 def _missing(written: str, path: Path, span: Span | None, writer: Path | None = None) -> Finding:
+    if os.path.lexists(path):  # a pipe, a device, a link to what is not there
+        return UNREADABLE.at(span, f"'{plain(written)}' is no regular file")
     if writer is not None and (namesakes := files_named(path.name, writer)):
         message, help_text = f"'{plain(written)}' does not exist", " or ".join(f"'{one}'" for one in namesakes)
         return UNREADABLE.at(span, message, help=f"did you mean {help_text}?")

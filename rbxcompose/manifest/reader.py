@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import stat
 from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from rbxcompose.manifest.tree import Node
 from rbxcompose.manifest.trouble import NOT_YAML
 from rbxcompose.manifest.walk import CHARACTER, Walk
 from rbxcompose.plain import FORBIDDEN, code_point
+from rbxcompose.regular_files import NotRegularError, open_regular
 
 NOT_UTF8 = kind(
     "RBX1111",
@@ -101,11 +101,10 @@ def _bytes(path: Path, shown: str, sources: MutableMapping[str, str], most: int,
 
 def _saved(path: Path, shown: str, most: int) -> bytes | Finding:
     try:
-        # A pipe without a writer must not hold us up, hence O_NONBLOCK before we know what it is.
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                return UNREADABLE.at(None, f"'{shown}' is no regular file")
+        with open_regular(path) as file:
             return file.read(most + 1)
+    except NotRegularError:
+        return UNREADABLE.at(None, f"'{shown}' is no regular file")
     except OSError as error:
         is_missing = error.errno == errno.ENOENT
         reason = "does not exist" if is_missing else f"cannot be read: {os.strerror(error.errno or 0)}"

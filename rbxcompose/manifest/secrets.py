@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rbxcompose.config import Secret
 from rbxcompose.manifest.limits import SECRET
+from rbxcompose.regular_files import NotRegularError, open_regular
 
 FOLDER = "secrets"
 VARIABLE = "RBX_SECRET_"
@@ -44,15 +45,14 @@ class Secrets:
     def _read(self, name: str) -> str:
         shown = f"{FOLDER}/{name}"
         try:
-            # O_NOFOLLOW: a link could lead anywhere. O_NONBLOCK: a pipe without a writer must not hold us up.
-            flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-            with open(os.open(self.project / FOLDER / name, flags), "rb") as file:
+            with open_regular(self.project / FOLDER / name, follow=False) as file:  # a link could lead anywhere
                 status = os.fstat(file.fileno())
-                if not stat.S_ISREG(status.st_mode):
-                    raise NoSecretError(f"'{shown}' is no regular file", f"put the secret into the file '{shown}'")
                 if stat.S_IMODE(status.st_mode) & 0o077 or status.st_uid != os.getuid():
                     raise NoSecretError(f"others may read the secret in '{shown}'", f"chmod 600 {shown}")
                 data = file.read(SECRET + 1)
+        except NotRegularError:
+            message = f"'{shown}' is no regular file"
+            raise NoSecretError(message, f"put the secret into the file '{shown}'") from None
         except OSError as error:
             is_missing = error.errno in (errno.ENOENT, errno.ENOTDIR)
             reason = "does not exist" if is_missing else f"cannot be read: {os.strerror(error.errno or 0)}"

@@ -12,6 +12,7 @@ from rbxcompose.manifest.fields import TopicName
 from rbxcompose.manifest.header import Header
 
 TEST = "Test"
+LONGEST_TEST = 3600.0  # [s] of robot time
 
 
 def _given(value: bool) -> bool:
@@ -93,8 +94,8 @@ class Expect(Config):
 
     outcome: Name | None = None
     """How the mission ends: `success`, `failure`, an end of its own, or `running`, together with `for`."""
-    for_: Time | None = Field(None, gt=0, alias="for")
-    """How long it is watched."""
+    for_: Time | None = Field(None, gt=0, le=LONGEST_TEST, alias="for")
+    """How long it is watched, an hour at most."""
     steps: tuple[Any, ...] = ()
     """What is done, in this order; other steps may lie between."""
     never: tuple[Any, ...] = ()

@@ -15,6 +15,7 @@ from typing import IO
 from rbxcompose.plain import plain
 from rbxcompose.recording.reader import NotARecordingError
 from rbxcompose.recording.recovery import recover
+from rbxcompose.regular_files import open_regular
 from rbxcompose.replacing import sync_folder
 
 ENDING, PART = ".mcap", ".part"
@@ -72,8 +73,7 @@ def recover_all(folder: Path) -> Iterator[Recovered]:
     for part in sorted(folder.glob(f"*{ENDING}{PART}")):
         path = part.with_name(part.name.removesuffix(PART))
         try:
-            descriptor = os.open(part, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-            with open(descriptor, "rb") as file:
+            with open_regular(part, follow=False) as file:
                 if _is_ours(file, part):
                     yield Recovered(path, _recover(file, part, path))
         except (OSError, NotARecordingError) as error:

@@ -13,7 +13,7 @@ from dataclasses import replace
 from rbxcompose.bus.attachment import decode_attachment
 from rbxcompose.bus.names import ADMIN
 from rbxcompose.bus.tokens import EndpointToken, gid, parse_token
-from rbxcompose.bus.transport import Answer, Arrival, Closable, Question, RemotePublisher, Transport
+from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Arrival, Closable, Question, RemotePublisher, Transport
 from rbxcompose.bus.witness import Call
 from rbxcompose.clock import NANOSECONDS, Clock
 from rbxcompose.msgs.cdr import encode
@@ -107,9 +107,16 @@ class _Taped:
         return self._inner.serve(key, asked)
 
     def ask(
-        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        answered: Callable[[Answer], None],
+        *,
+        of_all: bool = True,
+        within: float = LONGEST_WAIT,
     ) -> Closable:
-        return self._inner.ask(key, payload, attachment, answered, of_all=of_all)
+        return self._inner.ask(key, payload, attachment, answered, of_all=of_all, within=within)
 
     def announce(self, token: str) -> Closable:
         self._tape.announced(token)

@@ -21,7 +21,7 @@ _TYPE = re.compile(r"\w+/(msg|srv|action)/\w+", re.ASCII)
 _HASH = re.compile(r"\w{1,100}", re.ASCII)
 _QOS = re.compile(r"(?P<reliability>\d?):(?P<durability>\d?):(?P<history>\d?),(?P<depth>\d{0,9}):.*")
 _FOREVER = "{sec: 9223372036, nsec: 854775807}"  # how ROS writes that there is no limit
-_IS_LATCHED = re.compile(r"^[\s-]*durability: *(1|transient_local)\s*$", re.MULTILINE)
+_IS_LATCHED = re.compile(r"^[ \t-]*+durability: *+(1|transient_local)[ \t\r]*+$", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from typing import TypeVar
 from rbxcompose.bus.attachment import Attachment, decode_attachment
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.topics import Publisher
-from rbxcompose.bus.transport import Answer, Arrival, Nowhere, Question
+from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Arrival, Nowhere, Question
 from rbxcompose.clock import Clock
 from rbxcompose.msgs.types import Message
 from rbxcompose.plan.model import Plan
@@ -60,7 +60,14 @@ class Stage(Nowhere):
         return self
 
     def ask(
-        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        answered: Callable[[Answer], None],
+        *,
+        of_all: bool = True,
+        within: float = LONGEST_WAIT,
     ) -> Nowhere:
         """Wait for the reply that was recorded."""
         source = decode_attachment(attachment)

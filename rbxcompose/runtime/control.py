@@ -18,6 +18,7 @@ from typing import TypeVar
 
 from rbxcompose.requests import Refused, Request, requests
 from rbxcompose.runtime.folder import SOCKET, RobotFolder
+from rbxcompose.runtime.processes import Process
 from rbxcompose.typed_json import UnreadableError, from_data
 
 A = TypeVar("A")
@@ -55,14 +56,31 @@ class ControlServer:
         """Open the door; `handle` is to be set before the next request is read."""
         self.handle: Handle = lambda request, number: self.refuse(number, "nobody is here")
         self._selector = selector
+        self._folder = folder
         self._connections: dict[int, tuple[socket.socket, bytearray]] = {}
         self._count = 0
-        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._listener.setblocking(False)
-        with _short_address(folder.path) as address:
-            self._listener.bind(address)
-        self._listener.listen(_BACKLOG)
-        selector.register(self._listener, selectors.EVENT_READ, self._accept)
+        self._listener = self._listen()
+
+    def open_again(self) -> None:
+        """Open the door where it was, if its file has gone."""
+        if not (self._folder.path / SOCKET).exists():
+            listener = self._listen()
+            self._selector.unregister(self._listener)
+            self._listener.close()
+            self._listener = listener
+
+    def _listen(self) -> socket.socket:
+        listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            listener.setblocking(False)
+            with _short_address(self._folder.path) as address:
+                listener.bind(address)
+            listener.listen(_BACKLOG)
+        except OSError:
+            listener.close()
+            raise
+        self._selector.register(listener, selectors.EVENT_READ, self._accept)
+        return listener
 
     def answer(self, number: int, answer: object) -> None:
         """Answer a request."""
@@ -132,6 +150,23 @@ class ControlServer:
         connection, _ = self._connections.pop(number)
         self._selector.unregister(connection)
         connection.close()
+
+
+def supervisor_of(folder: RobotFolder) -> Process | None:
+    """Return the process of this user that listens at the control socket, also if it is suspended; None if none does.
+
+    The kernel tells who that is: no file has to be believed.
+    """
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
+        connection.settimeout(ANSWER)
+        try:
+            with _short_address(folder.path) as address:
+                connection.connect(address)
+            credentials = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+            pid, uid, _ = _CREDENTIALS.unpack(credentials)
+            return Process.of(pid) if uid == os.getuid() else None
+        except OSError:  # nobody is there, or not any more
+            return None
 
 
 def _micros(seconds: float) -> int:

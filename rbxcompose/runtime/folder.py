@@ -8,10 +8,13 @@ import json
 import os
 import stat
 import tempfile
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rbxcompose.plan.model import Plan
+from rbxcompose.regular_files import open_regular
 from rbxcompose.replacing import TEMPORARY, replace_file
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.typed_json import UnreadableError, from_data, to_data
@@ -19,6 +22,8 @@ from rbxcompose.typed_json import UnreadableError, from_data, to_data
 STATE, LOCK, SOCKET = "state.json", "lock", "control.sock"
 _VERSION = 1
 _PASSING = (STATE, SOCKET, LOCK)  # what goes when the robot is down; the log stays
+_LARGEST = 16_000_000  # [B] of a state
+_LOCK_TRIES, _LOOKING = 5, 0.01  # who looks whether the lock is held holds it for a moment [s]
 
 
 SUSPENDED = "suspended"
@@ -96,16 +101,28 @@ class RobotState:
             raise BrokenStateError(f"another version of rbxcompose wrote it: {error}") from error
         return state
 
+    @classmethod
+    def beginning(cls, plan: Plan) -> RobotState:
+        """Return the state of a robot that this process is about to start."""
+        return cls(plan.robot, os.path.realpath(plan.file), Process.of(os.getpid()), {}, (), boot=boot_id())
+
     def alive(self) -> dict[str, Process]:
         """Return those of its processes that still run, by name, without the supervisor."""
-        if self.boot != boot_id():
-            return {}
-        return {name: process for name, process in self.processes.items() if process.is_running}
+        return {name: process for name, process in self.processes.items() if self._is_ours(process)}
 
     @property
     def is_supervised(self) -> bool:
         """Tell whether the supervisor still runs."""
-        return self.boot == boot_id() and self.supervisor.is_running
+        return self._is_ours(self.supervisor)
+
+    def _is_ours(self, process: Process) -> bool:
+        # A file alone must not decide whom `down` ends: the process has to call itself one of this robot.
+        return self.boot == boot_id() and process.is_running and process.is_titled(title(self.robot))
+
+
+def title(robot: str, process: str = "") -> str:
+    """Return what the system's `ps` shows of a process of a robot; without its name, how those of all begin."""
+    return f"rbxcompose {robot}: {process}"
 
 
 def _checksum(body: str) -> str:
@@ -119,10 +136,34 @@ def base_folder() -> Path:
 
 
 def all_folders() -> list[RobotFolder]:
-    """Return the folders of all robots that are up or were left behind, by name."""
+    """Return the folders of all robots that are up or were left behind, by name.
+
+    Raises:
+        UnsafeFolderError: if the folder above them is somebody else's or open to others.
+    """
     base = base_folder()
-    names = sorted(path.parent.name for path in base.glob(f"*/{STATE}")) if base.is_dir() else []
-    return [RobotFolder(base / name) for name in names]
+    try:
+        _require_private(base)
+    except FileNotFoundError:
+        return []
+    # Any of these files may have been removed under a robot that runs.
+    names = {path.parent.name for mark in _PASSING for path in base.glob(f"*/{mark}")}
+    return [folder for name in sorted(names) if (folder := RobotFolder(base / name)).is_known]
+
+
+def _require_private(folder: Path) -> None:
+    """Refuse a folder that others could have put something into.
+
+    Raises:
+        FileNotFoundError: if it does not exist.
+        UnsafeFolderError: if it is somebody else's, open to others, or no folder.
+    """
+    try:
+        found = os.lstat(folder)
+    except PermissionError as error:
+        raise UnsafeFolderError(f"{folder} cannot be looked into: it is somebody else's") from error
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) & 0o077:
+        raise UnsafeFolderError(f"{folder} must be a folder of this user that nobody else can open (mode 0700)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,19 +185,50 @@ class RobotFolder:
         """
         for folder in (self.path.parent, self.path):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            found = os.lstat(folder)
-            if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) & 0o077:
-                raise UnsafeFolderError(f"{folder} must be a folder of this user that nobody else can open (mode 0700)")
+            _require_private(folder)
+
+    @property
+    def is_known(self) -> bool:
+        """Tell whether a robot is up here or has left its state behind."""
+        return (self.path / STATE).exists() or self.is_held
+
+    @property
+    def is_held(self) -> bool:
+        """Tell whether somebody holds the lock."""
+        try:
+            descriptor = os.open(self.path / LOCK, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+        except OSError:
+            return False
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        finally:
+            os.close(descriptor)
+        return False
+
+    def has_lost(self, lock: int) -> bool:
+        """Tell whether somebody has removed files of a robot that runs and holds `lock`."""
+        return self.has_lost_lock(lock) or not all((self.path / name).exists() for name in (STATE, SOCKET))
+
+    def has_lost_lock(self, lock: int) -> bool:
+        """Tell whether the lock that is held is no longer the one that others would try to hold."""
+        return not self._is_current(lock)
 
     def lock(self) -> int | None:
         """Return a descriptor that holds the lock until it is closed, or None if someone else holds it."""
+        tries = _LOCK_TRIES
         while True:
             descriptor = os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 os.close(descriptor)
-                return None
+                tries -= 1
+                if not tries:
+                    return None
+                time.sleep(_LOOKING)
+                continue
             if self._is_current(descriptor):
                 return descriptor
             os.close(descriptor)  # it was removed by who held it before
@@ -171,12 +243,23 @@ class RobotFolder:
         """Return the state, or None if there is none.
 
         Raises:
-            BrokenStateError: if the file is not what was written.
+            BrokenStateError: if the file is not what was written, or somebody else may have written it.
         """
         try:
-            return RobotState.from_text((self.path / STATE).read_text(encoding="utf-8"))
+            file = open_regular(self.path / STATE, follow=False)
         except FileNotFoundError:
             return None
+        except OSError as error:
+            raise BrokenStateError(error.strerror) from error
+        with file:
+            found = os.fstat(file.fileno())
+            if found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) & 0o077:
+                raise BrokenStateError("somebody else may have written it")
+            text = file.read(_LARGEST)  # a file that is cut off here has another checksum
+        try:
+            return RobotState.from_text(text.decode())
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            raise error if isinstance(error, BrokenStateError) else BrokenStateError("it has another form") from error
 
     def write_state(self, state: RobotState) -> None:
         """Replace the state file: whole or not at all, whatever happens meanwhile."""

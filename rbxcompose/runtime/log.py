@@ -50,7 +50,8 @@ class LogFile:
         line = record.to_json().encode(errors="backslashreplace") + b"\n"
         line = b"\n" + line if self._is_torn else line
         try:
-            if os.fstat(self._descriptor).st_size >= self._largest:
+            found = os.fstat(self._descriptor)
+            if found.st_size >= self._largest or not found.st_nlink:  # or somebody has removed it
                 self._go_on()
             written = os.write(self._descriptor, line)
         except OSError:

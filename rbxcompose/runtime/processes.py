@@ -8,11 +8,14 @@ import select
 import signal
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
+_M_MMAP_THRESHOLD = -3  # of mallopt(3)
+_LARGE = 1 << 20  # [B]
 _LIBC = ctypes.CDLL(None, use_errno=True)
 _STATE, _USER_TIME, _SYSTEM_TIME, _START_TIME, _RESIDENT = 0, 11, 12, 19, 21
 """Fields of /proc/<pid>/stat, counted after the last bracket."""
@@ -47,6 +50,23 @@ class Process:
     def is_stopped(self) -> bool:
         """Tell whether a signal has stopped it, so that it can hear no other but SIGKILL."""
         return self._state() in ("T", "t")
+
+    def is_titled(self, prefix: str) -> bool:
+        """Tell whether it is a process of this user whose title starts with `prefix`."""
+        folder = Path(f"/proc/{self.pid}")
+        try:
+            return folder.stat().st_uid == os.getuid() and folder.joinpath("cmdline").read_bytes().startswith(
+                prefix.encode()
+            )
+        except (OSError, ValueError):  # it has ended
+            return False
+
+    def holds_file_of(self, folder: Path) -> bool:
+        """Tell whether it has a file open that lies in `folder`, or lay there before it was removed."""
+        try:
+            return any(os.readlink(one).startswith(f"{folder}/") for one in Path(f"/proc/{self.pid}/fd").iterdir())
+        except OSError:  # it has ended, or closes one meanwhile
+            return False
 
     @property
     def usage(self) -> tuple[float, int] | None:
@@ -130,6 +150,14 @@ def adopt_orphans() -> None:
         raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER) failed")
 
 
+def give_back_large_memory() -> None:
+    """Have memory of large messages given back to the system when it is free, now and in all forked processes.
+
+    Else the C library takes the size of what was freed last for usual, and keeps as much.
+    """
+    _LIBC.mallopt(_M_MMAP_THRESHOLD, _LARGE)
+
+
 def boot_id() -> str:
     """Return what differs from one boot of this machine to the next."""
     return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
@@ -137,16 +165,11 @@ def boot_id() -> str:
 
 def titled(prefix: str) -> Iterator[Process]:
     """Yield the processes of this user whose title starts with `prefix`."""
-    for folder in Path("/proc").iterdir():
-        if not folder.name.isdigit():
-            continue
-        try:
-            if folder.stat().st_uid == os.getuid() and folder.joinpath("cmdline").read_bytes().startswith(
-                prefix.encode()
-            ):
-                yield Process.of(int(folder.name))
-        except (FileNotFoundError, ProcessLookupError):
-            continue  # it ended while we looked
+    for number in (folder.name for folder in Path("/proc").iterdir() if folder.name.isdigit()):
+        with suppress(ProcessLookupError):  # it ended while we looked
+            process = Process.of(int(number))
+            if process.is_titled(prefix):
+                yield process
 
 
 def describe_exit(status: int) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from rbxcompose.manifest.trials import TEST
+from rbxcompose.regular_files import open_regular
 
 _KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
 _HEAD = 4096  # bytes of a file in which its kind stands
@@ -26,6 +27,6 @@ def is_test(path: Path) -> bool:
     """Tell whether a file says that it is a test."""
     if path.suffix not in _SUFFIXES or not path.is_file():
         return False
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         kind = _KIND.search(file.read(_HEAD))
     return kind is not None and kind[1].decode() == TEST

@@ -9,6 +9,7 @@ from rbxcompose.components.mission import Mission, MissionConfig
 from rbxcompose.executive.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.executive.world import RobotWorld
 from rbxcompose.expressions.values import NotArrived, Value
+from rbxcompose.manifest.trials import LONGEST_TEST
 from rbxcompose.missions.events import MissionEvent
 from rbxcompose.missions.results import Result
 from rbxcompose.missions.world import World
@@ -22,7 +23,6 @@ from rbxcompose.trials.mocked import Mocked, SetValues
 from rbxcompose.trials.model import Deed, Event, Trial
 from rbxcompose.trials.record import Record
 from rbxcompose.trials.setting import Setter, Watcher
-from rbxcompose.trials.stage import LONGEST
 
 OWNER = "test"
 Ended = Callable[[int, Result], None]
@@ -70,8 +70,8 @@ class RobotRun:
             self.bench.scheduler.at(event.at, OWNER, lambda event=event: self._happens(event))  # type: ignore[misc]
         self.bench.host.start()
         until = self.trial.expect.until
-        if not self.bench.run_until(self._is_over, LONGEST if until is None else until) and until is None:
-            self.record.trouble = f"did not end within {LONGEST:g} s of robot time"
+        if not self.bench.run_until(self._is_over, LONGEST_TEST if until is None else until) and until is None:
+            self.record.trouble = f"did not end within {LONGEST_TEST:g} s of robot time"
         self.record.now = self.now
         self.record.late = len(self.events)
         self.record.data = dict(self.executive.missions.runs[self.trial.mission].engine.data)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rbxcompose.expressions.values import NotArrived, Value
+from rbxcompose.manifest.trials import LONGEST_TEST
 from rbxcompose.missions.engine import Engine
 from rbxcompose.missions.events import MissionEvent
 from rbxcompose.missions.statuses import IDLE, RUNNING
@@ -14,7 +15,6 @@ from rbxcompose.trials.model import Deed, Trial
 from rbxcompose.trials.record import Record
 from rbxcompose.trials.setting import Setter, Watcher
 
-LONGEST = 3600.0  # [s] of robot time
 MOST_INSTANTS = 100_000  # at which something happens
 MOST_STEPS = 5000
 
@@ -89,7 +89,7 @@ class Stage:
                 self.record.trouble = f"did not end: {MOST_STEPS} steps within {self.now:.0f} s"
                 break
             upcoming = self._next()
-            if upcoming is None or upcoming > (LONGEST if until is None else until) + ROUNDING:
+            if upcoming is None or upcoming > (LONGEST_TEST if until is None else until) + ROUNDING:
                 self._leave(until, upcoming)
                 break
             self.now = self.record.now = max(upcoming, self.now)
@@ -105,7 +105,7 @@ class Stage:
         elif upcoming is None:
             self.record.trouble = f"did not end: since {self.now:g} s it waits for what the test does not do"
         else:
-            self.record.trouble = f"did not end within {LONGEST:g} s of robot time"
+            self.record.trouble = f"did not end within {LONGEST_TEST:g} s of robot time"
 
     def _instant(self) -> None:
         """Do all that is due: calls end, the test acts, the mission is ticked."""

@@ -15,7 +15,7 @@ import pytest
 from rbxcompose.bus.attachment import Attachment, decode_attachment
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.tokens import gid
-from rbxcompose.bus.transport import Answer, Arrival
+from rbxcompose.bus.transport import EXPIRED, LONGEST_WAIT, Answer, Arrival
 from rbxcompose.clock import SteppedClock
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo
@@ -30,6 +30,7 @@ from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
 from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk import Ended, Outcome
 from rbxcompose.testing import Golden, instance
 
 ASKER = Attachment(41, 7, bytes(range(16)))
@@ -123,7 +124,14 @@ class Wire:
         return Declared(self, key)
 
     def ask(
-        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        answered: Callable[[Answer], None],
+        *,
+        of_all: bool = True,
+        within: float = LONGEST_WAIT,
     ) -> Declared:
         self.note("ask", key, payload, attachment)
         self.asked[key] = answered
@@ -203,6 +211,21 @@ def test_an_action_from_its_client(wire: Wire, golden: Golden) -> None:
     goal.cancel()
     wire.settle()
     golden.check("action_client.txt", wire.text())
+
+
+def test_the_result_of_a_goal_that_takes_longer_than_any_question_is_asked_for_again(wire: Wire) -> None:
+    ends: list[Ended[Recharge.Result]] = []
+    send = wire.bus().action_client("mission", "recharge", Recharge)
+    wire.show_servers()
+    send(Recharge.Goal(), ends.append)
+    wire.answer("send_goal", Recharge.SendGoal.Response(accepted=True))
+    (key,) = (key for key in wire.asked if "/get_result/" in key)
+    for _ in range(3):
+        wire.asked.pop(key)(Answer(error=EXPIRED))
+        wire.settle()
+    assert ends == []
+    wire.answer("get_result", Recharge.GetResult.Response(status=4, result=Recharge.Result(level=100.0)))
+    assert [end.outcome for end in ends] == [Outcome.SUCCEEDED]
 
 
 def test_parameters_log_and_frames_of_a_robot(wire: Wire, golden: Golden) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from rbxcompose.bus.renewal import RENEWED, RenewableTransport
-from rbxcompose.bus.transport import Answer, Arrival, Closable, Question
+from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Arrival, Closable, Question
 from rbxcompose.qos import Qos
 
 
@@ -33,7 +33,14 @@ class Link:
         return self._declare(f"serve {key}")
 
     def ask(
-        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        answered: Callable[[Answer], None],
+        *,
+        of_all: bool = True,
+        within: float = LONGEST_WAIT,
     ) -> Closable:
         return self._declare(f"ask {key}")
 

@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from rbxcompose.bus.services import Request
 from rbxcompose.config import Place
 from rbxcompose.geometry import Pose2, quaternion_from_yaw
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
-from rbxcompose.msgs.rbxcompose_msgs import Recharge
-from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
+from rbxcompose.msgs.std_msgs import Float32, Header
+from rbxcompose.qos import Qos
 from rbxcompose.sdk import Ended, Outcome, SentGoal
 from rbxcompose.testing import Bench, instance
 
@@ -108,6 +112,16 @@ def test_a_stop_cancels_the_goal_and_refuses_new_ones() -> None:
     assert [end.outcome for end in driver.ended] == [Outcome.CANCELED, Outcome.REJECTED]
 
 
+@pytest.mark.parametrize("x", [math.inf, math.nan, 1e300, -1e6])
+def test_a_goal_that_no_robot_can_reach_is_refused(x: float) -> None:
+    robot = bench()
+    driver = Driver(robot)
+    robot.advance(0.1)
+    driver.send(goal(x, 0.0))
+    robot.advance(0.1)
+    assert [end.outcome for end in driver.ended] == [Outcome.REJECTED]
+
+
 def test_charging_is_refused_away_from_the_dock_and_done_at_it() -> None:
     robot = bench()
     driver = Driver(robot)
@@ -123,3 +137,76 @@ def test_charging_is_refused_away_from_the_dock_and_done_at_it() -> None:
     robot.advance(1.0)
     assert charged[1].outcome is Outcome.SUCCEEDED
     assert charged[1].result == Recharge.Result(level=100.0)
+
+
+class Battery:
+    """Plays the battery: it tells its level once a second from `phase` [s] on, and answers `delay` [s] after it is set.
+
+    What it tells just when it is set may be overtaken by a lower level, so that nobody sees it.
+    """
+
+    def __init__(self, robot: Bench, *, phase: float, delay: float, tells_at_once: bool, drain: float) -> None:
+        self.robot, self.delay, self.tells_at_once, self.drain = robot, delay, tells_at_once, drain
+        self.level = 40.0
+        robot.bus.serve_later("battery", "set_battery_level", SetBatteryLevel, self.set)
+        robot.scheduler.at(robot.scheduler.now + phase, "battery", self.step)
+
+    def set(self, request: Request[SetBatteryLevel.Request, SetBatteryLevel.Response]) -> None:
+        self.level = request.message.value
+        if self.tells_at_once:
+            self.tell()
+        when = self.robot.scheduler.now + self.delay
+        self.robot.scheduler.at(when, "battery", lambda: request.reply(SetBatteryLevel.Response()))
+
+    def step(self) -> None:
+        self.level = max(0.0, self.level - self.drain)
+        self.tell()
+        self.robot.scheduler.at(self.robot.scheduler.now + 1.0, "battery", self.step)
+
+    def tell(self) -> None:
+        self.robot.publish("battery_level", Float32(data=self.level), Qos.STATE)
+
+
+def charge(robot: Bench) -> list[Ended[Recharge.Result]]:
+    charged: list[Ended[Recharge.Result]] = []
+    robot.bus.action_client("bench", "/recharge", Recharge)(Recharge.Goal(), charged.append)
+    return charged
+
+
+def at_the_dock() -> Bench:
+    here = Place("dock", 0.0, 0.0, 0.0)
+    return Bench(
+        instance("base", "diff_drive_sim"),
+        instance("transforms", "transforms"),
+        instance("charger", "charger", {"dock": "dock"}, [here]),
+    )
+
+
+@given(
+    phase=st.floats(0.0, 1.0),
+    delay=st.floats(0.0, 0.3),
+    starts=st.floats(0.1, 1.1),
+    drain=st.floats(0.1, 20.0),
+    tells_at_once=st.booleans(),
+)
+@settings(max_examples=60, deadline=None)
+def test_whenever_the_battery_steps_the_end_of_a_charge_is_seen(
+    phase: float, delay: float, starts: float, drain: float, tells_at_once: bool
+) -> None:
+    robot = at_the_dock()
+    Battery(robot, phase=phase, delay=delay, tells_at_once=tells_at_once, drain=drain)
+    robot.advance(starts)
+    charged = charge(robot)
+    assert robot.run_until(lambda: bool(charged), 2.0)
+    assert charged[0].outcome is Outcome.SUCCEEDED
+
+
+@pytest.mark.parametrize(("answers", "why"), [(True, "the battery told no level for 10 s"), (False, "no reply")])
+def test_a_battery_that_tells_nothing_ends_the_charge_with_a_reason(answers: bool, why: str) -> None:
+    robot = at_the_dock()
+    Battery(robot, phase=1e6, delay=0.1 if answers else 1e6, tells_at_once=False, drain=1.0)
+    robot.advance(0.1)
+    charged = charge(robot)
+    assert robot.run_until(lambda: bool(charged), 11.0)
+    assert charged[0].outcome is Outcome.ABORTED
+    assert why in str(robot.records)

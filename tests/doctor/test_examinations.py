@@ -23,6 +23,14 @@ from rbxcompose.runtime.processes import Process, boot_id
 
 HERE = Process.of(os.getpid())
 GONE = Process(HERE.pid, 1)
+
+
+@pytest.fixture(autouse=True)
+def titles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """This process stands for those of a robot, whatever it calls itself."""
+    monkeypatch.setattr(Process, "is_titled", lambda self, prefix: True)
+
+
 FINE = Facts(
     running=(),
     file=None,

@@ -12,6 +12,7 @@ import pytest
 
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.qos import Qos
+from rbxcompose.runtime.log import NAME as LOG
 from tests.conftest import ROOT
 from tests.faults.observer import COMMAND, MOTION, Observer
 from tests.faults.patrol import Patrol
@@ -71,3 +72,32 @@ def test_a_flood_is_refused_and_told_while_the_patrol_goes_on(soak: Soak, tmp_pa
     assert sum(began < at < ended for at in health.reports) >= seconds - 1, "nobody told how the robot is"
     assert gap < LONGEST_GAP, text
     assert moving > MOVING, text
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("what", ["goals", "requests", "queries"])
+def test_a_flood_of_questions_is_refused_while_the_patrol_goes_on(what: str, soak: Soak, tmp_path: Path) -> None:
+    seconds = soak.examples(QUICK, MANY)
+    with Patrol(tmp_path, times=10, hears_commands=False) as patrol:
+        observer = patrol.observer
+        assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
+        before = set(patrol.running())
+        words = [sys.executable, "-m", "tests.faults.asker", observer.router, what, str(seconds)]
+        with subprocess.Popen(words, env=patrol.environment, cwd=ROOT, stdout=subprocess.PIPE, text=True) as asker:
+            assert asker.stdout is not None
+            asker.stdout.readline()  # it begins
+            began = time.monotonic()
+            asked = int(asker.stdout.readline())
+            ended = time.monotonic()
+            asker.communicate()
+        motion = [one for one in list(observer.story) if one.topic == MOTION and began < one.time < ended]
+        assert set(patrol.running()) == before
+        lines = (patrol.state.path / LOG).read_text(encoding="utf-8").count("\n")
+    moving = sum(not one.is_rest for one in motion) / len(motion)
+    gap = max(after.time - before.time for before, after in pairwise(motion))
+    text = f"{asked / seconds:,.0f} {what} a second; it moved for {moving:.0%} of the time, gaps of {gap:.2f} s at most"
+    soak.tell(f"flood of {what}", asked, 0, text)
+    assert asked > 300 * seconds, text
+    assert gap < LONGEST_GAP, text
+    assert moving > MOVING, text
+    assert lines < 100 + 5 * seconds, f"{lines} lines of log"

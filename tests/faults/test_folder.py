@@ -28,6 +28,37 @@ def test_of_many_that_start_it_at_once_one_does(robot: Robot) -> None:
 
 
 @pytest.mark.timeout(40)
+@pytest.mark.parametrize("removed", ["state.json", "control.sock", "lock", "*"])
+def test_a_robot_whose_files_were_removed_is_found_and_restores_them(robot: Robot, removed: str) -> None:
+    robot.up_detached()
+    for path in robot.folder.path.glob(removed):
+        path.unlink()
+    if removed == "*":
+        robot.folder.path.rmdir()
+    eventually(lambda: robot.has_logged("somebody removed files of the running robot; they are restored"))
+    assert len(robot.ps()["components"]) == 2
+    assert robot.do("stop").returncode == 0
+    again = robot.up("-d")
+    assert "is already up" in again.communicate(timeout=PATIENCE)[0]
+    assert robot.do("down").returncode == 0
+    assert robot.processes() == []
+
+
+@pytest.mark.timeout(40)
+@pytest.mark.parametrize("is_suspended", [False, True])
+def test_stop_and_down_find_a_robot_at_once_whose_state_was_removed(robot: Robot, is_suspended: bool) -> None:
+    robot.up_detached()
+    supervisor = next(iter(titled(f"rbxcompose {robot.name}: supervisor")))
+    if is_suspended:
+        supervisor.send_signal(signal.SIGSTOP)
+    (robot.folder.path / STATE).unlink()
+    if not is_suspended:
+        assert robot.do("stop").returncode == 0
+    assert robot.do("down").returncode == 0
+    assert robot.processes() == []
+
+
+@pytest.mark.timeout(40)
 def test_a_state_that_cannot_be_written_is_told_and_the_robot_goes_on(robot: Robot) -> None:
     robot.up_detached()
     state = robot.folder.path / STATE

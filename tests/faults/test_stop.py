@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from pathlib import Path
 
 import pytest
 
+from rbxcompose.runtime.log import NAME as LOG
 from tests.faults.observer import MOTION
 from tests.faults.patrol import Patrol
 
+STANDSTILL = 3.0  # [s]; longer than any process may be silent
 ODOMETRIES = 25  # as many as come in half a second
 
 
@@ -32,3 +35,21 @@ def test_after_a_stop_and_its_release_the_patrol_moves_only_when_it_is_told_to(t
         patrol.do("mission", "resume")
         assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
         assert patrol.unsafe() == []
+
+
+@pytest.mark.timeout(60)
+def test_a_machine_that_slept_brakes_and_goes_on(tmp_path: Path) -> None:
+    with Patrol(tmp_path, times=10) as patrol:
+        observer = patrol.observer
+        assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
+        processes = patrol.running()
+        for one in processes:
+            one.send_signal(signal.SIGSTOP)
+        time.sleep(STANDSTILL)
+        slept = time.monotonic()
+        for one in processes:
+            one.send_signal(signal.SIGCONT)
+        assert patrol.wait_for(lambda: any(one.is_rest and one.time > slept for one in list(observer.story)))
+        assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
+        assert set(patrol.running()) == set(processes)
+        assert "time stood still for 3." in (patrol.state.path / LOG).read_text(encoding="utf-8")

@@ -54,6 +54,11 @@ ROWS = {
         "faults/test_folder.py",
         "a_state_that_cannot_be_written_is_told_and_the_robot_goes_on",
     ),
+    "the machine sleeps": ("faults/test_stop.py", "a_machine_that_slept_brakes_and_goes_on"),
+    "files of the running robot are removed": (
+        "faults/test_folder.py",
+        "a_robot_whose_files_were_removed_is_found_and_restores_them",
+    ),
     "the wall clock jumps": ("testing/test_clocks.py", "cores_components_and_the_sdk_never_ask_for_time"),
     "a clock from outside stands still": (
         "runtime/test_external_clock.py",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -88,3 +89,14 @@ def test_files_below_the_current_folder_are_shown_relative_to_it(
     monkeypatch.chdir(project)
     assert shown_name(project / "missions/patrol.yaml") == "missions/patrol.yaml"
     assert shown_name(project.parent / "secret.yaml") == str(project.parent / "secret.yaml")
+
+
+@pytest.mark.parametrize("kind", ["pipe", "link"])
+def test_what_is_there_and_no_file_is_told_as_that(project: Path, kind: str) -> None:
+    path = project / "missions/odd.yaml"
+    if kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path.symlink_to("nowhere.yaml")
+    expected = "is no regular file" if kind == "pipe" else "does not exist"
+    assert expected in refused("../../missions/odd.yaml", project).message

@@ -25,6 +25,7 @@ GROUND = {
     "plugins": "findings plain",
     "qos": "",
     "references": "findings units",
+    "regular_files": "",
     "replacing": "",
     "requests": "typed_json",
     "restarts": "config",

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from rbxcompose.bus.probe import MISSES
 from rbxcompose.bus.renewal import RenewableTransport
-from rbxcompose.bus.transport import Answer, Nowhere, Transport
+from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Nowhere, Transport
 from rbxcompose.runtime.process_group.driver import BEAT
 from rbxcompose.runtime.process_group.lifeline import BEATS, FIRST_PAUSE, LONGEST_PAUSE, Lifeline
 
@@ -18,7 +18,14 @@ class Deaf(Nowhere):
     """A session on which no question is ever answered."""
 
     def ask(
-        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        answered: Callable[[Answer], None],
+        *,
+        of_all: bool = True,
+        within: float = LONGEST_WAIT,
     ) -> Deaf:
         return self
 

@@ -73,6 +73,7 @@ def test_a_stopped_process_that_was_left_behind_is_killed(
     child: subprocess.Popen[bytes], tmp_path: os.PathLike[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr(Process, "is_titled", lambda self, prefix: prefix == "rbxcompose toys: ")
     folder = RobotFolder.of("toys")
     folder.make()
     process = Process.of(child.pid)
@@ -81,3 +82,38 @@ def test_a_stopped_process_that_was_left_behind_is_killed(
     wait_until_stopped(process)
     assert end_leftovers(folder) == ["processes left behind were killed: robot"]
     assert not process.is_running
+
+
+def test_a_process_that_only_a_file_calls_ours_is_not_signalled(
+    child: subprocess.Popen[bytes], tmp_path: os.PathLike[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    folder = RobotFolder.of("evil")
+    folder.make()
+    process = Process.of(child.pid)
+    folder.write_state(RobotState("evil", "", process, {"robot": process}, (), None, boot_id()))
+    assert end_leftovers(folder) == []
+    assert process.is_running
+
+
+ALLOCATES = """
+import sys
+from rbxcompose.runtime.processes import Process, give_back_large_memory
+import os
+
+if sys.argv[1] == "gives back":
+    give_back_large_memory()
+before = Process.of(os.getpid()).usage[1]
+for _ in range(4):
+    data = b"x" * 20_000_000
+    del data
+print(Process.of(os.getpid()).usage[1] - before)
+"""
+
+
+def test_memory_of_large_messages_is_given_back() -> None:
+    words = [sys.executable, "-c", ALLOCATES]
+    kept, given_back = (
+        int(subprocess.run([*words, mode], capture_output=True, check=True).stdout) for mode in ("keeps", "gives back")
+    )
+    assert given_back < 4_000_000 < kept

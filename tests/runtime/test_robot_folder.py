@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -88,18 +91,38 @@ def test_a_state_that_was_changed_is_not_believed(folder: RobotFolder) -> None:
         folder.read_state()
 
 
+TITLED = "import setproctitle; setproctitle.setproctitle(title); print(); input()"
+
+
+@contextmanager
+def process_with(title: str) -> Iterator[Process]:
+    """A process that calls itself so, until the end of the block."""
+    arguments = [sys.executable, "-c", f"title = {title!r}; {TITLED}"]
+    with subprocess.Popen(arguments, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+        assert child.stdout is not None
+        child.stdout.readline()
+        yield Process.of(child.pid)
+        child.communicate(b"\n")
+
+
 def test_processes_of_another_boot_or_another_life_are_not_alive() -> None:
+    with process_with("rbxcompose toys: robot") as one:
+        assert state(one).alive() == {"robot": one}
+        assert state(one, boot="another").alive() == {}
+        assert state(Process(one.pid, one.started - 1)).alive() == {}
+
+
+def test_a_process_that_does_not_call_itself_one_of_the_robot_is_none() -> None:
     us = Process.of(os.getpid())
-    assert state().alive() == {"robot": us}
-    assert state(boot="another").alive() == {}
-    assert state(Process(us.pid, us.started - 1)).alive() == {}
+    assert state(us).alive() == {}
+    assert not state(us).is_supervised
+    with process_with("rbxcompose boys: robot") as other:
+        assert state(other).alive() == {}
 
 
 def test_an_ended_supervisor_supervises_nothing() -> None:
-    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as child:
-        process = Process.of(child.pid)
+    with process_with("rbxcompose toys: supervisor") as process:
         assert state(process).is_supervised
-        child.communicate(b"\n")
     assert not state(process).is_supervised
 
 
@@ -109,6 +132,68 @@ def test_only_the_log_stays(folder: RobotFolder) -> None:
         (folder.path / name).touch()
     folder.clear()
     assert sorted(path.name for path in folder.path.iterdir()) == ["log.1.jsonl", "log.jsonl"]
+
+
+@pytest.mark.parametrize("mode", [0o644, 0o620, 0o606])
+def test_a_state_that_others_may_open_is_not_believed(folder: RobotFolder, mode: int) -> None:
+    folder.write_state(state())
+    (folder.path / folders.STATE).chmod(mode)
+    with pytest.raises(BrokenStateError, match="somebody else"):
+        folder.read_state()
+
+
+def test_a_state_of_somebody_else_is_not_believed(folder: RobotFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder.write_state(state())
+    monkeypatch.setattr(os, "getuid", lambda: 4711)
+    with pytest.raises(BrokenStateError, match="somebody else"):
+        folder.read_state()
+    with pytest.raises(UnsafeFolderError, match="0700"):
+        folders.all_folders()
+
+
+@pytest.mark.parametrize("kind", ["fifo", "folder", "link"])
+def test_a_state_that_is_no_file_is_not_read(folder: RobotFolder, kind: str) -> None:
+    path = folder.path / folders.STATE
+    if kind == "fifo":
+        os.mkfifo(path, 0o600)
+    elif kind == "folder":
+        path.mkdir(0o700)
+    else:
+        path.symlink_to("/etc/hostname")
+    with pytest.raises(BrokenStateError):
+        folder.read_state()
+
+
+@pytest.mark.parametrize("body", ["[]", "{}", '{"version": 1}', '{"version": 1, "supervisor": 7}', "[" * 100_000])
+def test_a_state_of_another_form_is_not_believed(folder: RobotFolder, body: str) -> None:
+    path = folder.path / folders.STATE
+    path.touch(0o600)
+    path.write_text(f"{hashlib.sha256(body.encode()).hexdigest()}\n{body}")
+    with pytest.raises(BrokenStateError):
+        folder.read_state()
+
+
+def test_a_robot_whose_state_was_removed_is_found_by_its_lock(folder: RobotFolder) -> None:
+    lock = folder.lock()
+    assert lock is not None
+    assert folders.all_folders() == [folder]
+    os.close(lock)
+    assert folders.all_folders() == []
+
+
+def test_files_of_a_running_robot_that_are_gone_are_noticed(folder: RobotFolder) -> None:
+    lock = folder.lock()
+    assert lock is not None
+    folder.write_state(state())
+    (folder.path / folders.SOCKET).touch()
+    assert not folder.has_lost(lock)
+    for name in (folders.STATE, folders.SOCKET, folders.LOCK):
+        path = folder.path / name
+        path.rename(path.with_suffix(".kept"))
+        assert folder.has_lost(lock)
+        path.with_suffix(".kept").rename(path)
+    assert not folder.has_lost(lock)
+    os.close(lock)
 
 
 def test_robots_are_found_by_their_state(folder: RobotFolder) -> None:

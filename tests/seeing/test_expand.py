@@ -9,7 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rbxcompose.compiler import compile_robot
 from rbxcompose.model.robot import Robot
+from rbxcompose.plain import FORBIDDEN
 from rbxcompose.plan.diff import difference
 from rbxcompose.seeing.expand import expand, expand_data, leaves
 from rbxcompose.testing import Checked, Golden, check_file, check_text
@@ -88,6 +90,15 @@ def test_a_robot_with_mistakes_is_written_as_far_as_it_could_be_read(tmp_path: P
     text = expand(robot_of(checked).manifest, has_origins=False)
     assert "    y: soon\n" in text
     assert again(text, tmp_path).codes == checked.codes
+
+
+def test_text_of_the_environment_cannot_reorder_what_is_shown(repository: Path) -> None:
+    path = str(repository / "robots/turtlebot")
+    compilation = compile_robot(path, sets=["about=${env.WORDS}"], environment={"WORDS": "a\u202eb\x1b[2J"})
+    assert compilation.robot is not None
+    text = expand(compilation.robot.manifest)
+    assert 'about: "a\\u202eb\\u001b[2J"' in text
+    assert not FORBIDDEN.search(text)
 
 
 def test_as_data_every_value_has_its_origin(repository: Path) -> None:

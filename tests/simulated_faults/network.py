@@ -9,7 +9,7 @@ from functools import cache
 from typing import Protocol, TypeVar
 
 from rbxcompose.bus.inbox import Post
-from rbxcompose.bus.transport import Answer, Arrival, Question
+from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Arrival, Question
 from rbxcompose.bus.zenoh_transport import GONE
 from rbxcompose.qos import Qos
 from rbxcompose.scheduler import Scheduler
@@ -332,7 +332,14 @@ class SimulatedTransport:
         return self.servers[-1]
 
     def ask(
-        self, key: str, payload: bytes, attachment: bytes, answered: Callable[[Answer], None], *, of_all: bool = True
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        answered: Callable[[Answer], None],
+        *,
+        of_all: bool = True,
+        within: float = LONGEST_WAIT,
     ) -> _Asked:
         asked = _Asked(self, answered)
         self.asked.append(asked)

@@ -82,6 +82,7 @@ def test_each_mistake_is_told_at_its_place(trying: Trying, golden: Golden) -> No
         ("expect:\n", "needs 'expect'"),
         ("mocks:\n  go_to:\n", "needs 'expect'"),
         ("expect:\n  outcome: running\n", "every test of a mission ends"),
+        ("expect:\n  outcome: running\n  for: 1e14 s\n", "'for' must be at most"),
         ("expect:\n  steps: go_to\n", "'steps'"),
         ("expect:\n  steps:\n    - recharge: dock\n", "takes no argument"),
         ("expect:\n  steps:\n    - [go_to]\n", "this is no step"),

@@ -12,8 +12,7 @@ from threading import Thread
 from rbxcompose.bus.graph import Graph
 from rbxcompose.cli.bus.place import BusPlace, place_of
 from rbxcompose.cli.completions.candidates import candidates, for_shell
-from rbxcompose.cli.robots.lookup import NotDoneError, find_robot, known_state
-from rbxcompose.runtime.folder import all_folders
+from rbxcompose.cli.robots.lookup import NotDoneError, find_robot, known_state, robots_up
 
 PATIENCE = 0.3  # [s] in which the bus must tell; who waits for a key does not wait for longer
 _MANIFESTS = (".yaml", ".yml")
@@ -77,7 +76,10 @@ def _place(given: Mapping[str, str]) -> BusPlace:
 
 def robots() -> list[str]:
     """Return the names of robots that are up."""
-    return [folder.path.name for folder in all_folders()]
+    try:
+        return [folder.path.name for folder in robots_up()]
+    except NotDoneError:
+        return []
 
 
 def files(current: str, endings: tuple[str, ...] = ("",)) -> list[str]:

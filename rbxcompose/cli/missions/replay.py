@@ -14,7 +14,9 @@ from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.findings import kind
 from rbxcompose.missions.logbook import INPUTS, Record, ReplayError, replay
 from rbxcompose.model.robot import Robot
+from rbxcompose.regular_files import read_regular
 
+_LARGEST = 16_000_000  # [B] of a log that is replayed
 _OWN = ("mission", "run")  # of a record, about which run it is
 
 NO_LOG = kind(
@@ -56,12 +58,12 @@ def runs_in(file: str) -> dict[tuple[str, int], list[Record]]:
     """
     runs: dict[tuple[str, int], list[Record]] = {}
     try:
-        for line in Path(file).read_text(encoding="utf-8").splitlines():
+        for line in read_regular(Path(file), _LARGEST).decode("utf-8").splitlines():
             record = json.loads(line)
             runs.setdefault((record["mission"], record["run"]), []).append(record)
     except OSError as error:
         raise NotDoneError(NO_LOG.at(None, f"'{file}' cannot be read: {error.strerror}")) from error
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise NotDoneError(NO_LOG.at(None, f"'{file}' is no log: each line is a record in JSON")) from error
     if not runs:
         raise NotDoneError(NO_LOG.at(None, f"'{file}' is empty"))

@@ -9,7 +9,9 @@ from typing import Protocol
 
 from rbxcompose.edits import apply, safe_fixes
 from rbxcompose.findings import Finding, Fix, Report, Sources
+from rbxcompose.manifest.limits import FILE_BYTES
 from rbxcompose.plain import plain
+from rbxcompose.regular_files import read_regular
 from rbxcompose.replacing import replace_file
 
 ROUNDS = 20  # one fix may let the next mistake be seen
@@ -81,7 +83,7 @@ def _told(one: Fix) -> str:
 def _unchanged_text(file: str, read: str) -> str | None:
     """Return the text of a file with its byte order mark and ends of lines, None if it is not what was read."""
     try:
-        text = Path(file).read_bytes().decode("utf-8")
+        text = read_regular(Path(file), FILE_BYTES).decode("utf-8")
     except (OSError, UnicodeDecodeError):
         return None
     return text if text.removeprefix("\ufeff").replace("\r\n", "\n") == read else None

@@ -9,8 +9,10 @@ from pathlib import Path, PurePosixPath
 from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
+from rbxcompose.manifest.limits import FILE_BYTES
 from rbxcompose.model.charging import navigator_of, top_speed
 from rbxcompose.model.robot import Robot
+from rbxcompose.regular_files import read_regular
 from rbxcompose.replacing import replace_file
 from rbxcompose.scaffold.answers import ANSWER, AnswerError
 from rbxcompose.scaffold.mission import MissionAnswers, with_entry
@@ -43,7 +45,7 @@ class Home:
 
     def add(self, answers: MissionAnswers) -> bool:
         """Write the mission's entry into the robot's file, if that surely does nothing else; tell whether it did."""
-        before = self.file.read_bytes()
+        before = read_regular(self.file, FILE_BYTES)
         text = with_entry(before.decode("utf-8"), answers)
         if text is None:
             return False
@@ -51,7 +53,7 @@ class Home:
         after = compile_robot(str(self.file), environment=os.environ, unsaved=unsaved)
         if after.plan is None or after.robot is None or answers.name not in after.robot.missions:
             return False
-        if before != self.file.read_bytes():
+        if before != read_regular(self.file, FILE_BYTES):
             return False
         try:
             replace_file(self.file, text.encode("utf-8"))

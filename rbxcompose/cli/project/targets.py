@@ -11,6 +11,7 @@ from rbxcompose.findings import Finding, Severity, Span, kind
 from rbxcompose.manifest.files import ROBOT_FILE, find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.trials import TEST
+from rbxcompose.regular_files import open_regular
 
 UNUSED = kind(
     "RBX9007",
@@ -103,8 +104,8 @@ def projects_of(paths: Iterable[str]) -> list[Path]:
 def _kind_of(path: Path) -> str:
     """Return the kind that a manifest names, nothing if it names none or cannot be read."""
     try:
-        with path.open("rb") as file:
-            found = _KIND.search(file.read(_HEAD)) if path.is_file() else None
+        with open_regular(path) as file:
+            found = _KIND.search(file.read(_HEAD))
     except OSError:
         return ""
     return found[1].decode() if found else ""

@@ -23,6 +23,7 @@ from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import RecordingReader
 from rbxcompose.recording.recorder import Recorder
 from rbxcompose.recording.tape import PLAN
+from rbxcompose.regular_files import open_regular
 from rbxcompose.rerun.comparison import Difference
 from rbxcompose.rerun.run import Rerun, missing_topics, rerun
 
@@ -41,7 +42,7 @@ def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader
     if missing := missing_topics(plan, instance, reader.topics):
         names = plain(", ".join(missing))
         raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(str(path))}' lacks inputs of '{instance.name}': {names}"))
-    with path.open("rb") as file, _kept(arguments.write) as keep:
+    with open_regular(path) as file, _kept(arguments.write) as keep:
         found = rerun(plan, instance, RecordingReader(file).messages(), keep)
     return _told(arguments, instance.name, found)
 

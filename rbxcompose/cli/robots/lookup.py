@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import TypeVar
 
 from rbxcompose.findings import Finding, kind, suggest
 from rbxcompose.requests import Refused, Request
 from rbxcompose.runtime.control import ANSWER, NoAnswerError, ask
-from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, all_folders
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, UnsafeFolderError, all_folders
+from rbxcompose.runtime.requests import RobotStatus
 
 A = TypeVar("A")
 
@@ -77,7 +79,7 @@ def find_robot(wanted: str | None) -> RobotFolder:
     Raises:
         NotDoneError: if there is none or more than one.
     """
-    found = {folder.path.name: folder for folder in all_folders()}
+    found = {folder.path.name: folder for folder in robots_up()}
     if wanted is None:
         return _only(found)
     if wanted in found:
@@ -87,6 +89,18 @@ def find_robot(wanted: str | None) -> RobotFolder:
         if path in files:
             return files[path]
     raise NotDoneError(NOT_UP.at(None, f"no robot '{wanted}' is up", help=suggest(wanted, found, "robots that are up")))
+
+
+def robots_up() -> list[RobotFolder]:
+    """Return the folders of all robots that are up or were left behind.
+
+    Raises:
+        NotDoneError: if somebody else could have put something there.
+    """
+    try:
+        return all_folders()
+    except UnsafeFolderError as error:
+        raise NotDoneError(UNSAFE.at(None, str(error))) from error
 
 
 def _only(found: dict[str, RobotFolder]) -> RobotFolder:
@@ -109,10 +123,13 @@ def _possible_files(path: str) -> Iterable[str]:
 
 
 def known_state(folder: RobotFolder) -> RobotState | None:
-    """Return the state that the folder tells, or None if it tells none that can be read."""
+    """Return the state from the robot's folder or, if the file is gone or broken, from its supervisor; else None."""
+    with suppress(BrokenStateError):
+        if (state := folder.read_state()) is not None:
+            return state
     try:
-        return folder.read_state()
-    except BrokenStateError:
+        return ask(folder, RobotStatus())
+    except (NoAnswerError, Refused):
         return None
 
 

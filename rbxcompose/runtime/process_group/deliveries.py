@@ -39,6 +39,12 @@ class Deliveries:
                 troubled.add(name)
                 refused = subscription.refusals.total
                 self._statuses.set(name, Level.WARN, text, {"refused": refused} if refused else {})
+        for gate in self._bus.gates:
+            if news := gate.refusals.news():
+                name = f"{gate.owner}: {gate.name.lstrip('/')}"
+                troubled.add(name)
+                text = sentence(gate.name, news, "request")
+                self._statuses.set(name, Level.WARN, text, {"refused": gate.refusals.total})
         for name in self._told - troubled:
             self._statuses.set(name, Level.OK, "messages arrive as they should", {})
         self._told = troubled

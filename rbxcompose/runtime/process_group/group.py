@@ -31,6 +31,7 @@ from rbxcompose.runtime.process_group.driver import Driver, ExternalDriver, Real
 from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.process_group.inbox import Inbox
 from rbxcompose.runtime.process_group.lifeline import Lifeline
+from rbxcompose.runtime.process_group.watchdog import HANG, Watchdog
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.typed_json import to_data
@@ -38,7 +39,6 @@ from rbxcompose.typed_json import to_data
 if TYPE_CHECKING:
     from rbxcompose.runtime.process_group.taping import Taping
 
-HANG = 2.0  # [s] without a turn of the loop after which the process ends itself
 LONGEST_CONFIGURE = 30.0  # [s]
 LONGEST_CLOSE = 1.0  # [s] to deactivate, clean up and leave the bus
 REST_BOUND = 1.0  # [s] of robot time to come to rest when the supervisor has gone
@@ -79,6 +79,7 @@ class Group:
         self._clock = self._made_clock(start)
         self._scheduler = Scheduler()
         self._inbox = Inbox()
+        self._watchdog = Watchdog()
         self._bus: Bus | None = None
         self._lifeline: Lifeline | None = None
         self._taping: Taping | None = None
@@ -242,7 +243,8 @@ class Group:
         self._watch(HANG)
 
     def _shutdown(self) -> None:
-        self._watch(LONGEST_CLOSE)  # nothing moves any more: what hangs now is cut off
+        if not self._options.is_stepped:
+            faulthandler.dump_traceback_later(LONGEST_CLOSE, exit=True)  # nothing moves any more: a hang is cut off
         if self._host is not None:
             if self._rest_deadline is None:
                 self._host.brake()  # the order to brake came together with this one
@@ -357,7 +359,7 @@ class Group:
 
     def _watch(self, seconds: float) -> None:
         if not self._options.is_stepped:
-            faulthandler.dump_traceback_later(seconds, exit=True)
+            self._watchdog.feed(seconds)
 
     def _on_sigterm(self, number: int, frame: FrameType | None) -> None:
         if not self._has_begun:

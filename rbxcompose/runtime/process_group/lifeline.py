@@ -20,6 +20,7 @@ from rbxcompose.bus.transport import Answer, Question, Transport
 from rbxcompose.runtime.process_group.driver import BEAT
 
 BEATS = 3  # of the process between two probes: three that are missed, and the change, take less than 4 s
+LONGEST_PROBE = 4.0  # [s] for an answer; all is over by then
 LONGEST_CLOSE = 1.0  # [s] for closing a session; Zenoh may hang in it
 FIRST_PAUSE, LONGEST_PAUSE = 2, 120  # beats until the next try, when no session can be opened
 KNOCK = 0.05  # [s] to wait for a connection on the loopback interface
@@ -140,7 +141,7 @@ class _Sent:
 
     def __init__(self, transport: Transport, key: str, *, of_all: bool) -> None:
         self.heard = Heard.NOTHING
-        self._asked = transport.ask(key, b"", b"", self._answered, of_all=of_all)
+        self._asked = transport.ask(key, b"", b"", self._answered, of_all=of_all, within=LONGEST_PROBE)
 
     def close(self) -> Heard:
         """Wait no longer; return what has come."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import faulthandler
 import os
 import signal
 from types import FrameType
@@ -16,10 +15,10 @@ from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.process_group.driver import RealTimeDriver
 from rbxcompose.runtime.process_group.inbox import Inbox
 from rbxcompose.runtime.process_group.lifeline import answer
+from rbxcompose.runtime.process_group.watchdog import Watchdog
 from rbxcompose.scheduler import Scheduler
 
 TRIES = 20  # ports from `bus.port` on
-HANG = 2.0  # [s] without a turn of the loop after which the process ends itself
 
 
 class Router:
@@ -29,6 +28,7 @@ class Router:
         self.is_over = False
         self._plan, self._clock, self._channel = plan, clock, channel
         self._inbox = Inbox()
+        self._watchdog = Watchdog()
         self._transport: ZenohTransport | None = None
 
     def run(self) -> None:
@@ -55,7 +55,7 @@ class Router:
 
     def beat(self) -> None:
         """Tell the supervisor, and the watchdog, that the loop turns."""
-        faulthandler.dump_traceback_later(HANG, exit=True)
+        self._watchdog.feed()
         self._channel.flush()
         if not self._channel.is_behind:
             self._channel.send(say.Alive(self._clock.now()))

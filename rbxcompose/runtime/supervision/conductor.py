@@ -275,9 +275,12 @@ class Conductor:
 
     def _look_for_silence(self) -> None:
         now = self._scheduler.now
-        is_late = self._silence.was_held_up(now)
+        held_up = self._silence.held_up(now)
+        if held_up and not self.is_going_down:
+            text = f"time stood still for {held_up:.1f} s: the machine slept, or the supervisor was suspended"
+            self._effects.log(Level.WARN, text)
         for member in self.members.values():
-            if is_late:
+            if held_up:
                 member.last_word = now
             elif member.is_there and not self.is_going_down:
                 self._silence.look(member, now)

@@ -18,7 +18,7 @@ from rbxcompose.clock import MonotonicClock
 from rbxcompose.diagnostics.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.faults import explain
-from rbxcompose.runtime.folder import BrokenStateError, RobotFolder
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, title
 from rbxcompose.runtime.log import start_new
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.processes import end_with
@@ -141,7 +141,7 @@ def _become_supervisor(plan: Plan, options: RunOptions, clock: MonotonicClock, p
         os.setsid()  # signals of the terminal reach the caller, who passes them on
         if not options.is_detached:
             end_with(caller, signal.SIGTERM)
-        setproctitle.setproctitle(f"rbxcompose {plan.robot}: supervisor")
+        setproctitle.setproctitle(title(plan.robot, "supervisor"))
         _leave_the_terminal()
         with os.fdopen(pipe, "w", buffering=1) as reports:
             exit_code = _supervise(plan, options, clock, reports)
@@ -160,19 +160,21 @@ def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: 
     folder = RobotFolder.of(plan.robot)
     try:
         folder.make()
-        if folder.lock() is None:  # else it is ours until this process ends
+        lock = folder.lock()  # ours until this process ends
+        if lock is None:
             _report(reports, AlreadyUp(_supervisor_of(folder)))
             return FINDINGS
         told = [*_not_brought_down(folder), *end_leftovers(folder)]
         folder.sweep()
         log = start_new(folder.path)
+        folder.write_state(RobotState.beginning(plan))
     except OSError as error:  # it is somebody else's, the disk is full
         _report(reports, Unsafe(str(error)))
         return FINDINGS
     _report(reports, Begun())
     for text in told:
         log.write(Record(0.0, Level.WARN, "robot", text))
-    ended = _run(Launch(plan, options, log, folder.path, clock), folder, reports)
+    ended = _run(Launch(plan, options, log, folder.path, clock), folder, lock, reports)
     shared_memory.remove_orphans()  # of processes that were killed
     folder.clear()
     _report(reports, ended)
@@ -194,13 +196,13 @@ def _supervisor_of(folder: RobotFolder) -> int | None:
     return state.supervisor.pid if state else None
 
 
-def _run(launch: Launch, folder: RobotFolder, reports: TextIO) -> RunEnded:
+def _run(launch: Launch, folder: RobotFolder, lock: int, reports: TextIO) -> RunEnded:
     plan, clock = launch.plan, launch.clock
 
     def tell_up() -> None:
         _report(reports, Up(len(plan.instances), len(plan.groups), clock.now()))
 
-    supervisor = Supervisor(launch, folder, tell_up)
+    supervisor = Supervisor(launch, folder, lock, tell_up)
     try:
         supervisor.run()
     except Exception as error:  # our own bug: nobody reads our stderr, so it goes where people look

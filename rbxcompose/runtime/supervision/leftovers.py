@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Sequence
 
 from rbxcompose.bus import shared_memory
-from rbxcompose.runtime.folder import BrokenStateError, RobotFolder
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, title
 from rbxcompose.runtime.processes import Process, titled, wait_until_ended
 
 ORDERLY = 2.5  # [s] for process groups to come to rest and end by themselves
@@ -21,10 +22,10 @@ def end_leftovers(folder: RobotFolder) -> list[str]:
     told: list[str] = []
     try:
         state = folder.read_state()
-        found = dict(state.alive()) if state else {}
     except BrokenStateError as error:
         told.append(f"the state of '{folder.path.name}' cannot be read ({error}); its processes were found by title")
-        found = {str(one.pid): one for one in titled(f"rbxcompose {folder.path.name}: ")}
+        state = None
+    found = dict(state.alive()) if state else _found_by_title(folder)
     deaf = [process for process in found.values() if process.is_stopped]
     _kill(deaf)
     left = wait_until_ended(list(found.values()), ORDERLY)
@@ -35,6 +36,15 @@ def end_leftovers(folder: RobotFolder) -> list[str]:
     if killed:
         told.append(f"processes left behind were killed: {', '.join(sorted(killed))}")
     return told
+
+
+def _found_by_title(folder: RobotFolder) -> dict[str, Process]:
+    """Return the processes that call themselves ones of this robot and have its log open."""
+    return {
+        str(one.pid): one
+        for one in titled(title(folder.path.name))
+        if one.pid != os.getpid() and one.holds_file_of(folder.path)
+    }
 
 
 def kill_supervisor(supervisor: Process) -> None:

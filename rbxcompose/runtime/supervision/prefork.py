@@ -23,9 +23,10 @@ import setproctitle
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.channel import Channel
+from rbxcompose.runtime.folder import title
 from rbxcompose.runtime.log import LogFile
 from rbxcompose.runtime.options import RunOptions
-from rbxcompose.runtime.processes import Process, end_with
+from rbxcompose.runtime.processes import Process, end_with, give_back_large_memory
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.typed_json import Family
 
@@ -46,7 +47,7 @@ class Launch:
 
     def title(self, process: str) -> str:
         """Return the title under which `ps` of the system shows a process."""
-        return f"rbxcompose {self.plan.robot}: {process}"
+        return title(self.plan.robot, process)
 
     def output(self, process: str) -> Path:
         """Return the file that takes what a process prints."""
@@ -149,6 +150,7 @@ def _run_parent(launch: Launch, connection: socket.socket, supervisor: int) -> N
     setproctitle.setproctitle(launch.title("parent"))
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _HELD_BACK)
+    give_back_large_memory()
     _import_what_is_common(launch.plan)
     gc.collect()
     gc.freeze()  # so that collections in the children do not copy these pages

@@ -32,10 +32,10 @@ class Silence:
             member.is_configured, member.last_word = False, now  # one kill is enough
             self._effects.kill(member.name)
 
-    def was_held_up(self, now: float) -> bool:
-        """Tell whether the last question was so long ago that nobody may be blamed for what was not heard since.
+    def held_up(self, now: float) -> float:
+        """Return how long nobody may be blamed for what was not heard [s], counted from the last question; mostly 0.
 
-        The supervisor was suspended itself then, or waited for a disk.
+        The supervisor was suspended itself then, waited for a disk, or the whole machine slept.
         """
         looked, self._looked = self._looked, now
-        return now - looked > SILENT
+        return now - looked if now - looked > SILENT else 0.0

@@ -20,6 +20,7 @@ from rbxcompose.plan.model import Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.control import ControlServer
 from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFolder, RobotState
+from rbxcompose.runtime.process_group.watchdog import MARK
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
 from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
@@ -33,7 +34,6 @@ from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.registry import declared
 
 _TAIL = 8000  # [B] of what a process printed that go into the log
-_HANG_MARK = "Timeout (0:00:"  # what the self-watchdog of a process prints before the place where it hung
 _LONGEST_WAIT = 60.0  # [s]
 _ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _OWNER = "supervisor"
@@ -52,14 +52,16 @@ class _Child:
 class Supervisor:
     """Runs one robot to its end; `run` returns the exit code."""
 
-    def __init__(self, launch: Launch, folder: RobotFolder, on_up: Callable[[], None]) -> None:
-        self._launch, self._folder, self._on_up = launch, folder, on_up
+    def __init__(self, launch: Launch, folder: RobotFolder, lock: int, on_up: Callable[[], None]) -> None:
+        """`lock` is the descriptor that holds the lock of `folder`."""
+        self._launch, self._folder, self._lock, self._on_up = launch, folder, lock, on_up
         self._clock: MonotonicClock = launch.clock
         self._scheduler = Scheduler()
         self._selector = selectors.DefaultSelector()
         self._children: dict[str, _Child] = {}
         self._interrupts = 0
         self._is_state_old = False  # the state file tells what was
+        self._complained = ""
         router = None if launch.plan.bus.router else ROUTER
         self.conductor = Conductor(launch.plan, launch.options, self._scheduler, self, router=router)
         self._wake, self._wakened = socket.socketpair()
@@ -76,7 +78,7 @@ class Supervisor:
         self._parent: Parent | None = Parent(self._launch)
         self._parent_process = self._parent.process
         self._parent_ran = self._clock.now()  # [s]
-        self._scheduler.every(LOOK, _OWNER, lambda dt: self._look_at_parent())
+        self._scheduler.every(LOOK, _OWNER, lambda dt: self._look_around())
         self._selector.register(self._parent, selectors.EVENT_READ, self._hear_parent)
         self._selector.register(self._wakened, selectors.EVENT_READ, self._hear_signals)
         self._control = ControlServer(self._folder, self._selector)
@@ -231,7 +233,7 @@ class Supervisor:
         if child.descriptor is not None:
             os.close(child.descriptor)
         printed = self._printed(name)
-        how = "hung and ended itself" if _HANG_MARK in printed else how
+        how = "hung and ended itself" if MARK in printed else how
         if printed and self.conductor.is_going_down:
             self.log(Level.OK, f"process '{name}' {how}; what it had printed is in the log file", printed)
         self.conductor.exited(name, how, printed)
@@ -241,6 +243,35 @@ class Supervisor:
             return self._launch.output(name).read_text(encoding="utf-8", errors="replace")[-_TAIL:]
         except OSError:  # it has printed nothing, or the disk is at fault: the robot does not depend on it
             return ""
+
+    def _look_around(self) -> None:
+        self._look_at_parent()
+        if self._folder.has_lost(self._lock):
+            self._restore_folder()
+
+    def _restore_folder(self) -> None:
+        """Put back what somebody has removed from the folder of this robot, so that `stop` and `down` find it."""
+        try:
+            self._folder.make()
+            lock = self._folder.lock() if self._folder.has_lost_lock(self._lock) else self._lock
+            if lock is None:
+                raise OSError("somebody else holds the lock")
+            if lock != self._lock:
+                os.close(self._lock)
+                self._lock = lock
+            self._control.open_again()
+            self._folder.write_state(self.state())
+        except OSError as error:
+            self._complain(f"files of the robot were removed and cannot be restored: {error}")
+        else:
+            self._complained = ""
+            self.log(Level.WARN, "somebody removed files of the running robot; they are restored")
+
+    def _complain(self, text: str) -> None:
+        """Warn of something that is tried again and again, once for each reason."""
+        if text != self._complained:
+            self._complained = text
+            self.log(Level.WARN, text)
 
     def _look_at_parent(self) -> None:
         """End a parent that a signal keeps from running: it forks nothing, and tells of no end of a process."""
@@ -314,7 +345,7 @@ class Supervisor:
         try:
             self._folder.write_state(self.state())
         except OSError as error:  # the robot does not depend on it
-            self.log(Level.WARN, f"the state file cannot be written: {error}")
+            self._complain(f"the state file cannot be written: {error}")
 
 
 def _executive(plan: Plan) -> str | None:

@@ -1,0 +1,50 @@
+"""Opening files of users: regular files only, so that a pipe holds nobody up and a device does not go on for ever."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+
+class NotRegularError(OSError):
+    """Raised when a path leads to a pipe, a device, a folder: to no regular file."""
+
+
+class TooLargeError(OSError):
+    """Raised when a file is larger than the limit of its kind."""
+
+
+def open_regular(path: Path, *, follow: bool = True) -> BinaryIO:
+    """Open a file of a user for reading; with `follow=False` no link is followed at its end.
+
+    Raises:
+        NotRegularError: if it is no regular file.
+        OSError: if it is not there or may not be read.
+    """
+    # O_NONBLOCK: a pipe without a writer would hold us up before we know what it is.
+    flags = os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | (0 if follow else os.O_NOFOLLOW)
+    descriptor = os.open(path, flags)
+    try:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise NotRegularError(0, "it is no regular file")
+        return open(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def read_regular(path: Path, most: int) -> bytes:
+    """Return what a file of a user holds.
+
+    Raises:
+        TooLargeError: if that is more than `most` [B].
+        NotRegularError: if it is no regular file.
+        OSError: if it is not there or may not be read.
+    """
+    with open_regular(path) as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise TooLargeError(0, f"it is larger than {most:,} bytes")
+    return data

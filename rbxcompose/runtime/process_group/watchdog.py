@@ -1,0 +1,43 @@
+"""A watchdog within a process: it ends the process if its loop does not turn, and tells where it hung.
+
+It counts its own wakings, not time: a process that was suspended, or a machine that slept, has hung nowhere.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import math
+import os
+import sys
+import threading
+import time
+
+HANG = 2.0  # [s] without a turn of the loop after which the process ends itself
+PERIOD = 0.25  # [s] between two wakings
+MARK = "the loop did not turn for "
+"""What the process prints before the places where its threads are."""
+
+
+class Watchdog:
+    """Ends the process with exit code 1 unless it is fed in time. A hang that keeps Python's lock is not seen here."""
+
+    def __init__(self) -> None:
+        self._seconds = HANG
+        self._left = 0  # wakings until the end
+        self._thread: threading.Thread | None = None
+
+    def feed(self, seconds: float = HANG) -> None:
+        """Let the process live for another `seconds` [s], less the part of a period that has gone already."""
+        self._seconds, self._left = seconds, math.ceil(seconds / PERIOD)
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
+            self._thread.start()
+
+    def _watch(self) -> None:
+        while self._left > 0:
+            time.sleep(PERIOD)
+            self._left -= 1
+        sys.stderr.flush()
+        os.write(2, f"{MARK}{self._seconds:g} s\n".encode())
+        faulthandler.dump_traceback(file=2)
+        os._exit(1)

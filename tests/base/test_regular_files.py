@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+import ast
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import rbxcompose
+from rbxcompose.regular_files import NotRegularError, TooLargeError, open_regular, read_regular
+
+PACKAGE = Path(rbxcompose.__file__).parent
+# What these open is no file that a user names: the package's own data, what the system tells, files of a running robot.
+MAY_OPEN = {
+    "cli/main.py",
+    "doctor/machine.py",
+    "msgs/definitions.py",
+    "msgs/packages.py",
+    "pages.py",
+    "recording/definitions.py",
+    "recording/files.py",
+    "regular_files.py",
+    "replacing.py",
+    "runtime/process_group/capture.py",
+    "runtime/folder.py",
+    "runtime/follow.py",
+    "runtime/supervision/launch.py",
+    "runtime/log.py",
+    "runtime/supervision/prefork.py",
+    "runtime/processes.py",
+    "runtime/supervision/supervisor.py",
+    "bus/shared_memory.py",
+    "runtime/control.py",
+    "scaffold/writing.py",
+    "testing/clocks.py",
+    "testing/golden.py",
+}
+
+
+def test_a_regular_file_is_read_up_to_its_limit(tmp_path: Path) -> None:
+    path = tmp_path / "text"
+    path.write_bytes(b"abc")
+    assert read_regular(path, 3) == b"abc"
+    with pytest.raises(TooLargeError, match="2 bytes"):
+        read_regular(path, 2)
+
+
+@pytest.mark.parametrize("path", ["/dev/zero", "/dev/null", "/", "FIFO"])
+def test_what_is_no_regular_file_is_refused_at_once(tmp_path: Path, path: str) -> None:
+    if path == "FIFO":
+        os.mkfifo(tmp_path / path)
+    with pytest.raises(NotRegularError):
+        open_regular(tmp_path / path)
+
+
+def test_a_link_is_followed_only_where_that_is_wanted(tmp_path: Path) -> None:
+    (tmp_path / "text").write_bytes(b"abc")
+    (tmp_path / "link").symlink_to(tmp_path / "text")
+    assert read_regular(tmp_path / "link", 3) == b"abc"
+    with pytest.raises(OSError, match="symbolic links"):
+        open_regular(tmp_path / "link", follow=False)
+
+
+def test_nobody_else_opens_files_of_users() -> None:
+    found = {str(path.relative_to(PACKAGE)) for path in PACKAGE.rglob("*.py") if any(opens_in(path))}
+    assert found <= MAY_OPEN
+
+
+def opens_in(path: Path) -> Iterator[int]:
+    """Lines that open a file by Python's own means; `something.open()` without arguments opens no file."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        match node:
+            case ast.Call(func=ast.Name("open")):
+                yield node.lineno
+            case ast.Call(func=ast.Attribute(attr="open", value=ast.Name("os")), args=[_, *_]):
+                yield node.lineno
+            case ast.Call(func=ast.Attribute(attr="open"), args=[ast.Constant(str())]):
+                yield node.lineno
+            case ast.Call(func=ast.Attribute(attr="read_text" | "read_bytes")):
+                yield node.lineno

@@ -1,0 +1,187 @@
+"""Every regular expression of the package takes time that grows with its text, not with the square of it."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import itertools
+import pkgutil
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from re import _constants as codes  # type: ignore[attr-defined]
+from re import _parser as parser  # type: ignore[attr-defined]
+from time import perf_counter
+from typing import Any
+
+import pytest
+
+import rbxcompose
+
+PACKAGE = Path(rbxcompose.__file__).parent
+N = 4_000  # characters of a near-miss
+SHORT = 0.004  # [s] in which a linear expression is through with any of them
+METHODS = ("match", "fullmatch", "search", "findall", "finditer", "sub", "split")
+SAMPLES = "\n\t -_.,:/#$'\"[]{}()!|>aAeisx01°"
+
+
+def modules() -> Iterator[str]:
+    for module in pkgutil.walk_packages([str(PACKAGE)], "rbxcompose."):
+        if not module.name.endswith("__main__"):
+            yield module.name
+
+
+def uses_of(tree: ast.AST) -> dict[str, set[str]]:
+    """The methods by which names of patterns are used."""
+    found: dict[str, set[str]] = {}
+    for node in ast.walk(tree):
+        match node:
+            case ast.Attribute(value=ast.Name(id=name) | ast.Attribute(attr=name), attr=method) if method in METHODS:
+                found.setdefault(name, set()).add(method)
+    return found
+
+
+def patterns() -> dict[tuple[str, Any], set[str]]:
+    """All patterns that are compiled in modules, with the methods by which anybody uses them."""
+    used: dict[str, set[str]] = {}
+    found: dict[tuple[str, Any], set[str]] = {}
+    for path in PACKAGE.rglob("*.py"):
+        for name, methods in uses_of(ast.parse(path.read_text())).items():
+            used.setdefault(name, set()).update(methods)
+    for name in modules():
+        for word, value in vars(importlib.import_module(name)).items():
+            if isinstance(value, re.Pattern):
+                found.setdefault((word, value), set()).update(used.get(word, ()))
+    for where, method, written in written_in_place():
+        if isinstance(written, ast.Constant):
+            found.setdefault((where, re.compile(written.value)), set()).add(method)
+    return found
+
+
+def written_in_place() -> Iterator[tuple[str, str, ast.expr]]:
+    """Patterns that stand where they are used, with the method."""
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            match node:
+                case ast.Call(func=ast.Attribute(value=ast.Name("re"), attr=method), args=[written, *_]):
+                    if method in METHODS:
+                        yield f"{path.relative_to(PACKAGE)}:{node.lineno}", method, written
+
+
+def character(items: list[Any]) -> str:
+    """A character that a set of characters holds, or nothing."""
+    for one in SAMPLES:
+        if any(holds(item, one) for item in items) != (items[0][0] is codes.NEGATE):
+            return one
+    return ""
+
+
+def holds(item: Any, one: str) -> bool:
+    match item:
+        case (codes.LITERAL, number):
+            return bool(ord(one) == number)
+        case (codes.RANGE, (low, high)):
+            return bool(low <= ord(one) <= high)
+        case (codes.CATEGORY, codes.CATEGORY_SPACE):
+            return one.isspace()
+        case (codes.CATEGORY, codes.CATEGORY_NOT_SPACE):
+            return not one.isspace()
+        case (codes.CATEGORY, codes.CATEGORY_DIGIT):
+            return one.isdigit()
+        case (codes.CATEGORY, codes.CATEGORY_WORD):
+            return one.isalnum() or one == "_"
+        case (codes.CATEGORY, codes.CATEGORY_NOT_WORD):
+            return not (one.isalnum() or one == "_")
+    return False
+
+
+def sample(tree: Any) -> str:
+    """A short text that a part of a pattern takes, as far as that can be told without looking around."""
+    text = ""
+    for code, value in tree:
+        match code:
+            case codes.LITERAL:
+                text += chr(value)
+            case codes.NOT_LITERAL:
+                text += next(one for one in SAMPLES if ord(one) != value)
+            case codes.ANY:
+                text += "a"
+            case codes.IN:
+                text += character(value)
+            case codes.BRANCH:
+                text += sample(value[1][0])
+            case codes.SUBPATTERN:
+                text += sample(value[3])
+            case codes.ATOMIC_GROUP:
+                text += sample(value)
+            case codes.MAX_REPEAT | codes.MIN_REPEAT | codes.POSSESSIVE_REPEAT:
+                text += sample(value[2]) * max(value[0], 0)
+    return text
+
+
+def starts(tree: Any, before: str = "") -> Iterator[tuple[str, str]]:
+    """For each repetition in a pattern: what can stand before it, and what it repeats."""
+    for code, value in tree:
+        match code:
+            case codes.MAX_REPEAT | codes.MIN_REPEAT | codes.POSSESSIVE_REPEAT:
+                yield before, sample(value[2])
+                yield from starts(value[2], before)
+            case codes.SUBPATTERN:
+                yield from starts(value[3], before)
+            case codes.ATOMIC_GROUP:
+                yield from starts(value, before)
+            case codes.BRANCH:
+                for branch in value[1]:
+                    yield from starts(branch, before)
+        before += sample([(code, value)])
+
+
+def near_misses(pattern: re.Pattern[Any]) -> Iterator[tuple[str, str, str]]:
+    """Beginnings, what is repeated behind them, and ends that spoil the match."""
+    found = {(before[-60:], pump) for before, pump in starts(parser.parse(pattern.pattern, pattern.flags & ~re.DEBUG))}
+    befores = {before for before, _ in found} | {f"{before}{pump}" for before, pump in found} | {""}
+    pumps = {pump for _, pump in found if pump} | {" ", "a", "\n", "a ", "- "}
+    yield from itertools.product(sorted(befores), sorted(pumps), ("\x00", "a:", ""))
+
+
+def seconds(call: Callable[[Any], object], text: Any) -> float:
+    """The least of two runs: others use the machine, too."""
+    took = []
+    for _ in range(2):
+        before = perf_counter()
+        call(text)
+        took.append(perf_counter() - before)
+    return min(took)
+
+
+def run_of(pattern: re.Pattern[Any], method: str) -> Callable[[Any], object]:
+    match method:
+        case "finditer":
+            return lambda text: sum(1 for _ in pattern.finditer(text))
+        case "sub":
+            return lambda text: pattern.sub(text[:0], text)
+    made: Callable[[Any], object] = getattr(pattern, method)
+    return made
+
+
+def slow_texts(pattern: re.Pattern[Any], methods: set[str]) -> Iterator[str]:
+    for method in sorted(methods):
+        call = run_of(pattern, method)
+        for before, pump, end in near_misses(pattern):
+            texts = [f"{before}{pump * (n // len(pump))}{end}" for n in (N, 2 * N)]
+            once, twice = (text.encode() if isinstance(pattern.pattern, bytes) else text for text in texts)
+            if seconds(call, once) > SHORT and seconds(call, twice) > 3 * seconds(call, once):
+                yield f"{method}: {before!r} {pump!r} * n {end!r}"
+
+
+ALL = sorted(patterns().items(), key=lambda one: (one[0][0], str(one[0][1].pattern)))
+
+
+@pytest.mark.parametrize(("pattern", "methods"), [(key[1], uses) for key, uses in ALL], ids=[key[0] for key, _ in ALL])
+def test_a_pattern_is_linear(pattern: re.Pattern[Any], methods: set[str]) -> None:
+    assert methods, "nobody uses it, or by a method that this test does not know"
+    assert next(slow_texts(pattern, methods), None) is None
+
+
+def test_no_pattern_is_put_together_where_this_test_cannot_see_it() -> None:
+    assert [where for where, _, written in written_in_place() if not isinstance(written, ast.Constant)] == []
