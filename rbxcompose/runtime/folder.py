@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rbxcompose.plan.model import Plan
 from rbxcompose.regular_files import open_regular
 from rbxcompose.replacing import TEMPORARY, replace_file
 from rbxcompose.runtime.processes import Process, boot_id
@@ -100,11 +99,6 @@ class RobotState:
         except UnreadableError as error:
             raise BrokenStateError(f"another version of rbxcompose wrote it: {error}") from error
         return state
-
-    @classmethod
-    def beginning(cls, plan: Plan) -> RobotState:
-        """Return the state of a robot that this process is about to start."""
-        return cls(plan.robot, os.path.realpath(plan.file), Process.of(os.getpid()), {}, (), boot=boot_id())
 
     def alive(self) -> dict[str, Process]:
         """Return those of its processes that still run, by name, without the supervisor."""

@@ -21,7 +21,7 @@ from rbxcompose.runtime.faults import explain
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, title
 from rbxcompose.runtime.log import start_new
 from rbxcompose.runtime.options import RunOptions
-from rbxcompose.runtime.processes import end_with
+from rbxcompose.runtime.processes import Process, boot_id, end_with
 from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
 from rbxcompose.runtime.supervision.leftovers import end_leftovers
@@ -167,7 +167,7 @@ def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: 
         told = [*_not_brought_down(folder), *end_leftovers(folder)]
         folder.sweep()
         log = start_new(folder.path)
-        folder.write_state(RobotState.beginning(plan))
+        folder.write_state(_beginning(plan))
     except OSError as error:  # it is somebody else's, the disk is full
         _report(reports, Unsafe(str(error)))
         return FINDINGS
@@ -179,6 +179,11 @@ def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: 
     folder.clear()
     _report(reports, ended)
     return ended.exit_code
+
+
+def _beginning(plan: Plan) -> RobotState:
+    """Return the state of a robot that this process is about to start."""
+    return RobotState(plan.robot, os.path.realpath(plan.file), Process.of(os.getpid()), {}, (), boot=boot_id())
 
 
 def _not_brought_down(folder: RobotFolder) -> Iterator[str]:
