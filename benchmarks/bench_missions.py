@@ -15,12 +15,12 @@ from rbxcompose.expressions.values import NotArrived, Value
 from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.missions.checking import check_program
-from rbxcompose.missions.engine import Engine
-from rbxcompose.missions.events import MissionEvent
-from rbxcompose.missions.mirror import Mirror
-from rbxcompose.missions.program import Program, RobotNames
-from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.engine.engine import Engine
+from rbxcompose.missions.engine.events import MissionEvent
+from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.program.program import Program, RobotNames
+from rbxcompose.missions.view.mirror import Mirror
 
 NODES = 1000
 TICKS = 50  # per sample

@@ -16,7 +16,7 @@ from typing import Any
 from benchmarks.measuring import BARE, COMMAND, ROOT, Row, Samples, in_turns, memory_of, program, tree
 from benchmarks.peers import ROS_PYTHON, Ros, free_port, missing
 from rbxcompose.compiler import compile_robot
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.testing import run_robot
 
 ROBOT = str(ROOT / "robots/turtlebot/robot.yaml")

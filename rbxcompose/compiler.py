@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 
-from rbxcompose.checking import run_checks
+from rbxcompose.check_runner import run_checks
+from rbxcompose.composition.overlay import SET
+from rbxcompose.composition.robot_file import load_robot
 from rbxcompose.findings import Related, Report, Severity, Span
-from rbxcompose.manifest.overlay import SET
 from rbxcompose.manifest.reader import Texts
-from rbxcompose.manifest.robot_file import load_robot
 from rbxcompose.manifest.walk import TWICE
 from rbxcompose.model.build import build_robot
 from rbxcompose.model.robot import Robot

@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from rbxcompose.findings import Severity, kind
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

@@ -9,7 +9,7 @@ from docs.generating.markdown import about, code, example, example_of, indented,
 from docs.generating.shapes import keys_table
 from rbxcompose.config import Place
 from rbxcompose.manifest.options import ComponentOptions
-from rbxcompose.missions.goals import typed_fields
+from rbxcompose.missions.program.goals import typed_fields
 from rbxcompose.qos import Qos
 from rbxcompose.references import PLACE
 from rbxcompose.schema.components import examples_of

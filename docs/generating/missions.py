@@ -12,16 +12,16 @@ from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions.asked import Asked, Assignment
-from rbxcompose.missions.goals import skill_of, topic_skill
-from rbxcompose.missions.grammar import Takes
-from rbxcompose.missions.messages import Message
+from rbxcompose.missions.language.asked import Asked, Assignment
+from rbxcompose.missions.language.grammar import Takes
+from rbxcompose.missions.language.reader import INTERRUPT_KEYS
 from rbxcompose.missions.modifiers.registry import modifiers
-from rbxcompose.missions.moments import Moments
-from rbxcompose.missions.reading import INTERRUPT_KEYS
-from rbxcompose.missions.registry import Kind, kinds
-from rbxcompose.schema.asking import Asking, first_line
+from rbxcompose.missions.program.goals import skill_of, topic_skill
+from rbxcompose.missions.program.messages import Message
+from rbxcompose.missions.program.moments import Moments
+from rbxcompose.missions.program.registry import Kind, kinds
 from rbxcompose.schema.mission import mission_schema
+from rbxcompose.schema.node_schema import Asking, first_line
 from rbxcompose.schema.scalars import Schema
 from rbxcompose.schema.settle import referred
 from rbxcompose.sdk.ports import ServesAction, ServesTopic

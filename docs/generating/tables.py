@@ -13,7 +13,7 @@ from docs.generating.families import families
 from docs.generating.markdown import about, code, lowered, table
 from docs.generating.missions import told_by
 from docs.generating.shapes import with_default
-from rbxcompose.missions.registry import Kind, kinds
+from rbxcompose.missions.program.registry import Kind, kinds
 from rbxcompose.sdk.registry import PLUGINS, component_type
 
 PAGES = ("architecture.md", "language.md", "missions.md")

@@ -2,8 +2,8 @@
 
 Who listens at the key hears what is new, who asks there gets the whole. Both are JSON of one shape (`SCHEMA`):
 `source` names the window, `sequence` counts the news from one, so that a listener notices what it missed, and `value`
-is what the component tells. A whole has the sequence of the last news that it contains. `missions/replica.py` is the
-other side.
+is what the component tells. A whole has the sequence of the last news that it contains. `missions/view/replica.py` is
+the other side.
 """
 
 from __future__ import annotations

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.expressions.tree import Call, Expression, ExpressionError, Index, Number, Variable, walk
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions.program import Program
-from rbxcompose.missions.spans import expression_of, inner_span
-from rbxcompose.model.charging import constants
+from rbxcompose.missions.language.spans import expression_of, inner_span
+from rbxcompose.missions.program.program import Program
+from rbxcompose.model.charge import constants
 from rbxcompose.model.robot import Robot
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding
 from rbxcompose.model.blame import blamed
-from rbxcompose.model.charging import calls
+from rbxcompose.model.charge import calls
 from rbxcompose.model.robot import Robot
 from rbxcompose.units import RATIO, format_quantity
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
-from rbxcompose.missions.ways import distance, too_short
-from rbxcompose.model.charging import charger_of, constants, ways_of
+from rbxcompose.missions.analysis.travel_times import distance, too_short
+from rbxcompose.model.charge import charger_of, constants, ways_of
 from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
 

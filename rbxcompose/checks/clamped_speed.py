@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Kind, Related, Severity
 from rbxcompose.model.flow import OTHER_TYPE, Drive, Flow, setting_span
 from rbxcompose.model.robot import Robot

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding
 from rbxcompose.model.robot import Robot
 from rbxcompose.sdk.ports import Looks

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.missions.facts import goal_place
-from rbxcompose.missions.ways import distance, too_short
+from rbxcompose.missions.analysis.facts import goal_place
+from rbxcompose.missions.analysis.travel_times import distance, too_short
 from rbxcompose.model.blame import blamed
-from rbxcompose.model.charging import calls, constants, ways_of
+from rbxcompose.model.charge import calls, constants, ways_of
 from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
 from rbxcompose.units import RATIO, TIME, format_quantity

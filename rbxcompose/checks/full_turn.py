@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.model.robot import Robot
 from rbxcompose.units import ANGLE, format_quantity

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
+from rbxcompose.composition.history import Step
+from rbxcompose.composition.overlay import SET
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.manifest.history import Step
-from rbxcompose.manifest.overlay import SET
 from rbxcompose.manifest.tree import Scalar
 from rbxcompose.model.robot import Robot
 

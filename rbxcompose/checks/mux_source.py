@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, correction, suggest, surely_meant
 from rbxcompose.model.robot import Robot
 from rbxcompose.sdk.ports import Out

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity, Span
 from rbxcompose.model.flow import is_written, setting_span
 from rbxcompose.model.robot import Part, Robot
-from rbxcompose.model.wiring import End
+from rbxcompose.model.wires import End
 from rbxcompose.sdk.capabilities import WritesFrame
 
 STATIC = "_static"  # ends the topic of transforms that never change; both topics tell one tree

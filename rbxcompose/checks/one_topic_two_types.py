@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wiring import resolve
+from rbxcompose.model.wires import resolve
 from rbxcompose.sdk.ports import Looks
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
+from rbxcompose.composition.robot_manifest import About, IncludedPart
 from rbxcompose.findings import Finding, Related
-from rbxcompose.manifest.models import About, IncludedPart
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wiring import End, resolve
+from rbxcompose.model.wires import End, resolve
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Serves, ServesAction
 
 WIRES: tuple[tuple[type[Port[Any]], type[Port[Any]]], ...] = ((Out, In), (Calls, Serves), (CallsAction, ServesAction))

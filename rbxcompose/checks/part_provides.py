@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.checks.part_needs import is_type, own_instances, short
+from rbxcompose.composition.robot_manifest import About, Claim
 from rbxcompose.findings import Finding, Related
-from rbxcompose.manifest.models import About, Claim
 from rbxcompose.manifest.tree import at
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wiring import End, resolve
+from rbxcompose.model.wires import End, resolve
 from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.expressions.tree import ExpressionError, Variable
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.findings import Finding, Related, Span, suggest
 from rbxcompose.manifest.tree import Mapping, Scalar, Sequence, at
-from rbxcompose.missions.deeds import replaced, written
-from rbxcompose.missions.facts import Constants
-from rbxcompose.missions.program import Node, Program
-from rbxcompose.missions.spans import expression_of
-from rbxcompose.model.charging import constants
+from rbxcompose.missions.analysis.effects import replaced, written
+from rbxcompose.missions.analysis.facts import Constants
+from rbxcompose.missions.language.spans import expression_of
+from rbxcompose.missions.program.program import Node, Program
+from rbxcompose.model.charge import constants
 from rbxcompose.model.robot import Robot
 
 

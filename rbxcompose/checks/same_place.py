@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.robot import Robot
 

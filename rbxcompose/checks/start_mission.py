@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
+from rbxcompose.composition.robot_file import MISSION
 from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.files import files_named
 from rbxcompose.manifest.reader import read_file
-from rbxcompose.manifest.robot_file import MISSION
 from rbxcompose.manifest.tree import Mapping, Scalar
 from rbxcompose.model.robot import Robot
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.missions.facts import place_in_text
-from rbxcompose.missions.ways import distance, too_short
-from rbxcompose.model.charging import constants, ways_of
+from rbxcompose.missions.analysis.facts import place_in_text
+from rbxcompose.missions.analysis.travel_times import distance, too_short
+from rbxcompose.model.charge import constants, ways_of
 from rbxcompose.model.robot import Robot
 from rbxcompose.units import LENGTH, TIME, format_quantity
 

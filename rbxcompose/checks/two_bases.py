@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wiring import End
+from rbxcompose.model.wires import End
 from rbxcompose.sdk.capabilities import Drives
 
 

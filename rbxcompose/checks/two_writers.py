@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import groupby
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.checks.mux_source import missing
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wiring import End
+from rbxcompose.model.wires import End
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import Out

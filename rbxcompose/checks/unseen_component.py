@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 from rbxcompose.checks.shortened_list import dropped
 from rbxcompose.diagnostics.core import Analyzer
 from rbxcompose.findings import Finding, Severity

@@ -79,7 +79,7 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> Checked:
 
 
 def _check_tests(tests: list[str], checked: Checked) -> None:
-    from rbxcompose.trials.reading import Reading  # only tests need it
+    from rbxcompose.mission_tests.reader import Reading  # only tests need it
 
     reading, found = Reading(os.environ), Report()
     for path in tests:

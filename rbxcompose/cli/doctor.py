@@ -20,8 +20,8 @@ from rbxcompose.cli.output.console import FINDINGS, has_colour, refuse, tell, te
 from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, find_robot, robots_up
 from rbxcompose.compiler import compile_robot
 from rbxcompose.doctor import machine
-from rbxcompose.doctor.examining import Answer, examine_all, has_errors
 from rbxcompose.doctor.facts import Bus, Facts, Running
+from rbxcompose.doctor.registry import Answer, examine_all, has_errors
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.model.robot import Robot

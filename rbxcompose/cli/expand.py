@@ -12,8 +12,8 @@ import json
 from rbxcompose.cli.output.console import FINDINGS, tell, tell_report
 from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
-from rbxcompose.plain import escaped
-from rbxcompose.seeing.expand import expand, expand_data
+from rbxcompose.inspection.expand import expand, expand_data
+from rbxcompose.printable import escaped
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

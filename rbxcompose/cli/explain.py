@@ -9,8 +9,8 @@ import argparse
 import json
 
 from rbxcompose.cli.output.console import misused, tell
+from rbxcompose.finding_pages import all_kinds, body_of, family_of, text_of, title_of
 from rbxcompose.findings import Kind, suggest
-from rbxcompose.pages import all_kinds, body_of, family_of, text_of, title_of
 
 _PREFIX = "RBX"
 

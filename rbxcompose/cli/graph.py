@@ -9,15 +9,15 @@ import argparse
 import sys
 from pathlib import Path
 
+from rbxcompose.atomic_files import replace_file
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
-from rbxcompose.replacing import replace_file
-from rbxcompose.seeing.diagram import diagram_of
-from rbxcompose.seeing.graph_dot import dot
-from rbxcompose.seeing.graph_html import html
-from rbxcompose.seeing.graph_mermaid import mermaid
-from rbxcompose.seeing.layout import NotDrawnError
+from rbxcompose.inspection.diagram import diagram_of
+from rbxcompose.inspection.graph_dot import dot
+from rbxcompose.inspection.graph_html import html
+from rbxcompose.inspection.graph_mermaid import mermaid
+from rbxcompose.inspection.layout import NotDrawnError
 
 USAGE = 2
 FORMATS = {"mermaid": mermaid, "dot": dot, "html": html}

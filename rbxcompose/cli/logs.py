@@ -13,8 +13,8 @@ from collections.abc import Iterable, Sequence
 from rbxcompose.cli.output.console import has_colour, refuse, tell
 from rbxcompose.cli.robots.lookup import NOT_UP, NotDoneError, add_robot_option, find_robot, known_state
 from rbxcompose.cli.robots.story import Story
-from rbxcompose.diagnostics.levels import LOG_LEVELS
 from rbxcompose.findings import suggest
+from rbxcompose.levels import LOG_LEVELS
 from rbxcompose.runtime.folder import RobotFolder, base_folder
 from rbxcompose.runtime.follow import Follower
 from rbxcompose.runtime.log import NAME

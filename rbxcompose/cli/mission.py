@@ -130,8 +130,8 @@ def _chosen(arguments: argparse.Namespace) -> str:
     """Return the mission that is meant: the one that is named, else the only one that runs, or ran last."""
     if arguments.name:
         return str(arguments.name)
-    from rbxcompose.missions.mirror import ACTIVE
-    from rbxcompose.missions.statuses import IDLE, NAMES
+    from rbxcompose.missions.program.statuses import IDLE, NAMES
+    from rbxcompose.missions.view.mirror import ACTIVE
 
     known = [one for one in ask(arguments.robot, ListMissions()) if one.state != NAMES[IDLE]]
     active = [one for one in known if one.state in ACTIVE] or known
@@ -154,7 +154,7 @@ def _status(arguments: argparse.Namespace) -> int:
 
 def _drawn(name: str, robot: str | None, seen: Seen, width: int, *, colour: bool = False) -> list[str]:
     from rbxcompose.cli.missions.live_view import lines_of
-    from rbxcompose.missions.picture import picture_from_data
+    from rbxcompose.missions.view.picture import picture_from_data
 
     return lines_of(picture_from_data(ask(robot, ShowPicture(name))), seen, width, colour=colour)
 
@@ -168,7 +168,7 @@ def _watch(arguments: argparse.Namespace) -> int:
 
 
 def _log(arguments: argparse.Namespace) -> int:
-    from rbxcompose.missions.logbook import INPUTS
+    from rbxcompose.missions.engine.logbook import INPUTS
 
     number = 0
     try:

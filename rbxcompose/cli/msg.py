@@ -17,7 +17,7 @@ from rbxcompose.msgs.generate import all_structures
 from rbxcompose.msgs.hashes import type_hash
 from rbxcompose.msgs.joined import short
 from rbxcompose.msgs.packages import OWN, all_names, package_files, parts_of, whole_text
-from rbxcompose.scaffold.writing import write_new
+from rbxcompose.scaffold.new_files import write_new
 
 LICENCE = "Apache-2.0"
 

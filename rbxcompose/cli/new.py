@@ -15,10 +15,10 @@ from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.project.new_mission import MistakenRobotError, find_home
 from rbxcompose.cli.project.questions import Asker, CancelledError
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 from rbxcompose.scaffold import component, mission, part, robot
 from rbxcompose.scaffold.answers import AnswerError, read_name, read_text, read_yes
-from rbxcompose.scaffold.writing import write_new
+from rbxcompose.scaffold.new_files import write_new
 
 INTERRUPTED = 130
 _WIDEST = 4096  # characters of a line, enough for any path

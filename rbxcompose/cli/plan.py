@@ -13,12 +13,12 @@ from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import Finding, kind
+from rbxcompose.inspection.plan_text import plan_text
 from rbxcompose.manifest.limits import ALL_BYTES
 from rbxcompose.plan.diff import difference
 from rbxcompose.plan.dump import PlanTextError, dump, load
 from rbxcompose.plan.model import Plan
 from rbxcompose.regular_files import read_regular
-from rbxcompose.seeing.plan_text import plan_text
 
 NO_PLAN = kind(
     "RBX9012",

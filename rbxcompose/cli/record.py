@@ -26,7 +26,7 @@ from rbxcompose.cli.recordings.options import (
 )
 from rbxcompose.cli.recordings.tap import Tap
 from rbxcompose.cli.robots.lookup import NotDoneError, find_robot
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 from rbxcompose.recording.codes import LOST, UNWRITABLE
 from rbxcompose.recording.files import ENDING
 from rbxcompose.recording.recorder import Recorder, Split

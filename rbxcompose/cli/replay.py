@@ -33,7 +33,7 @@ from rbxcompose.cli.recordings.rerun import run_again
 from rbxcompose.cli.recordings.tap import Player
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.findings import MOST_NAMES, Finding
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 from rbxcompose.qos import Qos
 from rbxcompose.recording.codes import DAMAGED, NOT_REPLAYED, NOTHING, SENT_ALREADY, UNREADABLE
 from rbxcompose.recording.files import PART

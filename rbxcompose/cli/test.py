@@ -17,12 +17,12 @@ from pathlib import Path
 from rbxcompose.cli.output.console import FINDINGS, has_colour, misused, tell, tell_report
 from rbxcompose.findings import Report
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.trials.coverage import Coverage
-from rbxcompose.trials.finding_files import tests_of
-from rbxcompose.trials.junit import junit
-from rbxcompose.trials.reading import Reading, Written
-from rbxcompose.trials.running import run_trial
-from rbxcompose.trials.telling import Outcome, Teller, as_json, coverage_text
+from rbxcompose.mission_tests.coverage import Coverage
+from rbxcompose.mission_tests.finding_files import tests_of
+from rbxcompose.mission_tests.junit import junit
+from rbxcompose.mission_tests.reader import Reading, Written
+from rbxcompose.mission_tests.report import Outcome, Teller, as_json, coverage_text
+from rbxcompose.mission_tests.runner import run_trial
 
 HERE = Path("missions")
 

@@ -27,7 +27,7 @@ from rbxcompose.cli.bus.topic_echo import Reader
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.geometry import Transform3, yaw_of
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 
 _TOPICS = ("/tf", "/tf_static")
 _DIGITS = 4  # of metres and degrees

@@ -19,7 +19,7 @@ from rbxcompose.cli.output.console import has_colour, refuse, tell
 from rbxcompose.cli.output.terminal import full_screen, raw, show
 from rbxcompose.cli.robots.lookup import NOT_UP, NotDoneError, add_robot_option, find_robot
 from rbxcompose.cli.robots.picture import Picture, lines_of
-from rbxcompose.cli.robots.sampling import Sampler
+from rbxcompose.cli.robots.sampler import Sampler
 
 _PERIOD = 1.0  # [s] between two looks
 _MOST_READ = 1024  # bytes of keys at once

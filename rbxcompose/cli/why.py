@@ -13,7 +13,7 @@ from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import Finding
-from rbxcompose.seeing.why import why
+from rbxcompose.inspection.why import why
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

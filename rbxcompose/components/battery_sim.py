@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.msgs.rbxcompose_msgs import SetBatteryLevel
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.sdk import (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pydantic import Field
 
 from rbxcompose.diagnostics.core import DEFAULT_TIMEOUT, Aggregator, Analyzer
-from rbxcompose.diagnostics.levels import Level, level_of
 from rbxcompose.diagnostics.status import Status
+from rbxcompose.levels import Level, level_of
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header

@@ -7,8 +7,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from rbxcompose.diagnostics.levels import Level
 from rbxcompose.geometry import Transform3, Velocity2
+from rbxcompose.levels import Level
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.stamps import to_time

@@ -11,7 +11,9 @@ from pydantic import InstanceOf, WithJsonSchema
 
 from rbxcompose.executive import broadcast
 from rbxcompose.executive.arrivals import Arrivals
+from rbxcompose.executive.mission_run import PATIENCE, Running
 from rbxcompose.executive.missions import Missions
+from rbxcompose.executive.ports import EVENTS, ports_for
 from rbxcompose.executive.requests import (
     CancelMission,
     ListedMission,
@@ -27,20 +29,18 @@ from rbxcompose.executive.requests import (
     Seen,
     ShowPicture,
 )
-from rbxcompose.executive.running import PATIENCE, Running
 from rbxcompose.executive.shell import ENDS, PUBLISHES, VALUE, port_name
 from rbxcompose.executive.topic_skills import Desks
-from rbxcompose.executive.wiring import EVENTS, ports_for
 from rbxcompose.executive.world import RobotWorld
-from rbxcompose.missions.events import MissionEnded, MissionEvent
-from rbxcompose.missions.logbook import INPUTS, Record
-from rbxcompose.missions.program import Program, RobotNames
-from rbxcompose.missions.results import Result
-from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource
-from rbxcompose.missions.statuses import IDLE
-from rbxcompose.missions.using import Using
-from rbxcompose.missions.watching import POSE
-from rbxcompose.missions.world import World
+from rbxcompose.missions.analysis.uses import Using
+from rbxcompose.missions.engine.condition_watches import POSE
+from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
+from rbxcompose.missions.engine.logbook import INPUTS, Record
+from rbxcompose.missions.engine.world import World
+from rbxcompose.missions.program.program import Program, RobotNames
+from rbxcompose.missions.program.results import Result
+from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource
+from rbxcompose.missions.program.statuses import IDLE
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.robot_events import MissionOver, MissionWaits
 from rbxcompose.sdk import (

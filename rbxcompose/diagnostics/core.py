@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
-from rbxcompose.diagnostics.levels import Level, combined
 from rbxcompose.diagnostics.status import Status
+from rbxcompose.levels import Level, combined
 
 DEFAULT_TIMEOUT = 5.0  # [s]
 OTHER = "Other"  # the group of what no analyzer matches

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rbxcompose.diagnostics.levels import level_of
 from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
-from rbxcompose.missions.sources import ValueSource
+from rbxcompose.levels import level_of
+from rbxcompose.missions.program.sources import ValueSource
 
 
 class Arrivals:

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from rbxcompose.executive.mission_run import Running
 from rbxcompose.executive.missions import Missions
 from rbxcompose.executive.requests import ListMissions, LookAtAll
-from rbxcompose.executive.running import Running
 from rbxcompose.requests import Query
 from rbxcompose.sdk.bound import Window
 

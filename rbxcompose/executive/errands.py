@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 from rbxcompose.executive.shell import PAUSES, SKILL, Shell
 from rbxcompose.expressions.values import Value
-from rbxcompose.missions.goals import SUCCESS, values_of
-from rbxcompose.missions.program import Skill
-from rbxcompose.missions.results import Result
-from rbxcompose.missions.sources import OUTCOME
+from rbxcompose.missions.program.goals import SUCCESS, values_of
+from rbxcompose.missions.program.program import Skill
+from rbxcompose.missions.program.results import Result
+from rbxcompose.missions.program.sources import OUTCOME
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal
 

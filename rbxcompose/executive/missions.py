@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.executive.mission_run import MakeWorld, Running, claims_of
 from rbxcompose.executive.requests import ListedMission, LogPart, PictureData, Seen
-from rbxcompose.executive.running import MakeWorld, Running, claims_of
 from rbxcompose.executive.shell import Equipment
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import suggest
-from rbxcompose.missions.beginning import NoSuchState, start_at
-from rbxcompose.missions.inputs import bind_texts
-from rbxcompose.missions.linking import link
-from rbxcompose.missions.logbook import Record
-from rbxcompose.missions.picture import picture_of, picture_to_data
-from rbxcompose.missions.program import Program
-from rbxcompose.missions.statuses import IDLE, NAMES
-from rbxcompose.missions.world import Observer, Settings
+from rbxcompose.levels import Level
+from rbxcompose.missions.engine.entry_states import NoSuchState, start_at
+from rbxcompose.missions.engine.inputs import bind_texts
+from rbxcompose.missions.engine.logbook import Record
+from rbxcompose.missions.engine.world import Observer, Settings
+from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.program import Program
+from rbxcompose.missions.program.statuses import IDLE, NAMES
+from rbxcompose.missions.view.picture import picture_of, picture_to_data
 from rbxcompose.requests import Refused
 
 MOST_RECORDS = 20_000  # of the log that are kept

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from rbxcompose.executive.errands import Done, Errand
 from rbxcompose.executive.shell import Shell
 from rbxcompose.expressions.values import Value
-from rbxcompose.missions.results import Result
+from rbxcompose.missions.program.results import Result
 from rbxcompose.sdk.skills import Activity, SkillType, Told
 
 LONGEST = 0.005  # [s] in one call; meanwhile no mission does anything else

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from rbxcompose.missions.program import Program, RobotNames
-from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource
+from rbxcompose.missions.program.program import Program, RobotNames
+from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource
 
 # What the names of ports begin with.
 VALUE, PUBLISHES, CALLS = "value_", "publishes_", "calls_"

@@ -7,9 +7,9 @@ from typing import Any
 
 from rbxcompose.executive.errands import GONE, Done, Waiting, text_in
 from rbxcompose.executive.shell import ENDS, HALTS, SKILL, Shell, port_name
-from rbxcompose.missions.goals import SUCCESS, values_of
-from rbxcompose.missions.results import Result
-from rbxcompose.missions.sources import OUTCOME, SkillSource
+from rbxcompose.missions.program.goals import SUCCESS, values_of
+from rbxcompose.missions.program.results import Result
+from rbxcompose.missions.program.sources import OUTCOME, SkillSource
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.bound import OrderSender
 

@@ -11,11 +11,11 @@ from rbxcompose.executive.python_skills import PythonErrand
 from rbxcompose.executive.shell import CALLS, PUBLISHES, SKILL, Shell, port_name
 from rbxcompose.executive.topic_skills import Desks, TopicErrand
 from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
-from rbxcompose.missions.events import MissionEvent
-from rbxcompose.missions.goals import filled, goal_of, message_of
-from rbxcompose.missions.results import Result
-from rbxcompose.missions.sources import Way
-from rbxcompose.missions.watching import POSE
+from rbxcompose.missions.engine.condition_watches import POSE
+from rbxcompose.missions.engine.events import MissionEvent
+from rbxcompose.missions.program.goals import filled, goal_of, message_of
+from rbxcompose.missions.program.results import Result
+from rbxcompose.missions.program.sources import Way
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.skills import skill_type
 

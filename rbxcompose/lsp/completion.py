@@ -11,7 +11,7 @@ from typing import Any
 from rbxcompose.lsp.document import Document, Spot
 from rbxcompose.lsp.names import SKILL, named_by_key
 from rbxcompose.lsp.variables import fills, variables
-from rbxcompose.missions.keys import anywhere
+from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.references import PLACE
 from rbxcompose.schema.guide import Guide, Value
 from rbxcompose.schema.scalars import Schema, units_of

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from rbxcompose.lsp.quick import LARGE, near, quick_tree
-from rbxcompose.manifest.collection import paused_collection
+from rbxcompose.manifest.garbage_collection import paused_collection
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, Sequence, at
 
 MARK = "\ue000"  # a character for private use, so that it stands in no manifest

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.composition.robot_file import read_mission
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.files import ROBOT_FILE, project_of, shown_name
 from rbxcompose.manifest.reader import Texts, read_file
-from rbxcompose.manifest.robot_file import read_mission
-from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.language.reader import read_program
 from rbxcompose.model.robot import Robot
 
 ROBOT, MISSION, OVERLAY = "Robot", "Mission", "Overlay"

@@ -9,8 +9,8 @@ from itertools import pairwise
 import yaml
 
 from rbxcompose.findings import Span
-from rbxcompose.manifest.composing import compose
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.yaml_nodes import compose
 
 LARGE = 300  # lines; of longer manifests only what is near the position is read
 SMALL = 100  # lines; a section of that size is always read

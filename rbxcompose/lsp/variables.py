@@ -8,9 +8,9 @@ from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span
 from rbxcompose.lsp.document import Spot
 from rbxcompose.manifest.tree import Mapping, Scalar, at, key_span
-from rbxcompose.missions.program import Program
-from rbxcompose.missions.views import base_names, views
-from rbxcompose.missions.watching import POSE
+from rbxcompose.missions.analysis.scope_types import base_names, views
+from rbxcompose.missions.engine.condition_watches import POSE
+from rbxcompose.missions.program.program import Program
 from rbxcompose.references import ARGUMENT
 
 _FILLS = {"robot.name": "name of the robot", "sim": "true in simulation", "env.": "a variable of the environment"}

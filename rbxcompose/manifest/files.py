@@ -8,7 +8,7 @@ from pathlib import Path
 from rbxcompose.findings import Finding, Span, kind
 from rbxcompose.manifest.library import PARTS, PREFIX, library_root
 from rbxcompose.manifest.reader import UNREADABLE
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 
 OUTSIDE = kind(
     "RBX1306",

@@ -16,16 +16,16 @@ from rbxcompose.expressions.values import EvaluationError
 from rbxcompose.findings import Report, correction, kind, replacement, suggest
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.arguments import show
-from rbxcompose.manifest.composing import TOO_LARGE
-from rbxcompose.manifest.given import given_span
+from rbxcompose.manifest.fill_names import Names, NameTypes, NameValues
+from rbxcompose.manifest.given_values import given_span
 from rbxcompose.manifest.limits import ALL_BYTES
-from rbxcompose.manifest.names import Names, NameTypes, NameValues
-from rbxcompose.manifest.parts import part_span
+from rbxcompose.manifest.scalar_parts import part_span
 from rbxcompose.manifest.scalars import describe
 from rbxcompose.manifest.secrets import NoSecretError
 from rbxcompose.manifest.tree import BROKEN, Entry, Node, Scalar, Sequence, size
 from rbxcompose.manifest.validate import to_plain
-from rbxcompose.plain import plain
+from rbxcompose.manifest.yaml_nodes import TOO_LARGE
+from rbxcompose.printable import plain
 from rbxcompose.units import NUMBER, QUOTIENT, Quantity
 
 SYNTAX = kind(

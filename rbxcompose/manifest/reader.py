@@ -8,12 +8,12 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
 
 from rbxcompose.findings import Edit, Finding, Fix, Span, kind
-from rbxcompose.manifest.composing import TOO_LARGE, compose
 from rbxcompose.manifest.limits import ALL_BYTES, FILE_BYTES, FILES
+from rbxcompose.manifest.parser_error import NOT_YAML
 from rbxcompose.manifest.tree import Node
-from rbxcompose.manifest.trouble import NOT_YAML
 from rbxcompose.manifest.walk import CHARACTER, Walk
-from rbxcompose.plain import FORBIDDEN, code_point
+from rbxcompose.manifest.yaml_nodes import TOO_LARGE, compose
+from rbxcompose.printable import FORBIDDEN, code_point
 from rbxcompose.regular_files import NotRegularError, open_regular
 
 NOT_UTF8 = kind(

@@ -20,11 +20,11 @@ from pydantic import BeforeValidator
 from rbxcompose.config import Name
 from rbxcompose.findings import Report
 from rbxcompose.manifest.documents import Documents
-from rbxcompose.manifest.renames import Renames
+from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.shapes import below, kinds_of, with_references
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, at
 from rbxcompose.manifest.validate import WRONG_TYPE, is_valid, label_of, validate
-from rbxcompose.manifest.wanted import WantedComponent, Wiring
+from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.references import COMPONENT, Refers
 
 M = TypeVar("M")

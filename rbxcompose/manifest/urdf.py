@@ -6,9 +6,9 @@ from typing import NamedTuple
 from xml.parsers import expat
 
 from rbxcompose.findings import Finding, Related, Span, kind
-from rbxcompose.manifest.composing import TOO_LARGE
 from rbxcompose.manifest.limits import DEPTH, NODES
-from rbxcompose.plain import plain
+from rbxcompose.manifest.yaml_nodes import TOO_LARGE
+from rbxcompose.printable import plain
 
 NOT_XML = kind(
     "RBX2001",

@@ -15,12 +15,12 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from rbxcompose.findings import SIMILAR, Finding, Report, Span, correction, kind
-from rbxcompose.manifest.repairs import changed, repaired
+from rbxcompose.manifest.conversions import changed, repaired
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import dimension_at, keys_at
 from rbxcompose.manifest.slips import Refused, value_slip
 from rbxcompose.manifest.tree import BROKEN, Mapping, Node, Path, Scalar, Sequence, at, key_span, value_span
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 from rbxcompose.units import Quantity, UnitError, format_quantity
 
 UNKNOWN_KEY = kind(

@@ -13,12 +13,12 @@ from typing import Any
 import yaml
 
 from rbxcompose.findings import Finding, Related, Severity, Span, kind
-from rbxcompose.manifest.composing import TOO_LARGE
 from rbxcompose.manifest.limits import ALIAS_NODES, DEPTH, KEY, TEXT
+from rbxcompose.manifest.parser_error import QUOTE_HELP, QUOTES_NEEDED
 from rbxcompose.manifest.scalars import number_trouble
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
-from rbxcompose.manifest.trouble import QUOTE_HELP, QUOTES_NEEDED
-from rbxcompose.plain import FORBIDDEN, code_point, plain
+from rbxcompose.manifest.yaml_nodes import TOO_LARGE
+from rbxcompose.printable import FORBIDDEN, code_point, plain
 
 TWICE = kind(
     "RBX1104",

@@ -8,9 +8,9 @@ from collections.abc import Callable
 import yaml
 
 from rbxcompose.findings import Finding, Related, Span
+from rbxcompose.manifest.parser_error import NOT_YAML, QUOTE_HELP, QUOTES_NEEDED, Trouble, indent
 from rbxcompose.manifest.slips import ANY, COLON, NO_COLON, NO_DASH, NO_KEY, text_slip
-from rbxcompose.manifest.trouble import NOT_YAML, QUOTE_HELP, QUOTES_NEEDED, Trouble, indent
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 
 _NO_SIGIL = "@`%>|"  # at the beginning of a text; `&`, `*` and `!` may have been meant as such
 _CLOSES = {"sequence": ("list", "[", "]"), "mapping": ("map", "{", "}")}

@@ -8,11 +8,11 @@ from rbxcompose.expressions.check import check_condition
 from rbxcompose.expressions.types import FLAG
 from rbxcompose.findings import Related, Span
 from rbxcompose.manifest.tree import at
-from rbxcompose.missions.asked import Asked
-from rbxcompose.missions.bounds import Bounds, truth
-from rbxcompose.missions.views import NodeScope, base_scope, views
-from rbxcompose.missions.watching import POSE
-from rbxcompose.model.charging import batteries, constants
+from rbxcompose.missions.analysis.bounds import Bounds, truth
+from rbxcompose.missions.analysis.scope_types import NodeScope, base_scope, views
+from rbxcompose.missions.engine.condition_watches import POSE
+from rbxcompose.missions.language.asked import Asked
+from rbxcompose.model.charge import batteries, constants
 from rbxcompose.model.robot import Robot, RobotMission
 
 FULL = Bounds(0.0, 1.0)  # what the level of a battery can be

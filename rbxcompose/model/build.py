@@ -8,20 +8,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.config import Config
-from rbxcompose.diagnostics.levels import LOG_LEVELS
 from rbxcompose.findings import Report
-from rbxcompose.manifest.models import RobotManifest
+from rbxcompose.levels import LOG_LEVELS
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import ROBOT, Contents
-from rbxcompose.manifest.wanted import WantedComponent
-from rbxcompose.missions.deeds import sent_by
-from rbxcompose.missions.sources import ValueSource
+from rbxcompose.manifest.wanted_components import WantedComponent
+from rbxcompose.missions.analysis.effects import sent_by
+from rbxcompose.missions.program.sources import ValueSource
 from rbxcompose.model.missions import read_missions
 from rbxcompose.model.robot import Part, Robot
 from rbxcompose.model.skills import names_of_skills, services_of, skills_of, topics_of
 from rbxcompose.model.values import value_of
-from rbxcompose.model.wiring import ends_of, readers, resolve
+from rbxcompose.model.wires import ends_of, readers, resolve
 from rbxcompose.sdk.capabilities import require_declared
 from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import at
 from rbxcompose.model.robot import Part, Robot
-from rbxcompose.model.wiring import End
+from rbxcompose.model.wires import End
 from rbxcompose.sdk.capabilities import CommandsMotion, Drives, Forwards
 from rbxcompose.sdk.ports import In
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
+from rbxcompose.composition.robot_file import read_mission
+from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.findings import Report
-from rbxcompose.manifest.models import RobotManifest
-from rbxcompose.manifest.robot_file import read_mission
-from rbxcompose.missions.inputs import bind_inputs
-from rbxcompose.missions.reading import read_program
-from rbxcompose.missions.using import Using
+from rbxcompose.missions.analysis.uses import Using
+from rbxcompose.missions.engine.inputs import bind_inputs
+from rbxcompose.missions.language.reader import read_program
 from rbxcompose.model.robot import RobotMission
 
 

@@ -8,16 +8,16 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
 
+from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.config import Config
-from rbxcompose.diagnostics.levels import Level
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span
-from rbxcompose.manifest.models import RobotManifest
+from rbxcompose.levels import Level
 from rbxcompose.manifest.registry import naming
 from rbxcompose.manifest.tree import Path, at, key_span, value_span
-from rbxcompose.missions.program import Program, RobotNames
-from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource
-from rbxcompose.model.wiring import End
+from rbxcompose.missions.program.program import Program, RobotNames
+from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource
+from rbxcompose.model.wires import End
 from rbxcompose.references import COMPONENT
 from rbxcompose.restarts import DEFAULT, Restart
 from rbxcompose.sdk.capabilities import Capability

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rbxcompose.manifest.models import RobotManifest
-from rbxcompose.missions.goals import service_skill, skill_of, topic_skill
-from rbxcompose.missions.program import Program, Skill
-from rbxcompose.missions.sources import Orders, OrderTopic, SkillSource, TopicSource, Way
+from rbxcompose.composition.robot_manifest import RobotManifest
+from rbxcompose.missions.program.goals import service_skill, skill_of, topic_skill
+from rbxcompose.missions.program.program import Program, Skill
+from rbxcompose.missions.program.sources import Orders, OrderTopic, SkillSource, TopicSource, Way
 from rbxcompose.model.robot import Part
-from rbxcompose.model.wiring import End
+from rbxcompose.model.wires import End
 from rbxcompose.plugins import BrokenPluginError
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.ports import In, Out, Serves, ServesAction, ServesTopic

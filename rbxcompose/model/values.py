@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 
-from rbxcompose.diagnostics.levels import Level
 from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, choice_of, quantity_of
-from rbxcompose.missions.sources import ValueSource
+from rbxcompose.levels import Level
+from rbxcompose.missions.program.sources import ValueSource
 from rbxcompose.model.robot import Part
-from rbxcompose.model.wiring import End, resolve
+from rbxcompose.model.wires import End, resolve
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.ports import In, Out
 from rbxcompose.sections.values import Value as ValueEntry

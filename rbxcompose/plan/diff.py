@@ -8,11 +8,11 @@ from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 from rbxcompose.config import Config
-from rbxcompose.diagnostics.levels import log_word
 from rbxcompose.expressions.types import Type
+from rbxcompose.levels import log_word
 from rbxcompose.manifest.shapes import dimension_at
 from rbxcompose.manifest.validate import to_plain
-from rbxcompose.missions.program import Program
+from rbxcompose.missions.program.program import Program
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.units import Quantity, format_number, format_quantity, to_si
 

@@ -21,8 +21,8 @@ from pydantic_core import to_jsonable_python
 from rbxcompose.config import HIDDEN, Config, Dimensioned, Place, Secret
 from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Mapping as LocatedMapping
-from rbxcompose.missions.program import Program
-from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.program.program import Program
 from rbxcompose.plan.located import node_of_data, node_to_data
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.plan.units import dimension_of_data, dimension_to_data

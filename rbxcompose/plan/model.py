@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from rbxcompose.config import Config
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.restarts import DEFAULT, Restart
 
 STEPPED_GROUP = "robot"  # the one process group of a robot on a stepped clock

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from rbxcompose.plain import plain
+from rbxcompose.atomic_files import sync_folder
+from rbxcompose.printable import plain
 from rbxcompose.recording.reader import NotARecordingError
 from rbxcompose.recording.recovery import recover
 from rbxcompose.regular_files import open_regular
-from rbxcompose.replacing import sync_folder
 
 ENDING, PART = ".mcap", ".part"
 _NEW = ".new"

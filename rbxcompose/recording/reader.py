@@ -13,7 +13,7 @@ from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.topics import HASH, NODE, Topic, qos_of_metadata
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.edits import COMMAND_LINE
 from rbxcompose.findings import Finding, Report, Sources, Span
 from rbxcompose.formats import output_format
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 
 _IN_TEXT = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A"})
 _IN_PROPERTY = {**_IN_TEXT, **str.maketrans({":": "%3A", ",": "%2C"})}

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.edits import safe_fixes
 from rbxcompose.findings import Finding, Related, Report, Severity, Sources, Span
 from rbxcompose.formats import output_format
-from rbxcompose.plain import columns, plain
+from rbxcompose.printable import columns, plain
 
 MOST_SHOWN = 20
 _LINE_CELLS = 160  # of a source line; of a longer one only what surrounds the caret is shown

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rbxcompose.atomic_files import TEMPORARY, replace_file
 from rbxcompose.regular_files import open_regular
-from rbxcompose.replacing import TEMPORARY, replace_file
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.typed_json import UnreadableError, from_data, to_data
 

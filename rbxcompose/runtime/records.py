@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from collections.abc import Collection
 
 from rbxcompose.config import Place
 from rbxcompose.findings import Finding, kind
-from rbxcompose.plain import FORBIDDEN, plain
+from rbxcompose.printable import FORBIDDEN, plain
 from rbxcompose.units import ANGLE, LENGTH, UnitError, to_si
 
 LONGEST_NAME = 60  # characters

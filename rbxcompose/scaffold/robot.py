@@ -13,7 +13,7 @@ from rbxcompose.config import Config, Place
 from rbxcompose.expressions.functions import FUNCTIONS
 from rbxcompose.findings import suggest
 from rbxcompose.missions.modifiers.registry import modifier_keys
-from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.program.registry import kinds
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.plugins import BrokenPluginError
 from rbxcompose.scaffold.answers import ANSWER, AnswerError, read_place

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.replacing import replace_file
+from rbxcompose.atomic_files import replace_file
 from rbxcompose.schema.mission import mission_schema
 from rbxcompose.schema.robot import overlay_schema, part_schema, robot_schema
 from rbxcompose.schema.scalars import Schema

@@ -10,18 +10,18 @@ from rbxcompose.config import Name
 from rbxcompose.expressions.types import FLAG, TYPES
 from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.manifest.header import Header
-from rbxcompose.missions.goals import skill_of, topic_skill
-from rbxcompose.missions.history import HISTORY
-from rbxcompose.missions.machines import MACHINE_KEYS
-from rbxcompose.missions.modifiers.entering import ON_ENTER
+from rbxcompose.missions.engine.resume_points import HISTORIES
+from rbxcompose.missions.language.machine_reader import RESULTS
+from rbxcompose.missions.language.reader import INTERRUPT_KEYS, KEYS
 from rbxcompose.missions.modifiers.registry import modifiers
-from rbxcompose.missions.moments import DEEDS
-from rbxcompose.missions.places import HISTORIES
-from rbxcompose.missions.program import AFTERWARDS, RESTART, Skill
-from rbxcompose.missions.reading import INTERRUPT_KEYS, KEYS
-from rbxcompose.missions.registry import kinds
-from rbxcompose.missions.state_reading import RESULTS
-from rbxcompose.schema.asking import (
+from rbxcompose.missions.modifiers.state_hooks import ON_ENTER
+from rbxcompose.missions.program.goals import skill_of, topic_skill
+from rbxcompose.missions.program.history import HISTORY
+from rbxcompose.missions.program.machines import MACHINE_KEYS
+from rbxcompose.missions.program.moments import DEEDS
+from rbxcompose.missions.program.program import AFTERWARDS, RESTART, Skill
+from rbxcompose.missions.program.registry import kinds
+from rbxcompose.schema.node_schema import (
     EXPRESSION,
     ITEM_NAME,
     MACHINE,

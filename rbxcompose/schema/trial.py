@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from rbxcompose.config import Name, Time
-from rbxcompose.manifest.trials import SECTIONS, TEST, TrialFile
+from rbxcompose.manifest.test_file import SECTIONS, TEST, TrialFile
 from rbxcompose.schema.robot import document, or_empty
 from rbxcompose.schema.scalars import Schema
 from rbxcompose.schema.settle import opened, schemas_of

@@ -17,8 +17,8 @@ from rbxcompose.config import (
     Speed,
     Time,
 )
-from rbxcompose.diagnostics.levels import Level
 from rbxcompose.geometry import Pose2
+from rbxcompose.levels import Level
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Command, Query, Refused, answers
 from rbxcompose.robot_events import MissionOver, MissionWaits

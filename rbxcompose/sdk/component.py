@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, get_args
 
 from rbxcompose.clock import Clock
 from rbxcompose.config import Config
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.requests import Command, Query, Refused, Request, Requests, answering, requests
 from rbxcompose.robot_events import RobotEvent
 from rbxcompose.sdk.bound import Window

@@ -16,7 +16,7 @@ from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import value_span
 from rbxcompose.manifest.urdf import mistake_in_urdf
-from rbxcompose.manifest.wanted import WantedComponent, Wiring
+from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 
 DESCRIPTION = "robot_description"
 """The component that a robot with a body runs."""

@@ -12,13 +12,13 @@ from rbxcompose.config import Config
 from rbxcompose.findings import SIMILAR, Report, Span, kind
 from rbxcompose.manifest.options import OPTIONS, ComponentOptions
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.renames import Renames
+from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.section import Contents, Reading, Scope
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, at
 from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, label_of, validate
-from rbxcompose.manifest.wanted import WantedComponent, Wiring
-from rbxcompose.plain import plain
+from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.plugins import BROKEN, LEFT_OUT, BrokenPluginError
+from rbxcompose.printable import plain
 from rbxcompose.references import COMPONENT
 from rbxcompose.sdk import registry
 from rbxcompose.sdk.component import Component

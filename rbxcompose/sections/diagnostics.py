@@ -10,7 +10,7 @@ from pydantic import Field
 
 from rbxcompose.config import Config, Name, Time
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.renames import Renames
+from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.section import Reading
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.manifest.validate import validate

@@ -11,10 +11,10 @@ from pydantic import Field
 
 from rbxcompose.config import Config, Name, Secret
 from rbxcompose.findings import Finding, Report, Span
-from rbxcompose.manifest.data import is_moderate
 from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.files import resolve
 from rbxcompose.manifest.fill import SHOWN_SECRET
+from rbxcompose.manifest.mission_data import is_moderate
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Reading, Short
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, children

@@ -9,11 +9,11 @@ from pydantic import Field
 from rbxcompose.config import Config, Frequency, Name, Time
 from rbxcompose.manifest.fields import PortName
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.renames import Renames
+from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.section import ANY, Contents, Reading, Scope
 from rbxcompose.manifest.tree import Entry, Node, at
 from rbxcompose.manifest.tree import Mapping as MappingNode
-from rbxcompose.manifest.wanted import WantedComponent, Wiring
+from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.sections.components import ComponentEntry, components

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 
 NOTHING_LEFT = 1e-9  # below this the sum of many small steps is rounding, not charge
 

@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import SteppedClock
 from rbxcompose.config import Place
-from rbxcompose.diagnostics.levels import Level
-from rbxcompose.model.wiring import ends_of
+from rbxcompose.levels import Level
+from rbxcompose.model.wires import ends_of
 from rbxcompose.msgs.types import Message
 from rbxcompose.plan.model import Instance, Plan, Wire
 from rbxcompose.qos import Qos

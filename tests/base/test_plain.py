@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.plain import FORBIDDEN, columns, fitted, plain
+from rbxcompose.printable import FORBIDDEN, columns, fitted, plain
 
 
 def test_control_characters_are_spelt_out() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.checking import Check, all_checks
+from rbxcompose.check_runner import Check, all_checks
 from rbxcompose.compiler import compile_robot
 from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden

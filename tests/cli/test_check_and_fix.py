@@ -13,11 +13,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rbxcompose.atomic_files import replace_file
 from rbxcompose.cli import main as command
 from rbxcompose.cli.project import fixes
 from rbxcompose.edits import safe_fixes
 from rbxcompose.findings import Finding, Fix, Sources
-from rbxcompose.replacing import replace_file
 
 ROOT = Path(__file__).parents[2]
 ROBOT, MISSION = Path("robots/bot/robot.yaml"), Path("missions/patrol.yaml")

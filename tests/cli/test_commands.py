@@ -14,7 +14,7 @@ import pytest
 
 from rbxcompose.cli import main as command
 from rbxcompose.cli import verbs
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.log import start_new
 from rbxcompose.runtime.processes import Process, boot_id

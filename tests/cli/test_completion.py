@@ -83,6 +83,7 @@ def test_bash_tells_a_line_that_may_end_in_a_quote_and_takes_what_follows_a_colo
 def up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A robot that is written down as if it were up."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr(Process, "is_titled", lambda self, prefix: prefix == "rbxcompose cart: ")
     folder = RobotFolder.of("cart")
     folder.make()
     part, here = ComponentState("base", "toy", "active", "robot", 77, 0), Process.of(os.getpid())

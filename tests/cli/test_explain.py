@@ -7,8 +7,8 @@ import json
 import pytest
 
 from rbxcompose.cli import main as command
+from rbxcompose.finding_pages import all_kinds
 from rbxcompose.findings import KINDS
-from rbxcompose.pages import all_kinds
 
 
 @pytest.mark.parametrize("written", ["RBX1001", "rbx1001", "1001"])

@@ -12,14 +12,14 @@ import pytest
 from rbxcompose.cli import main as command
 from rbxcompose.cli.missions.live_view import lines_of
 from rbxcompose.executive.requests import CancelMission, LookAtAll
-from rbxcompose.missions.picture import picture_from_data
+from rbxcompose.missions.view.picture import picture_from_data
 from rbxcompose.requests import Request, as_data
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing.golden import Golden
 from rbxcompose.typed_json import from_data, to_data
 from tests.executive.fake_robot import Robot
-from tests.seeing.pictures import undrawn
+from tests.inspection.pictures import undrawn
 
 ROUNDS = """
 name: rounds

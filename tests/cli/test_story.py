@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from rbxcompose.cli.robots.story import Story, summary
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.runtime.records import Record
 
 

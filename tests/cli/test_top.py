@@ -23,8 +23,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.cli.robots.picture import Load, Part, Picture, Tree, lines_of
-from rbxcompose.diagnostics.levels import Level
-from rbxcompose.plain import FORBIDDEN, columns
+from rbxcompose.levels import Level
+from rbxcompose.printable import FORBIDDEN, columns
 from rbxcompose.runtime.records import Record
 from rbxcompose.testing.golden import Golden
 from tests.third_party.places import put

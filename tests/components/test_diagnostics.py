@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
 from rbxcompose.testing import Bench, instance
 

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from rbxcompose.diagnostics import core
 from rbxcompose.diagnostics.core import Aggregator, Analyzer
-from rbxcompose.diagnostics.levels import Level, combined
 from rbxcompose.diagnostics.status import Status
+from rbxcompose.levels import Level, combined
 
 OK, WARN, ERROR, STALE = Level
 POWER = {"power": Analyzer(match=("battery", "charger"))}

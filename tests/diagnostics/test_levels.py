@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.diagnostics.levels import Level, combined, level_of
+from rbxcompose.levels import Level, combined, level_of
 
 OK, WARN, ERROR, STALE = Level
 

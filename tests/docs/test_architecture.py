@@ -38,7 +38,7 @@ def test_the_map_names_every_package_and_module_and_nothing_else() -> None:
 def test_imports_point_downwards_in_the_map(part: str) -> None:
     below = set(MAP[MAP.index(part) + 1 :])
     imported = {name.partition(".")[0] for name in TABLE[part]} - {part}
-    assert imported - below == ({"manifest"} if part in ("missions", "sections") else set())
+    assert imported - below == set()
 
 
 def test_every_stage_is_a_function_of_the_file_that_is_named() -> None:

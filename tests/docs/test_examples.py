@@ -12,7 +12,7 @@ import pytest
 
 from rbxcompose.cli.verbs import load, verbs
 from rbxcompose.findings import Severity
-from rbxcompose.missions.registry import forget
+from rbxcompose.missions.program.registry import forget
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.sdk import registry
 from rbxcompose.testing.bench import Bench, instance

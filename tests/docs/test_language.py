@@ -13,10 +13,10 @@ from rbxcompose.expressions.types import TYPES
 from rbxcompose.manifest.file_models import FILES, file_model
 from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.manifest.registry import sections
-from rbxcompose.missions.header import INPUT_KEYS
+from rbxcompose.missions.language.header import INPUT_KEYS
+from rbxcompose.missions.language.reader import INTERRUPT_KEYS, KEYS
 from rbxcompose.missions.modifiers.registry import modifiers
-from rbxcompose.missions.program import AFTERWARDS
-from rbxcompose.missions.reading import INTERRUPT_KEYS, KEYS
+from rbxcompose.missions.program.program import AFTERWARDS
 from rbxcompose.units import UNITS
 from tests.docs.examples import ROOT
 

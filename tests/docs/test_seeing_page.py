@@ -10,7 +10,7 @@ import pytest
 from rbxcompose.cli import main as command
 from tests.docs.examples import ROOT, Block, blocks_of
 
-PAGE = ROOT / "docs/seeing.md"
+PAGE = ROOT / "docs/inspection.md"
 BLOCKS = list(blocks_of(PAGE.read_text(encoding="utf-8"), PAGE.name))
 SHOWN = [(one, other) for one, other in pairwise(BLOCKS) if (one.language, other.language) == ("sh", "text")]
 SKIPS = "..."

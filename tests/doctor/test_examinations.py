@@ -14,8 +14,8 @@ from rbxcompose.bus.graph import End, Graph, Kind, Name
 from rbxcompose.bus.wire import RosQos
 from rbxcompose.compiler import compile_robot
 from rbxcompose.doctor import machine
-from rbxcompose.doctor.examining import EXAMINATIONS, PLUGINS, Answer, examination, examine_all, has_errors
 from rbxcompose.doctor.facts import Bus, Clocks, Facts, Limits, Listener, Running, Version
+from rbxcompose.doctor.registry import EXAMINATIONS, PLUGINS, Answer, examination, examine_all, has_errors
 from rbxcompose.findings import Finding
 from rbxcompose.model.robot import Robot
 from rbxcompose.runtime.folder import RobotFolder, RobotState

@@ -9,17 +9,17 @@ from typing import Any, ClassVar
 
 from rbxcompose.clock import Clock, SteppedClock
 from rbxcompose.components.mission import Mission, MissionConfig
-from rbxcompose.diagnostics.levels import Level
 from rbxcompose.expressions.types import FLAG, TEXT, TYPES
 from rbxcompose.findings import Report
 from rbxcompose.geometry import Pose2
+from rbxcompose.levels import Level
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.missions.deeds import sent_by
-from rbxcompose.missions.goals import skill_of
-from rbxcompose.missions.program import Program, Skill
-from rbxcompose.missions.reading import read_program
-from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, Way
+from rbxcompose.missions.analysis.effects import sent_by
+from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.program.goals import skill_of
+from rbxcompose.missions.program.program import Program, Skill
+from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource, Way
 from rbxcompose.model.skills import python_skills
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.nav2_msgs import NavigateToPose

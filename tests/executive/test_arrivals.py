@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from rbxcompose.executive.arrivals import Arrivals
 from rbxcompose.expressions.types import TYPES
-from rbxcompose.missions.sources import ValueSource
+from rbxcompose.missions.program.sources import ValueSource
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.units import RATIO, to_si
 

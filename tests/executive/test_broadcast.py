@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from rbxcompose.executive.requests import CancelMission, ListMissions, LookAtAll, PauseMission, RunMission
-from rbxcompose.missions.mirror import joined
-from rbxcompose.missions.replica import Replica
+from rbxcompose.missions.view.mirror import joined
+from rbxcompose.missions.view.replica import Replica
 from rbxcompose.requests import Command, Refused
 from tests.executive.fake_robot import FakeWindow, Robot
 
@@ -30,7 +30,7 @@ def watched(robot: Robot) -> FakeWindow:
 
 def test_nothing_is_put_together_while_nobody_watches(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = Robot(COUNT)
-    monkeypatch.setattr("rbxcompose.executive.running.Mirror.look", lambda *_: pytest.fail("looked for nobody"))
+    monkeypatch.setattr("rbxcompose.executive.mission_run.Mirror.look", lambda *_: pytest.fail("looked for nobody"))
     robot.start()
     robot.advance(10.0)
     assert robot.windows["missions/test"].news == []

@@ -6,7 +6,7 @@ import pytest
 
 from rbxcompose.components.mission import Mission
 from rbxcompose.executive.requests import PauseMission, ResumeMission, RunMission
-from rbxcompose.model.wiring import ends_of
+from rbxcompose.model.wires import ends_of
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.plan.model import Instance, Wire

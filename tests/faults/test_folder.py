@@ -6,7 +6,7 @@ import signal
 
 import pytest
 
-from rbxcompose.replacing import TEMPORARY
+from rbxcompose.atomic_files import TEMPORARY
 from rbxcompose.runtime.folder import STATE
 from rbxcompose.runtime.processes import titled
 from tests.runtime.test_real_processes import PATIENCE, Robot, eventually, robot

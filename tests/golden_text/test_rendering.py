@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.composition.robot_file import load_robot
 from rbxcompose.findings import Finding, Related, Report, Severity, Span, replacement
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.robot_file import load_robot
 from rbxcompose.rendering.json_ import render_json
 from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden

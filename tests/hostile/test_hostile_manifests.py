@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rbxcompose.composition.overlay import compose
+from rbxcompose.composition.robot_file import load_robot
+from rbxcompose.composition.set_options import read_sets
 from rbxcompose.findings import Report
-from rbxcompose.manifest.overlay import compose
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.robot_file import load_robot
-from rbxcompose.manifest.sets import read_sets
 from rbxcompose.manifest.tree import Mapping
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.rendering.json_ import render_json
@@ -30,7 +30,7 @@ CHILD = """
 import json, resource, sys, time
 from pathlib import Path
 from rbxcompose.findings import Report
-from rbxcompose.manifest.robot_file import load_robot
+from rbxcompose.composition.robot_file import load_robot
 from rbxcompose.rendering.text import render_text
 import rbxcompose.components.go_to, rbxcompose.components.battery_sim
 pages = int(Path("/proc/self/statm").read_text().split()[0])

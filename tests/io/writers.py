@@ -13,26 +13,26 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from rbxcompose.atomic_files import replace_file
 from rbxcompose.cli import main as command
 from rbxcompose.cli.project.fixes import fix
 from rbxcompose.clock import SteppedClock
 from rbxcompose.compiler import compile_robot
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
 from rbxcompose.recording.files import recover_all
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import RecordingReader
 from rbxcompose.recording.topics import Topic
-from rbxcompose.replacing import replace_file
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.follow import read_log
 from rbxcompose.runtime.log import NAME, PREVIOUS, LogFile, start_new
-from rbxcompose.runtime.process_group.taping import Taping
+from rbxcompose.runtime.process_group.run_recorder import Taping
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.supervision.supervisor import Supervisor
-from rbxcompose.scaffold.writing import write_new
+from rbxcompose.scaffold.new_files import write_new
 
 OLD, NEW = b"old: 1\n" * 3000, b"new: 2\n" * 4000
 MESSAGES = 40

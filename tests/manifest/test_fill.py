@@ -7,7 +7,7 @@ import pytest
 from rbxcompose.expressions.types import PLACE, TEXT, TYPES, UNKNOWN
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.fill import fill
-from rbxcompose.manifest.names import Names, Typed, names_of, with_arguments
+from rbxcompose.manifest.fill_names import Names, Typed, names_of, with_arguments
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import BROKEN, Mapping, Scalar
 from rbxcompose.manifest.validate import to_plain

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rbxcompose.composition.history import History, Step
+from rbxcompose.composition.overlay import compose, settled
+from rbxcompose.composition.set_options import read_sets
 from rbxcompose.findings import Report, Span
-from rbxcompose.manifest.history import History, Step
-from rbxcompose.manifest.overlay import compose, settled
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.sets import read_sets
 from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar, at, children, value_span
 from rbxcompose.manifest.validate import to_plain
 

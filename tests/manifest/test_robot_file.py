@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.composition.robot_file import load_robot, read_mission
+from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.findings import Report
-from rbxcompose.manifest.models import RobotManifest
-from rbxcompose.manifest.robot_file import load_robot, read_mission
 from rbxcompose.manifest.tree import at
 
 ROOT = Path(__file__).parents[2]

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.composition.dump import dump_robot
 from rbxcompose.findings import KINDS
-from rbxcompose.manifest.dump import dump_robot
 from rbxcompose.manifest.limits import DEPTH, NODES, URDF_BYTES
 from rbxcompose.manifest.urdf import mistake_in_urdf
 from rbxcompose.plan.diff import difference

@@ -19,8 +19,8 @@ from pathlib import Path
 import yaml
 
 from rbxcompose.compiler import compile_robot
+from rbxcompose.finding_pages import all_kinds, title_of
 from rbxcompose.findings import Finding
-from rbxcompose.pages import all_kinds, title_of
 
 HERE = Path(__file__).parent
 EXPECT = re.compile(r"# expect(-next)?: ([A-Z0-9, ]+)$")

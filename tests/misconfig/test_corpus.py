@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.checking import all_checks
+from rbxcompose.check_runner import all_checks
 from rbxcompose.findings import KINDS
-from rbxcompose.missions.checking import mission_checks
+from rbxcompose.missions.analysis.check_runner import mission_checks
 from tests.misconfig.corpus import Case, cases, described, figures, kinds, run
 from tests.misconfig.page import page
 

@@ -10,9 +10,9 @@ from typing import Any
 from hypothesis import strategies as st
 
 from rbxcompose.findings import Report
-from rbxcompose.missions.program import Program, RobotNames
-from rbxcompose.missions.reading import read_program
-from rbxcompose.missions.world import PLAIN, Settings
+from rbxcompose.missions.engine.world import PLAIN, Settings
+from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.program.program import Program, RobotNames
 from tests.missions.simulated import Simulated, robot_with, tree
 
 Node = Any  # a word, a list or a map, as YAML has it

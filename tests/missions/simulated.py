@@ -12,15 +12,15 @@ from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
 from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.missions.checking import check_program
-from rbxcompose.missions.engine import Engine
-from rbxcompose.missions.events import MissionEnded, MissionEvent
-from rbxcompose.missions.program import Program, RobotNames, Skill
-from rbxcompose.missions.reading import read_program
-from rbxcompose.missions.results import Result
-from rbxcompose.missions.statuses import IDLE, NAMES, RUNNING
-from rbxcompose.missions.story import Story
-from rbxcompose.missions.world import PLAIN, Settings
+from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.engine.engine import Engine
+from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
+from rbxcompose.missions.engine.story import Story
+from rbxcompose.missions.engine.world import PLAIN, Settings
+from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.program.program import Program, RobotNames, Skill
+from rbxcompose.missions.program.results import Result
+from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING
 from rbxcompose.units import LENGTH
 
 PLACES = {name: Place(name, float(x), 0.0, 0.0) for x, name in enumerate(("dock", "kitchen", "corner_1", "corner_2"))}

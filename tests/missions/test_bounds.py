@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.parser import parse
-from rbxcompose.missions.bounds import Bounds, truth
+from rbxcompose.missions.analysis.bounds import Bounds, truth
 
 KNOWN = {"a": Bounds(0.0, 1.0), "b": Bounds(-3.0, 3.0)}
 TERMS = st.sampled_from(

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from rbxcompose.expressions.types import choice_of
-from rbxcompose.missions.events import SkillStarted
-from rbxcompose.missions.program import Skill
-from rbxcompose.missions.story import Story
+from rbxcompose.missions.engine.events import SkillStarted
+from rbxcompose.missions.engine.story import Story
+from rbxcompose.missions.program.program import Skill
 from tests.missions.simulated import ROBOT, SKILLS, Simulated, program_of, simulate
 
 

@@ -9,7 +9,7 @@ import pytest
 from rbxcompose.config import Place
 from rbxcompose.expressions.types import POSE, TEXT, TYPES
 from rbxcompose.geometry import Pose2
-from rbxcompose.missions.goals import goal_of, message_of, skill_of, values_of
+from rbxcompose.missions.program.goals import goal_of, message_of, skill_of, values_of
 from rbxcompose.msgs.nav2_msgs import NavigateToPose, Wait
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.stamps import to_duration

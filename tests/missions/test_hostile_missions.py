@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from rbxcompose.findings import Report, Span
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
-from rbxcompose.missions.checking import check_program
-from rbxcompose.missions.reading import KEYS, read_program
-from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.language.reader import KEYS, read_program
+from rbxcompose.missions.program.registry import kinds
 from tests.missions.simulated import ROBOT
 
 HERE = Span("mission.yaml", 1, 1, 1, 2)

@@ -7,7 +7,7 @@ import pytest
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import Mapping
-from rbxcompose.missions.inputs import bind_inputs
+from rbxcompose.missions.engine.inputs import bind_inputs
 from tests.missions.simulated import PLACES, program_of, tree
 
 MISSION = """

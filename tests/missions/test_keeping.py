@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.missions.events import Logged
+from rbxcompose.missions.engine.events import Logged
 from tests.missions.simulated import Simulated, simulate
 from tests.missions.test_composites import fails, skills
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from rbxcompose.expressions.parser import parse
-from rbxcompose.missions.watching import Watched
-from rbxcompose.missions.world import Settings
+from rbxcompose.missions.engine.condition_watches import Watched
+from rbxcompose.missions.engine.world import Settings
 from tests.missions.simulated import PLACES, simulate
 from tests.missions.test_composites import fails, skills
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.executive.requests import PauseMission, ResumeMission
-from rbxcompose.missions.logbook import INPUTS, ReplayError, replay
+from rbxcompose.missions.engine.logbook import INPUTS, ReplayError, replay
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.sdk import Outcome
 from tests.executive.fake_robot import Robot

@@ -6,9 +6,9 @@ import pytest
 
 from rbxcompose.findings import Report
 from rbxcompose.geometry import Pose2
-from rbxcompose.missions.checking import check_program
-from rbxcompose.missions.reading import read_program
-from rbxcompose.missions.world import Settings
+from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.engine.world import Settings
+from rbxcompose.missions.language.reader import read_program
 from tests.missions.simulated import ROBOT, Simulated, simulate, tree
 from tests.missions.test_composites import fails, skills
 

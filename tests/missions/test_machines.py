@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.missions.events import Logged, Transition
-from rbxcompose.missions.world import Settings
+from rbxcompose.missions.engine.events import Logged, Transition
+from rbxcompose.missions.engine.world import Settings
 from tests.missions.simulated import Simulated, simulate
 from tests.missions.test_composites import fails, skills
 

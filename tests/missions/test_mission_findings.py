@@ -10,9 +10,9 @@ from rbxcompose.findings import KINDS, Finding, Kind, Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping
 from rbxcompose.missions import codes
-from rbxcompose.missions.checking import check_program
-from rbxcompose.missions.reading import read_program
-from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.program.registry import kinds
 from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
 from tests.missions.simulated import ROBOT, tree

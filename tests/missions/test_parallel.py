@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from rbxcompose.missions.events import Transition
+from rbxcompose.missions.engine.events import Transition
 from tests.missions.simulated import Simulated, simulate
 from tests.missions.test_composites import fails, skills
 

@@ -9,8 +9,8 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.missions.mirror import Mirror
-from rbxcompose.missions.replica import MOST_WAITING, Replica
+from rbxcompose.missions.view.mirror import Mirror
+from rbxcompose.missions.view.replica import MOST_WAITING, Replica
 
 
 class Sender:

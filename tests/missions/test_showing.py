@@ -7,7 +7,7 @@ import pytest
 from rbxcompose.config import Place
 from rbxcompose.expressions.types import TYPES
 from rbxcompose.expressions.values import Value
-from rbxcompose.missions.showing import show, show_briefly
+from rbxcompose.missions.engine.value_text import show, show_briefly
 
 
 @pytest.mark.parametrize(

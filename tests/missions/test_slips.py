@@ -8,9 +8,9 @@ from rbxcompose.edits import apply, safe_fixes
 from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import Mapping
-from rbxcompose.missions.checking import check_program
-from rbxcompose.missions.reading import read_program
-from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.program.registry import kinds
 from rbxcompose.missions.slips.count_in_words import ENDLESS
 from rbxcompose.missions.slips.foreign_flag import FLAGS
 from rbxcompose.missions.slips.unknown_settings import FOREIGN, STEPS

@@ -11,28 +11,28 @@ import pytest
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import COUNT
 from rbxcompose.findings import Report
-from rbxcompose.missions import registry
-from rbxcompose.missions.answers import Advice, Counted, Flow
-from rbxcompose.missions.checking import check_program
-from rbxcompose.missions.families import Deed, Loop
-from rbxcompose.missions.linking import link
-from rbxcompose.missions.look import Look
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ANY, SUCCEEDS, Outcomes
-from rbxcompose.missions.picture import picture_of
-from rbxcompose.missions.possible import Possibility, started
-from rbxcompose.missions.program import Endings, Node, RobotNames
-from rbxcompose.missions.reading import read_program
-from rbxcompose.missions.registry import kind, kinds
-from rbxcompose.missions.snapshot import restore, save
-from rbxcompose.missions.statuses import FAILURE, RUNNING, SUCCESS
-from rbxcompose.missions.task import Site, Task
-from rbxcompose.missions.world import Settings
-from rbxcompose.schema.asking import kind_schema
-from rbxcompose.seeing.mission_html import mission_html
-from rbxcompose.seeing.mission_text import mission_text
-from rbxcompose.trials.coverage import Coverage, Seen
-from rbxcompose.trials.exploring import Limits, explore
+from rbxcompose.inspection.mission_html import mission_html
+from rbxcompose.inspection.mission_text import mission_text
+from rbxcompose.mission_tests.coverage import Coverage, Seen
+from rbxcompose.mission_tests.explorer import Limits, explore
+from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.engine.snapshot import restore, save
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.engine.world import Settings
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.program import registry
+from rbxcompose.missions.program.answers import Advice, Counted, Flow
+from rbxcompose.missions.program.families import Deed, Loop
+from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.look import Look
+from rbxcompose.missions.program.outcomes import ANY, SUCCEEDS, Outcomes
+from rbxcompose.missions.program.possible import Possibility, started
+from rbxcompose.missions.program.program import Endings, Node, RobotNames
+from rbxcompose.missions.program.registry import kind, kinds
+from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
+from rbxcompose.missions.view.picture import picture_of
+from rbxcompose.schema.node_schema import kind_schema
 from tests.missions.simulated import ROBOT, Simulated, program_of, tree
 
 TEXT = "do: {persist: 2, gap: 1 s, do: {go_to: dock}, timeout: 1 min}"

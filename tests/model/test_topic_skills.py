@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.inspection.diagram import diagram_of
+from rbxcompose.inspection.port import why_port
 from rbxcompose.lsp.definition import define
 from rbxcompose.lsp.document import Document
-from rbxcompose.missions.goals import topic_skill
-from rbxcompose.missions.sources import Orders, OrderTopic, Way
+from rbxcompose.missions.program.goals import topic_skill
+from rbxcompose.missions.program.sources import Orders, OrderTopic, Way
 from rbxcompose.model.robot import Robot
 from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist
 from rbxcompose.msgs.std_msgs import Bool, Empty, Float64, String
@@ -18,8 +20,6 @@ from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.qos import Qos
 from rbxcompose.schema.mission import skills_of
 from rbxcompose.sdk import Component, Config, In, Out, ServesTopic, component
-from rbxcompose.seeing.diagram import diagram_of
-from rbxcompose.seeing.port import why_port
 from rbxcompose.testing import check_text
 from tests.executive.toy_gripper import GripEnd, Gripper, GripperConfig
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import dedent
 
+from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.findings import Finding
-from rbxcompose.manifest.models import RobotManifest
 from rbxcompose.manifest.tree import at
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.testing.manifests import Checked, check_text

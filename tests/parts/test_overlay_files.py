@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.cli.main import main
+from rbxcompose.composition.dump import dump_robot, exact
 from rbxcompose.findings import Report
-from rbxcompose.manifest.dump import dump_robot, exact
 from rbxcompose.manifest.fill import fill
-from rbxcompose.manifest.names import Names
+from rbxcompose.manifest.fill_names import Names
 from rbxcompose.manifest.tree import NOWHERE, Entry, Mapping, Scalar
 from rbxcompose.units import ANGLE, LENGTH, RATIO, SPEED, TIME, Dimension, to_si
 from tests.parts.project import BATTERY, Project

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.cli.main import main
+from rbxcompose.composition.dump import dump_robot
 from rbxcompose.config import Secret
 from rbxcompose.formats import format_names
-from rbxcompose.manifest.dump import dump_robot
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.sdk import Component, Config, Out, component, registry
 from rbxcompose.testing.robots import run_robot

@@ -13,20 +13,22 @@ PACKAGE = Path(__file__).parents[2] / "rbxcompose"
 
 # What everything else may import, each with what it imports itself.
 GROUND = {
+    "atomic_files": "",
     "clock": "",
-    "config": "units",
+    "config": "references units",
     "edits": "findings",
     "expressions": "findings units",
     "findings": "",
     "formats": "findings plugins",
     "geometry": "",
+    "levels": "",
+    "manifest": "config expressions findings plugins printable references regular_files restarts slips units",
     "msgs": "findings",
-    "plain": "",
-    "plugins": "findings plain",
+    "plugins": "findings printable",
+    "printable": "",
     "qos": "",
     "references": "findings units",
     "regular_files": "",
-    "replacing": "",
     "requests": "typed_json",
     "restarts": "config",
     "robot_events": "",
@@ -41,45 +43,46 @@ ABOVE = {
     "__main__": "cli.main",
     "body": "",
     "bus": "sdk.bound",
-    "checking": "missions.checking model.robot",
-    "checks": "checking diagnostics.core manifest missions model sdk",
-    "cli": "body.transforms bus compiler diagnostics.levels doctor executive.requests lsp.server manifest missions "
-    "model pages params plan recording rendering rerun runtime scaffold schema.documents sdk seeing trials",
-    "compiler": "checking manifest model plan",
+    "check_runner": "missions.analysis model.robot",
+    "checks": "check_runner composition diagnostics.core missions model sdk sections",
+    "cli": "body.transforms bus compiler composition doctor executive.requests finding_pages inspection lsp.server "
+    "mission_tests missions model params plan recording rendering replay runtime scaffold schema.documents sdk "
+    "sections",
+    "compiler": "check_runner composition model plan",
     "components": "diagnostics executive missions mux.core navigation.go_to sdk sim",
+    "composition": "sections",
     "diagnostics": "",
-    "doctor": "bus.graph manifest model.robot runtime.folder runtime.processes sdk",
-    "executive": "diagnostics.levels missions sdk",
-    "lsp": "compiler manifest missions model.robot schema",
-    "manifest": "sdk sections",
-    "missions": "diagnostics.levels manifest.brackets manifest.scalars manifest.tree",
-    "model": "diagnostics.levels manifest missions sdk",
+    "doctor": "bus.graph composition model.robot runtime.folder runtime.processes sdk sections",
+    "executive": "missions sdk",
+    "finding_pages": "check_runner missions.analysis",
+    "inspection": "bus.names bus.wire composition missions model plan schema sdk sections",
+    "lsp": "compiler composition missions model.robot schema sections",
+    "mission_tests": "compiler components.mission composition executive missions model plan.model sdk testing.bench",
+    "missions": "",
+    "model": "composition missions sdk sections",
     "mux": "",
     "navigation": "",
-    "pages": "checking missions.checking",
     "params": "",
-    "plan": "diagnostics.levels manifest.shapes manifest.tree manifest.validate missions model sdk",
+    "plan": "composition missions model sdk",
     "recording": "bus.attachment bus.classes bus.names bus.tokens bus.transport bus.witness",
     "rendering": "",
-    "rerun": "bus diagnostics.levels plan.model recording runtime.process_group runtime.records sdk",
-    "runtime": "body.transforms bus diagnostics.levels missions.sources params plan recording sdk",
-    "scaffold": "manifest.files missions sdk",
-    "schema": "manifest missions sdk",
-    "sdk": "diagnostics.levels",
-    "seeing": "bus.names bus.wire diagnostics.levels manifest missions model plan schema sdk",
-    "sim": "diagnostics.levels",
+    "replay": "bus plan.model recording runtime.process_group runtime.records sdk",
+    "runtime": "body.transforms bus missions.program.sources params plan recording sdk",
+    "scaffold": "composition missions sdk",
+    "schema": "missions sdk sections",
+    "sdk": "",
+    "sections": "sdk",
+    "sim": "",
     "skills": "sdk",
-    "testing": "bus compiler components diagnostics.levels model.wiring plan.model recording.message rendering.text "
-    "runtime.process_group runtime.records sdk",
-    "trials": "compiler components.mission diagnostics.levels executive.requests executive.world manifest missions "
-    "model plan.model sdk testing.bench",
+    "testing": "bus compiler components model.wires plan.model recording.message rendering.text runtime.process_group "
+    "runtime.records sdk",
 }
 CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}  # pure: no bus, thread or clock
 TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
 }
-TYPE_CHECKING_BLOCKS = 49
+TYPE_CHECKING_BLOCKS = 9
 
 
 def imports(path: Path) -> set[str]:

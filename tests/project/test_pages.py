@@ -8,11 +8,11 @@ import sys
 from docs import generate
 from docs.generating.components import MADE_OF_SECTIONS
 from docs.generating.families import declared, next_code
-from rbxcompose.checking import OWN
+from rbxcompose.check_runner import OWN
 from rbxcompose.expressions.types import TYPES
+from rbxcompose.finding_pages import FAMILIES, all_kinds, family_of
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import ROBOT
-from rbxcompose.pages import FAMILIES, all_kinds, family_of
 from rbxcompose.sdk.registry import PLUGINS
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.runtime.process_group.capture import Capture, take_printed
 
 Told = list[tuple[Level, str]]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.plan.dump import load
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say

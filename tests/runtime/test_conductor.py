@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.diagnostics.levels import Level
 from rbxcompose.executive.requests import RunMission
+from rbxcompose.levels import Level
 from rbxcompose.plan.model import BusPlan, Plan
 from rbxcompose.requests import as_data
 from rbxcompose.robot_events import MissionOver

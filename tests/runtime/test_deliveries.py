@@ -13,7 +13,7 @@ from rbxcompose.bus.tokens import EntityKind, NodeToken
 from rbxcompose.bus.transport import Arrival, Nowhere
 from rbxcompose.bus.writers import SILENCE
 from rbxcompose.clock import SteppedClock
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32

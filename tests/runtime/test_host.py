@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from rbxcompose.diagnostics.levels import Level
 from rbxcompose.executive.requests import PauseMission
+from rbxcompose.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.requests import as_data

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Annotated
 
 from rbxcompose.config import Live
-from rbxcompose.diagnostics.levels import Level
 from rbxcompose.executive.requests import PauseMission, ResumeMission
+from rbxcompose.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.restarts import Restart

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from rbxcompose.components.mission import MissionConfig
-from rbxcompose.diagnostics.levels import Level
 from rbxcompose.executive.requests import ListMissions, PauseMission
+from rbxcompose.levels import Level
 from rbxcompose.plan.dump import dump
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.requests import Command, Request, answers, as_data

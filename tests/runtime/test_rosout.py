@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.msgs.rcl_interfaces import Log
 from rbxcompose.testing import Bench, instance
 

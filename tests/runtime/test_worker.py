@@ -12,7 +12,7 @@ import pytest
 
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import MonotonicClock
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger

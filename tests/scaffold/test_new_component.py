@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 
 from rbxcompose.scaffold.component import component_files, read_component_name
-from rbxcompose.scaffold.writing import write_new
+from rbxcompose.scaffold.new_files import write_new
 from rbxcompose.testing import Golden
 
 ROBOT = """

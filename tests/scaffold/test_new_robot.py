@@ -8,10 +8,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rbxcompose.composition.section_reader import reserved_names
 from rbxcompose.expressions.functions import FUNCTIONS
-from rbxcompose.manifest.sections import reserved_names
 from rbxcompose.missions.modifiers.registry import modifier_keys
-from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.program.registry import kinds
 from rbxcompose.scaffold.answers import AnswerError
 from rbxcompose.scaffold.robot import DOCK, MOST_PLACES, RobotAnswers, read_places, robot_files
 from rbxcompose.testing import Checked, Golden, check_file, run_robot

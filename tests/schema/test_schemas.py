@@ -16,9 +16,9 @@ from rbxcompose.config import Config, Length, Time
 from rbxcompose.manifest.file_models import FILES, file_model
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.validate import to_plain
-from rbxcompose.missions.registry import kinds
-from rbxcompose.schema.asking import kind_schema
+from rbxcompose.missions.program.registry import kinds
 from rbxcompose.schema.documents import MAKERS, as_text, files
+from rbxcompose.schema.node_schema import kind_schema
 from rbxcompose.schema.settle import referred
 from rbxcompose.sdk import Component, component
 from tests.conftest import ROOT

@@ -8,7 +8,7 @@ from typing import Annotated
 from rbxcompose.config import Config, Name, PlaceName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, Short
-from rbxcompose.manifest.wanted import WantedComponent, Wiring
+from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.references import COMPONENT, Refers
 from rbxcompose.sdk import Component, component
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.sim.battery import BatteryCore, BatterySettings
 
 SETTINGS = BatterySettings(runtime=60.0)

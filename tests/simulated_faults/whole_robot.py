@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import SteppedClock
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.tape import Tape

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from rbxcompose.checking import OWN
+from rbxcompose.check_runner import OWN
 from rbxcompose.findings import KINDS
 
 collect_ignore = ["rbx_lamp"]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose import checking
+from rbxcompose import check_runner as checking
 from rbxcompose.plugins import GROUP, Plugins
 from rbxcompose.sdk import registry
 

@@ -32,7 +32,7 @@ class Thing(Component[Config]):
     pass
 """
 CHECK = '''\
-from rbxcompose.checking import check
+from rbxcompose.check_runner import check
 
 
 @check("{code}")

@@ -14,7 +14,7 @@ from rbxcompose.cli.bus.place import add_bus_options, find_place
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.findings import kind
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 from rbxcompose.units import FREQUENCY, TIME, Dimension, UnitError, to_si
 
 Do = Callable[[Guest, argparse.Namespace], int]

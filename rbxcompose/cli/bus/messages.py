@@ -20,7 +20,7 @@ from rbxcompose.manifest.tree import Mapping, Node, Scalar, key_span, value_span
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.plain import Path, from_plain
 from rbxcompose.msgs.types import Interface, Message
-from rbxcompose.plain import FORBIDDEN
+from rbxcompose.printable import FORBIDDEN
 
 NO_TYPE = kind(
     "RBX9021",

@@ -12,11 +12,11 @@ from rbxcompose.cli.output.console import FINDINGS, misused, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.executive.requests import settings
 from rbxcompose.expressions.values import Value
-from rbxcompose.missions.inputs import bind_texts
+from rbxcompose.mission_tests.explorer import Limits, text_of
+from rbxcompose.mission_tests.explorer import explore as explore_program
+from rbxcompose.missions.engine.inputs import bind_texts
 from rbxcompose.model.robot import Robot
 from rbxcompose.requests import Refused
-from rbxcompose.trials.exploring import Limits, text_of
-from rbxcompose.trials.exploring import explore as explore_program
 
 
 def explore(arguments: argparse.Namespace) -> int:

@@ -16,18 +16,18 @@ from rbxcompose.cli.robots.lookup import NotDoneError, answer_of, find_robot, kn
 from rbxcompose.compiler import compile_robot
 from rbxcompose.executive.requests import ListMissions, LookAtAll
 from rbxcompose.findings import kind, suggest
-from rbxcompose.missions.mirror import joined, status_list
-from rbxcompose.missions.picture import Picture, picture_from_data, picture_of
-from rbxcompose.missions.program import Skill
-from rbxcompose.missions.sources import SkillSource, Way
-from rbxcompose.missions.statuses import IDLE, NAMES
+from rbxcompose.inspection.layout import NotDrawnError
+from rbxcompose.inspection.mission_graphs import mission_dot, mission_mermaid
+from rbxcompose.inspection.mission_html import mission_html
+from rbxcompose.inspection.mission_text import mission_text
+from rbxcompose.missions.program.program import Skill
+from rbxcompose.missions.program.sources import SkillSource, Way
+from rbxcompose.missions.program.statuses import IDLE, NAMES
+from rbxcompose.missions.view.mirror import joined, status_list
+from rbxcompose.missions.view.picture import Picture, picture_from_data, picture_of
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.skills import python_skills
 from rbxcompose.sdk.skills import skill_names
-from rbxcompose.seeing.layout import NotDrawnError
-from rbxcompose.seeing.mission_graphs import mission_dot, mission_mermaid
-from rbxcompose.seeing.mission_html import mission_html
-from rbxcompose.seeing.mission_text import mission_text
 from rbxcompose.units import example
 
 FORMATS = {"text": mission_text, "mermaid": mission_mermaid, "dot": mission_dot, "html": mission_html}

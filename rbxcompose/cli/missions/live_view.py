@@ -17,12 +17,12 @@ from rbxcompose.cli.robots.lookup import answer_of
 from rbxcompose.executive.requests import LookAtMission, ShowPicture
 from rbxcompose.expressions.text import show_value
 from rbxcompose.expressions.values import NOT_ARRIVED
-from rbxcompose.missions.mirror import ACTIVE, joined, status_list
-from rbxcompose.missions.picture import Picture, picture_from_data
-from rbxcompose.missions.snapshot import from_plain
-from rbxcompose.plain import fitted, plain
+from rbxcompose.inspection.mission_text import mission_lines
+from rbxcompose.missions.engine.snapshot import from_plain
+from rbxcompose.missions.view.mirror import ACTIVE, joined, status_list
+from rbxcompose.missions.view.picture import Picture, picture_from_data
+from rbxcompose.printable import fitted, plain
 from rbxcompose.runtime.folder import RobotFolder
-from rbxcompose.seeing.mission_text import mission_lines
 
 MOST = 5  # transitions that are shown
 _WIDTH = 120  # of a picture for no terminal

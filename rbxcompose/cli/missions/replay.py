@@ -12,7 +12,7 @@ from rbxcompose.cli.missions.files import mission_in, robot_of
 from rbxcompose.cli.output.console import FINDINGS, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.findings import kind
-from rbxcompose.missions.logbook import INPUTS, Record, ReplayError, replay
+from rbxcompose.missions.engine.logbook import INPUTS, Record, ReplayError, replay
 from rbxcompose.model.robot import Robot
 from rbxcompose.regular_files import read_regular
 

@@ -11,8 +11,8 @@ from rbxcompose.bus.names import admin_key
 from rbxcompose.bus.transport import Answer
 from rbxcompose.bus.window import SCHEMA
 from rbxcompose.cli.bus.guest import LONGEST_QUEUE, NAME, Guest
-from rbxcompose.missions.replica import Replica
-from rbxcompose.missions.statuses import IDLE, NAMES
+from rbxcompose.missions.program.statuses import IDLE, NAMES
+from rbxcompose.missions.view.replica import Replica
 from rbxcompose.qos import Qos
 
 _PATH = "missions"

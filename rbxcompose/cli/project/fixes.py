@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
+from rbxcompose.atomic_files import replace_file
 from rbxcompose.edits import apply, safe_fixes
 from rbxcompose.findings import Finding, Fix, Report, Sources
 from rbxcompose.manifest.limits import FILE_BYTES
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 from rbxcompose.regular_files import read_regular
-from rbxcompose.replacing import replace_file
 
 ROUNDS = 20  # one fix may let the next mistake be seen
 _WORDS = 200  # characters of a title

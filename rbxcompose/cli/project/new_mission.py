@@ -6,14 +6,14 @@ import os
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from rbxcompose.atomic_files import replace_file
 from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.limits import FILE_BYTES
-from rbxcompose.model.charging import navigator_of, top_speed
+from rbxcompose.model.charge import navigator_of, top_speed
 from rbxcompose.model.robot import Robot
 from rbxcompose.regular_files import read_regular
-from rbxcompose.replacing import replace_file
 from rbxcompose.scaffold.answers import ANSWER, AnswerError
 from rbxcompose.scaffold.mission import MissionAnswers, with_entry
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from rbxcompose.findings import Finding, Severity, Span, kind
 from rbxcompose.manifest.files import ROBOT_FILE, find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
-from rbxcompose.manifest.trials import TEST
+from rbxcompose.manifest.test_file import TEST
 from rbxcompose.regular_files import open_regular
 
 UNUSED = kind(

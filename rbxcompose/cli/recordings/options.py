@@ -9,7 +9,7 @@ from pathlib import Path
 from rbxcompose.cli.bus.entities import table
 from rbxcompose.cli.output.console import tell_report
 from rbxcompose.findings import Finding, Report
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 from rbxcompose.qos import Qos
 from rbxcompose.recording.codes import RECOVERED
 from rbxcompose.recording.files import recover_all

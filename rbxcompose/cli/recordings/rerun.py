@@ -14,9 +14,9 @@ from rbxcompose.cli.project.robot_options import compiled
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.config import HIDDEN
 from rbxcompose.findings import suggest
-from rbxcompose.plain import plain
 from rbxcompose.plan.dump import PlanTextError, dump, load
 from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.printable import plain
 from rbxcompose.recording.codes import DIFFERENT, NOT_ENOUGH, UNWRITABLE
 from rbxcompose.recording.files import write_problem
 from rbxcompose.recording.message import Recorded
@@ -24,8 +24,8 @@ from rbxcompose.recording.reader import RecordingReader
 from rbxcompose.recording.recorder import Recorder
 from rbxcompose.recording.tape import PLAN
 from rbxcompose.regular_files import open_regular
-from rbxcompose.rerun.comparison import Difference
-from rbxcompose.rerun.run import Rerun, missing_topics, rerun
+from rbxcompose.replay.comparison import Difference
+from rbxcompose.replay.run import Rerun, missing_topics, rerun
 
 HOW = "'rbxcompose up PATH --rate max --record FILE' records all that is needed"
 

@@ -11,8 +11,8 @@ from rbxcompose.cli.robots.file_watch import FileWatch
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.cli.robots.proposal import Proposal
 from rbxcompose.compiler import Compilation
+from rbxcompose.composition.overlay import SET
 from rbxcompose.manifest.library import PREFIX
-from rbxcompose.manifest.overlay import SET
 
 _LOOK = 0.25  # [s] between looks at the files; a change is taken at the second look at which it is the same
 _AGAIN = 0.5  # [s] between tries of what the robot cannot do now

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from rbxcompose.diagnostics.levels import Level
-from rbxcompose.plain import columns, fitted, plain
+from rbxcompose.levels import Level
+from rbxcompose.printable import columns, fitted, plain
 from rbxcompose.runtime.records import Record
 
 MOST_WARNINGS = 5

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from rbxcompose.cli.robots.lookup import answer_of, find_robot
+from rbxcompose.inspection.changes_text import changes_text, with_places
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.dump import dump
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
 from rbxcompose.runtime.supervision.changes import Fate
-from rbxcompose.runtime.supervision.changing import LONGEST
-from rbxcompose.seeing.changes_text import changes_text, with_places
+from rbxcompose.runtime.supervision.plan_change import LONGEST
 from rbxcompose.typed_json import to_data
 
 _COMPARE = 10.0  # [s] for the supervisor to read a plan

@@ -9,7 +9,7 @@ from rbxcompose.cli.output.console import has_colour, refuse, tell
 from rbxcompose.cli.robots.live_reload import LiveReload
 from rbxcompose.cli.robots.lookup import ALREADY_UP, UNSAFE
 from rbxcompose.cli.robots.story import Story, summary
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan, extent
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.follow import Follower

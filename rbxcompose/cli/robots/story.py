@@ -6,8 +6,8 @@ import zlib
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
-from rbxcompose.diagnostics.levels import Level
-from rbxcompose.plain import plain
+from rbxcompose.levels import Level
+from rbxcompose.printable import plain
 from rbxcompose.runtime.records import Record
 
 _LONGEST = 2000  # characters of a record's text that are shown

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.doctor.examining import examination
 from rbxcompose.doctor.facts import Facts
+from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
 
 MOST_STEP = 0.05  # [s] by which the wall clock may move against the monotonic one while we look

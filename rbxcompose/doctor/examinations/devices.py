@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.doctor.examining import examination
 from rbxcompose.doctor.facts import Facts
+from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, kind
 from rbxcompose.model.robot import Robot
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 
 _PREFIX = "/dev/"
 

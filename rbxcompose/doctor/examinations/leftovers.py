@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbxcompose.doctor.examining import examination
 from rbxcompose.doctor.facts import Facts, Running
+from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 
 LEFT = kind(
     "RBX9409",

@@ -7,12 +7,12 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from rbxcompose.doctor.examining import examination
 from rbxcompose.doctor.facts import Facts
+from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.files import project_of, shown_name
 from rbxcompose.manifest.secrets import FOLDER
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 
 OPEN_TO_OTHERS = kind(
     "RBX9410",

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.doctor.examining import examination
 from rbxcompose.doctor.facts import Facts, Listener, Running
+from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 from rbxcompose.sections.bus import Bus
 
 PORT_TAKEN = kind(

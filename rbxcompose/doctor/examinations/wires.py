@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.bus.graph import Name
-from rbxcompose.doctor.examining import examination
 from rbxcompose.doctor.facts import Facts, Running
+from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
-from rbxcompose.plain import plain
+from rbxcompose.printable import plain
 from rbxcompose.sdk.ports import In
 
 NOBODY_PUBLISHES = kind(

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from rbxcompose.findings import Finding
+from rbxcompose.manifest.parser_error import Trouble
 from rbxcompose.manifest.tree import Node, Path
-from rbxcompose.manifest.trouble import Trouble
 from rbxcompose.slips import Repair, Slips
 
 # What the parser says, in its words.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from rbxcompose.findings import Edit, Finding, Fix
+from rbxcompose.manifest.parser_error import NOT_YAML, Trouble, indent
 from rbxcompose.manifest.slips import COLON, text_slip
-from rbxcompose.manifest.trouble import NOT_YAML, Trouble, indent
 
 # The keys of manifests and skills whose value is a text for people, in which a colon may stand.
 TEXTS = ("about", "description", "label", "log", "message", "name", "say", "text", "title")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from rbxcompose.findings import Finding, replacement
+from rbxcompose.manifest.parser_error import NOT_YAML, Trouble, indent
 from rbxcompose.manifest.slips import NO_COLON, text_slip
-from rbxcompose.manifest.trouble import NOT_YAML, Trouble, indent
 
 _BARE = re.compile(r"(?P<indent> *+)(?P<word>[a-z][a-z0-9_]*)(?P<value>(?: ++[^\s:#]++){1,2})? *")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 
 from rbxcompose.findings import Finding, Related, replacement
+from rbxcompose.manifest.parser_error import NOT_YAML, Trouble, indent
 from rbxcompose.manifest.slips import COLON, text_slip
 from rbxcompose.manifest.slips.tight_colon import tight_colon
-from rbxcompose.manifest.trouble import NOT_YAML, Trouble, indent
 
 _STEP = re.compile(r"(?P<before> *+(- ++)*)(?P<word>[a-z][a-z0-9_]*)(?P<value> ++[^\s:#][^:#]*)?")
 

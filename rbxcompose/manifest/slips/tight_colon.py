@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 
 from rbxcompose.findings import Finding, replacement
+from rbxcompose.manifest.parser_error import NOT_YAML, Trouble, behind_dashes
 from rbxcompose.manifest.slips import COLON, NO_COLON, text_slip
 from rbxcompose.manifest.slips.key_in_line import key_in_line
 from rbxcompose.manifest.slips.missing_dash import missing_dash
-from rbxcompose.manifest.trouble import NOT_YAML, Trouble, behind_dashes
 
 _TIGHT = re.compile(r"[a-z][a-z0-9_]*:(?!//)(?=\S)")
 

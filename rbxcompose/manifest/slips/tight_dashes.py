@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from rbxcompose.findings import Edit, Finding, Fix
+from rbxcompose.manifest.parser_error import NOT_YAML, Trouble, indent
 from rbxcompose.manifest.slips import ANY, text_slip
-from rbxcompose.manifest.trouble import NOT_YAML, Trouble, indent
 
 _TIGHT = re.compile(r"( *)-([a-z][a-z0-9_]*)(?=: |:? *$)")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 
 from rbxcompose.findings import Finding
+from rbxcompose.manifest.parser_error import NOT_YAML, Trouble, behind_dashes, indent
 from rbxcompose.manifest.slips import COLON, NO_DASH, NO_KEY, text_slip
 from rbxcompose.manifest.slips.step_without_colon import step_without_colon
-from rbxcompose.manifest.trouble import NOT_YAML, Trouble, behind_dashes, indent
 
 _KEY_LINE = re.compile(r" *+(- ++)*[a-z][a-z0-9_]*:( |$)")
 _FULL_LINE = re.compile(r" *+[a-z][a-z0-9_]*: ++[^\s#].*")

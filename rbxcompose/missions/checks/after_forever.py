@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.ending import Ending
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.facts import never_skipped
-from rbxcompose.missions.outcomes import SUCCEEDS
-from rbxcompose.missions.program import Node, Program
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.endings import Ending
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.facts import never_skipped
+from rbxcompose.missions.program.outcomes import SUCCEEDS
+from rbxcompose.missions.program.program import Node, Program
 
 
 @mission_check("RBX4125", Severity.WARNING)

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from rbxcompose.expressions.tree import Expression, Number
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.missions.branches import ALL, Branches
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.outcomes import SUCCEEDS
-from rbxcompose.missions.program import Node
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.program.branches import ALL, Branches
+from rbxcompose.missions.program.outcomes import SUCCEEDS
+from rbxcompose.missions.program.program import Node
 
 
 @mission_check("RBX4138", Severity.WARNING)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Finding, Severity
-from rbxcompose.missions.answers import Serves
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.facts import place_in_text
-from rbxcompose.missions.outcomes import FAILS
-from rbxcompose.missions.program import CONTINUE, Node, Program
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.facts import place_in_text
+from rbxcompose.missions.program.answers import Serves
+from rbxcompose.missions.program.outcomes import FAILS
+from rbxcompose.missions.program.program import CONTINUE, Node, Program
 
 
 @mission_check("RBX4127", Severity.WARNING)

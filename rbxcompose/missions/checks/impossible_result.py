@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 from rbxcompose.expressions.tree import Comparison, Node, Variable, Word, walk
 from rbxcompose.findings import Finding, Severity
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.outcomes import FAILS, SUCCEEDS, Outcomes
-from rbxcompose.missions.spans import inner_span
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.language.spans import inner_span
+from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes
 
 
 @mission_check("RBX4135", Severity.WARNING)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Finding, Related
-from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.codes import NAME_CLASH
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.look import Form
-from rbxcompose.missions.program import Node, Program, RobotNames
-from rbxcompose.missions.registry import kinds
-from rbxcompose.missions.views import View
-from rbxcompose.missions.watching import POSE
+from rbxcompose.missions.engine.condition_watches import POSE
+from rbxcompose.missions.program.look import Form
+from rbxcompose.missions.program.program import Node, Program, RobotNames
+from rbxcompose.missions.program.registry import kinds
 
 
 @mission_check(NAME_CLASH)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Finding
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.look import Form
-from rbxcompose.missions.machines import Next
-from rbxcompose.missions.outcomes import FAILS, Outcomes
-from rbxcompose.missions.program import Node
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.program.look import Form
+from rbxcompose.missions.program.machines import Next
+from rbxcompose.missions.program.outcomes import FAILS, Outcomes
+from rbxcompose.missions.program.program import Node
 
 ONE_WORD = "write 'next' as a map with 'success' and 'failure'"
 

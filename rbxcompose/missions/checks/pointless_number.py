@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from rbxcompose.expressions.tree import Expression, Minus, Number
 from rbxcompose.findings import Finding, Severity
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.facts import place_in_text
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.facts import place_in_text
 
 
 @mission_check("RBX4128", Severity.WARNING)

@@ -8,9 +8,9 @@ from rbxcompose.expressions.check import check
 from rbxcompose.expressions.tree import Expression, Flag, Number, Text, Word
 from rbxcompose.expressions.types import Type, TypeKind
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.missions.asked import Asked
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.language.asked import Asked
 
 WORDS = (TypeKind.TEXT, TypeKind.CHOICE, TypeKind.PLACE)
 NUMBERS = (TypeKind.QUANTITY, TypeKind.COUNT)

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from itertools import combinations
 
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.claims import claims_below
-from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.claims import claims_below
+from rbxcompose.missions.analysis.examined import Examined
 
 
 @mission_check("RBX4152", Severity.WARNING)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from rbxcompose.findings import Finding
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.deeds import called, published
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.messages import Message
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.effects import called, published
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.program.messages import Message
 
 
 @mission_check("RBX4150", is_fixable=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Finding
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
 
 
 @mission_check("RBX4144", is_fixable=True)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Finding, correction, suggest
-from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.effects import assignments
+from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.codes import UNKNOWN_NAME
-from rbxcompose.missions.deeds import assignments
-from rbxcompose.missions.examined import Examined
 
 
 @mission_check(UNKNOWN_NAME)

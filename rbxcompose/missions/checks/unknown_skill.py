@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Finding, nearest
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.registry import kinds
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.program.registry import kinds
 
 
 @mission_check("RBX4102", is_fixable=True)

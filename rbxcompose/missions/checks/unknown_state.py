@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Finding
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.machines import States
-from rbxcompose.missions.program import Node
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.program.machines import States
+from rbxcompose.missions.program.program import Node
 
 
 @mission_check("RBX4140", is_fixable=True)

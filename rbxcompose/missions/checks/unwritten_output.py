@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.deeds import written
-from rbxcompose.missions.examined import Examined
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.effects import written
+from rbxcompose.missions.analysis.examined import Examined
 
 
 @mission_check("RBX4134", Severity.WARNING)

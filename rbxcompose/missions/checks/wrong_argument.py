@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions.asked import Argument
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.program import Skill
-from rbxcompose.missions.typing import check_written
-from rbxcompose.missions.views import View
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.scope_types import View
+from rbxcompose.missions.language.argument_types import check_written
+from rbxcompose.missions.language.asked import Argument
+from rbxcompose.missions.program.program import Skill
 
 STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
 

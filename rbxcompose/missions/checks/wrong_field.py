@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping
 from rbxcompose.expressions.check import check
 from rbxcompose.expressions.types import TEXT, UNKNOWN, TypeKind
 from rbxcompose.findings import Finding, Span
-from rbxcompose.missions.checking import mission_check
-from rbxcompose.missions.deeds import called, published
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.messages import Message, Shape, Written
-from rbxcompose.missions.typing import check_written
-from rbxcompose.missions.views import View
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.effects import called, published
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.scope_types import View
+from rbxcompose.missions.language.argument_types import check_written
+from rbxcompose.missions.program.messages import Message, Shape, Written
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import Shape as Single
 from rbxcompose.msgs.definitions import parse_type

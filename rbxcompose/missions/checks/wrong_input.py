@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.codes import WRONG_INPUT
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.program import Program
-from rbxcompose.missions.typing import check_written
-from rbxcompose.missions.views import View
+from rbxcompose.missions.language.argument_types import check_written
+from rbxcompose.missions.program.program import Program
 
 
 @mission_check(WRONG_INPUT)

@@ -9,14 +9,14 @@ from rbxcompose.expressions.check import check
 from rbxcompose.expressions.tree import Number
 from rbxcompose.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, TypeKind, choice_of, quantity_of
 from rbxcompose.findings import Finding
-from rbxcompose.missions.asked import Assignment
-from rbxcompose.missions.branches import RESULTS
-from rbxcompose.missions.checking import mission_check
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.effects import assignments
+from rbxcompose.missions.analysis.endings import Ending
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.scope_types import View, findings_of
 from rbxcompose.missions.codes import UNKNOWN_NAME, WRONG_TYPE
-from rbxcompose.missions.deeds import assignments
-from rbxcompose.missions.ending import Ending
-from rbxcompose.missions.examined import Examined
-from rbxcompose.missions.views import View, findings_of
+from rbxcompose.missions.language.asked import Assignment
+from rbxcompose.missions.program.branches import RESULTS
 from rbxcompose.units import NUMBER
 
 LISTED = (TypeKind.LIST, TypeKind.MAP, TypeKind.UNKNOWN)

@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from rbxcompose.missions.families import LeafStep
-from rbxcompose.missions.leaf import Leaf
-from rbxcompose.missions.messages import Message
-from rbxcompose.missions.moments import Effects
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ANY, Outcomes
-from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.sending import fields_of
-from rbxcompose.missions.statuses import RUNNING
-from rbxcompose.missions.task import Site
+from rbxcompose.missions.engine.instant_actions import fields_of
+from rbxcompose.missions.engine.leaf import Leaf
+from rbxcompose.missions.engine.task import Site
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.families import LeafStep
+from rbxcompose.missions.program.messages import Message
+from rbxcompose.missions.program.moments import Effects
+from rbxcompose.missions.program.outcomes import ANY, Outcomes
+from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import RUNNING
 from rbxcompose.msgs import registry
 
 

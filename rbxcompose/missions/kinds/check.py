@@ -7,14 +7,14 @@ from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.missions.families import LeafStep
-from rbxcompose.missions.moments import NO_EFFECTS
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ANY, Outcomes
-from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.statuses import FAILURE, SUCCESS
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.families import LeafStep
+from rbxcompose.missions.program.moments import NO_EFFECTS
+from rbxcompose.missions.program.outcomes import ANY, Outcomes
+from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
 
 
 class CheckTask(Task):

@@ -8,14 +8,14 @@ from typing import Self
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.expressions.values import is_same
-from rbxcompose.missions.branches import Choice
-from rbxcompose.missions.families import Choosing
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
-from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.statuses import SKIPPED
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.branches import Choice
+from rbxcompose.missions.program.families import Choosing
+from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
+from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import SKIPPED
 
 
 class ChooseTask(Task):

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from typing import Self
 
 from rbxcompose.expressions.text import Template
-from rbxcompose.missions.families import Deed
-from rbxcompose.missions.moments import NO_EFFECTS
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import FAILS, NEVER, SUCCEEDS, Outcomes
-from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.statuses import FAILURE, RUNNING, SUCCESS
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.families import Deed
+from rbxcompose.missions.program.moments import NO_EFFECTS
+from rbxcompose.missions.program.outcomes import FAILS, NEVER, SUCCEEDS, Outcomes
+from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
 
 
 class EndTask(Task):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.missions.answers import Flow
-from rbxcompose.missions.in_turn import OPTIONS, RANDOM, InTurn, InTurnTask
-from rbxcompose.missions.look import Look
-from rbxcompose.missions.outcomes import FAILS, SUCCEEDS
-from rbxcompose.missions.possible import Possibility, started
-from rbxcompose.missions.program import Node, RobotNames
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.statuses import SUCCESS
+from rbxcompose.missions.program.answers import Flow
+from rbxcompose.missions.program.in_turn import OPTIONS, RANDOM, InTurn, InTurnTask
+from rbxcompose.missions.program.look import Look
+from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
+from rbxcompose.missions.program.possible import Possibility, started
+from rbxcompose.missions.program.program import Node, RobotNames
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import SUCCESS
 
 
 class FallbackTask(InTurnTask):

@@ -12,22 +12,22 @@ from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression, Field, Index, Variable
 from rbxcompose.expressions.types import TEXT, UNKNOWN, Type, TypeKind
 from rbxcompose.expressions.values import NOT_ARRIVED, Located, NotArrivedError, Value
-from rbxcompose.missions.answers import Flow
-from rbxcompose.missions.editing import without
-from rbxcompose.missions.facts import constants_of
-from rbxcompose.missions.families import Loop
-from rbxcompose.missions.look import Look
-from rbxcompose.missions.moments import NO_EFFECTS, Effects
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ANY as ANYHOW
-from rbxcompose.missions.outcomes import Outcomes
-from rbxcompose.missions.program import NOTHING, Endings, Node, Program, Target
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.results import NodeFailed
-from rbxcompose.missions.scopes import ItemScope
-from rbxcompose.missions.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
-from rbxcompose.missions.task import Site, Task
-from rbxcompose.missions.watching import POSE
+from rbxcompose.missions.analysis.facts import constants_of
+from rbxcompose.missions.engine.condition_watches import POSE
+from rbxcompose.missions.engine.data_edits import without
+from rbxcompose.missions.engine.scopes import ItemScope
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.answers import Flow
+from rbxcompose.missions.program.families import Loop
+from rbxcompose.missions.program.look import Look
+from rbxcompose.missions.program.moments import NO_EFFECTS, Effects
+from rbxcompose.missions.program.outcomes import ANY as ANYHOW
+from rbxcompose.missions.program.outcomes import Outcomes
+from rbxcompose.missions.program.program import NOTHING, Endings, Node, Program, Target
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.results import NodeFailed
+from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
 
 WRITTEN, RANDOM, NEAREST = "written", "random", "nearest"
 STOP, NEXT = "stop", "next"

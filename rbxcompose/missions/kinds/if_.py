@@ -7,14 +7,14 @@ from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.missions.facts import is_simple
-from rbxcompose.missions.families import Choosing
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
-from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.statuses import SKIPPED
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.analysis.facts import is_simple
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.families import Choosing
+from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
+from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import SKIPPED
 
 
 class IfTask(Task):

@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from typing import Self
 
 from rbxcompose.expressions.text import Template
-from rbxcompose.missions.events import Logged
-from rbxcompose.missions.facts import is_sure
-from rbxcompose.missions.families import Deed
-from rbxcompose.missions.moments import LEVELS, NO_EFFECTS
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
-from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.statuses import SUCCESS
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.analysis.facts import is_sure
+from rbxcompose.missions.engine.events import Logged
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.families import Deed
+from rbxcompose.missions.program.moments import LEVELS, NO_EFFECTS
+from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
+from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import SUCCESS
 
 
 class LogTask(Task):

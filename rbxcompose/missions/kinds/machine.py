@@ -7,21 +7,21 @@ from dataclasses import dataclass, field
 from typing import Self
 
 from rbxcompose.expressions.values import Value
-from rbxcompose.missions.answers import Advice, Flow, Skipped
-from rbxcompose.missions.events import Transition
-from rbxcompose.missions.families import Loop, Straight
-from rbxcompose.missions.history import WithHistory
-from rbxcompose.missions.look import Form, Look
-from rbxcompose.missions.machines import ENDS, FAILED, FINISHED, STATE, Next, States
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ANY, Outcomes
-from rbxcompose.missions.possible import Possibility, led
-from rbxcompose.missions.program import Endings, Node, RobotNames
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.results import NodeFailed
-from rbxcompose.missions.state_reading import read_machine, read_state
-from rbxcompose.missions.statuses import FAILURE, NAMES, RUNNING, SKIPPED, SUCCESS
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.engine.events import Transition
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.machine_reader import read_machine, read_state
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.answers import Advice, Flow, Skipped
+from rbxcompose.missions.program.families import Loop, Straight
+from rbxcompose.missions.program.history import WithHistory
+from rbxcompose.missions.program.look import Form, Look
+from rbxcompose.missions.program.machines import ENDS, FAILED, FINISHED, STATE, Next, States
+from rbxcompose.missions.program.outcomes import ANY, Outcomes
+from rbxcompose.missions.program.possible import Possibility, led
+from rbxcompose.missions.program.program import Endings, Node, RobotNames
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.results import NodeFailed
+from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SKIPPED, SUCCESS
 
 
 class MachineTask(WithHistory):

@@ -7,17 +7,17 @@ from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.missions.answers import Flow, Skipped
-from rbxcompose.missions.branches import ALL, ANY, Branches, BranchScope, Ended, read_outcomes
-from rbxcompose.missions.families import Straight
-from rbxcompose.missions.look import Form, Look
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import FAILS, SUCCEEDS, Outcomes, either
-from rbxcompose.missions.program import Endings, Node, Target
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.results import NodeFailed
-from rbxcompose.missions.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.answers import Flow, Skipped
+from rbxcompose.missions.program.branches import ALL, ANY, Branches, BranchScope, Ended, read_outcomes
+from rbxcompose.missions.program.families import Straight
+from rbxcompose.missions.program.look import Form, Look
+from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes, either
+from rbxcompose.missions.program.program import Endings, Node, Target
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.results import NodeFailed
+from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
 
 PLAIN = {SUCCEEDS: SUCCEEDS, FAILS: FAILS}
 

@@ -8,16 +8,16 @@ from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression, Number
-from rbxcompose.missions.answers import Advice, Counted, Flow
-from rbxcompose.missions.facts import is_simple, takes_time
-from rbxcompose.missions.families import Loop
-from rbxcompose.missions.look import Look
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ANY, Outcomes
-from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.analysis.facts import is_simple, takes_time
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.answers import Advice, Counted, Flow
+from rbxcompose.missions.program.families import Loop
+from rbxcompose.missions.program.look import Look
+from rbxcompose.missions.program.outcomes import ANY, Outcomes
+from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
 
 
 class RepeatTask(Task):

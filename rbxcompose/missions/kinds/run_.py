@@ -8,16 +8,16 @@ from typing import Self
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN
-from rbxcompose.missions.answers import Flow, Skipped
-from rbxcompose.missions.families import Straight
-from rbxcompose.missions.held import HeldNode
-from rbxcompose.missions.look import PLAIN
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ALWAYS_FAILS, ANY, Outcomes, either
-from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.results import NodeFailed
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.analysis.held_nodes import HeldNode
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.answers import Flow, Skipped
+from rbxcompose.missions.program.families import Straight
+from rbxcompose.missions.program.look import PLAIN
+from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ANY, Outcomes, either
+from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.results import NodeFailed
 
 
 class RunTask(Task):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from rbxcompose.missions.answers import Flow
-from rbxcompose.missions.in_turn import OPTIONS, RANDOM, InTurn, InTurnTask
-from rbxcompose.missions.look import Look
-from rbxcompose.missions.outcomes import FAILS, SUCCEEDS
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.statuses import FAILURE
+from rbxcompose.missions.program.answers import Flow
+from rbxcompose.missions.program.in_turn import OPTIONS, RANDOM, InTurn, InTurnTask
+from rbxcompose.missions.program.look import Look
+from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import FAILURE
 
 
 class SequenceTask(InTurnTask):

@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from rbxcompose.missions.asked import Assignment
-from rbxcompose.missions.facts import is_sure
-from rbxcompose.missions.families import Deed
-from rbxcompose.missions.moments import Effects
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
-from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.sending import assign
-from rbxcompose.missions.statuses import SUCCESS
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.analysis.facts import is_sure
+from rbxcompose.missions.engine.instant_actions import assign
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.asked import Assignment
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.families import Deed
+from rbxcompose.missions.program.moments import Effects
+from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
+from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import SUCCESS
 
 
 class SetTask(Task):

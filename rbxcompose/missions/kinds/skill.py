@@ -10,20 +10,20 @@ from rbxcompose.expressions.values import Value
 from rbxcompose.manifest.tree import Mapping as Tree
 from rbxcompose.manifest.tree import Node as Located
 from rbxcompose.manifest.tree import Scalar, Sequence
-from rbxcompose.missions.asked import Argument
-from rbxcompose.missions.events import Reported, SkillEnded, SkillStarted
-from rbxcompose.missions.families import LeafStep
-from rbxcompose.missions.leaf import Leaf
-from rbxcompose.missions.moments import NO_EFFECTS
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ANY, FAILS, SUCCEEDS, Outcomes
-from rbxcompose.missions.possible import Possibility, ended
-from rbxcompose.missions.program import Endings, Node, RobotNames
-from rbxcompose.missions.registry import SKILL, kind
-from rbxcompose.missions.results import Result
-from rbxcompose.missions.statuses import FAILURE, NAMES, RUNNING, SUCCESS
-from rbxcompose.missions.task import Site
-from rbxcompose.missions.written import Getter, getter
+from rbxcompose.missions.engine.events import Reported, SkillEnded, SkillStarted
+from rbxcompose.missions.engine.leaf import Leaf
+from rbxcompose.missions.engine.task import Site
+from rbxcompose.missions.language.asked import Argument
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.written import Getter, getter
+from rbxcompose.missions.program.families import LeafStep
+from rbxcompose.missions.program.moments import NO_EFFECTS
+from rbxcompose.missions.program.outcomes import ANY, FAILS, SUCCEEDS, Outcomes
+from rbxcompose.missions.program.possible import Possibility, ended
+from rbxcompose.missions.program.program import Endings, Node, RobotNames
+from rbxcompose.missions.program.registry import SKILL, kind
+from rbxcompose.missions.program.results import Result
+from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SUCCESS
 
 
 class SkillTask(Leaf):

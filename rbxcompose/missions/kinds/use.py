@@ -8,19 +8,19 @@ from typing import Self
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.values import NotArrivedError, Value
 from rbxcompose.manifest.tree import Scalar
-from rbxcompose.missions.answers import Flow, Skipped
-from rbxcompose.missions.asked import Argument
-from rbxcompose.missions.families import Straight
-from rbxcompose.missions.history import HISTORY, WithHistory, read_history
-from rbxcompose.missions.look import Look
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import Outcomes
-from rbxcompose.missions.places import LAST
-from rbxcompose.missions.program import Endings, Node, Target
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.statuses import FAILURE, RUNNING
-from rbxcompose.missions.task import Site
-from rbxcompose.missions.written import PLACED, getter, place
+from rbxcompose.missions.engine.resume_points import LAST
+from rbxcompose.missions.engine.task import Site
+from rbxcompose.missions.language.asked import Argument
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.written import PLACED, getter, place
+from rbxcompose.missions.program.answers import Flow, Skipped
+from rbxcompose.missions.program.families import Straight
+from rbxcompose.missions.program.history import HISTORY, WithHistory, read_history
+from rbxcompose.missions.program.look import Look
+from rbxcompose.missions.program.outcomes import Outcomes
+from rbxcompose.missions.program.program import Endings, Node, Target
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import FAILURE, RUNNING
 
 
 class UseTask(WithHistory):

@@ -7,16 +7,16 @@ from typing import Self
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.missions.facts import is_simple
-from rbxcompose.missions.families import LeafStep
-from rbxcompose.missions.moments import NO_EFFECTS
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
-from rbxcompose.missions.program import Endings, Node
-from rbxcompose.missions.registry import kind
-from rbxcompose.missions.statuses import IDLE, RUNNING, SUCCESS
-from rbxcompose.missions.task import Site, Task
-from rbxcompose.missions.watching import Watched
+from rbxcompose.missions.analysis.facts import is_simple
+from rbxcompose.missions.engine.condition_watches import Watched
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.families import LeafStep
+from rbxcompose.missions.program.moments import NO_EFFECTS
+from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
+from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import IDLE, RUNNING, SUCCESS
 
 
 class WaitForTask(Task):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rbxcompose.missions.answers import Serves
-from rbxcompose.missions.modifier import Modifier
-from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, Outcomes
+from rbxcompose.missions.program.answers import Serves
+from rbxcompose.missions.program.modifier import Modifier
+from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, Outcomes
 
 
 class Plain(Modifier):

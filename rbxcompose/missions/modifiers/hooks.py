@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Self
 
+from rbxcompose.missions.engine.instant_actions import act, act_safely
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.families import Plain
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.moments import Moments
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.sending import act, act_safely
-from rbxcompose.missions.statuses import FAILURE, SUCCESS
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.program.moments import Moments
+from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
 
 ON_START, ON_SUCCESS, ON_FAILURE, ON_HALT = "on_start", "on_success", "on_failure", "on_halt"
 _ON: Mapping[int, str] = {SUCCESS: ON_SUCCESS, FAILURE: ON_FAILURE}

@@ -9,15 +9,15 @@ from typing import Self
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions import codes
-from rbxcompose.missions.answers import Advice, Counted, Serves
-from rbxcompose.missions.facts import takes_time
-from rbxcompose.missions.modifier import Modifier
+from rbxcompose.missions.analysis.facts import takes_time
+from rbxcompose.missions.engine.condition_watches import Watched
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ALWAYS_FAILS, SUCCEEDS, Outcomes
-from rbxcompose.missions.statuses import FAILURE, RUNNING
-from rbxcompose.missions.task import Site, Task
-from rbxcompose.missions.watching import Watched
+from rbxcompose.missions.program.answers import Advice, Counted, Serves
+from rbxcompose.missions.program.modifier import Modifier
+from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, SUCCEEDS, Outcomes
+from rbxcompose.missions.program.statuses import FAILURE, RUNNING
 from rbxcompose.units import TIME, format_quantity
 
 SHORTEST = 1e-6  # [s] of a timeout with a meaning

@@ -9,11 +9,11 @@ from functools import cache
 from types import MappingProxyType
 from typing import TypeVar
 
-from rbxcompose.missions.modifier import Modifier
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.program.modifier import Modifier
 
 # From the outside in, whatever the order in the text: a rule of the language.
-MODULES = ("entering", "starting", "results", "hooks", "limits", "saving")
+MODULES = ("state_hooks", "start_conditions", "results", "hooks", "limits", "kept_results")
 
 
 class Decorator(Task):

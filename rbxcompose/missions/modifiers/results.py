@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
-from rbxcompose.missions.answers import Serves
-from rbxcompose.missions.modifier import Modifier
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.node_reader import NodeReader
-from rbxcompose.missions.outcomes import ALWAYS_SUCCEEDS, FAILS, SUCCEEDS, Outcomes
-from rbxcompose.missions.statuses import FAILURE, SUCCESS
-from rbxcompose.missions.task import Site, Task
+from rbxcompose.missions.program.answers import Serves
+from rbxcompose.missions.program.modifier import Modifier
+from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, FAILS, SUCCEEDS, Outcomes
+from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
 
 
 class TurningTask(Decorator):

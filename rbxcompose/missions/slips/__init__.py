@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rbxcompose.manifest.tree import Node
-from rbxcompose.missions.grammar import Place
+from rbxcompose.missions.language.grammar import Place
 from rbxcompose.slips import Repair, Slips
 
 slip: Slips[Callable[[Place, Node], Repair[Node] | None]] = Slips(__name__)

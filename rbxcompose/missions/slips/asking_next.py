@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rbxcompose.manifest.tree import Mapping, Node
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes, told
+from rbxcompose.missions.language.grammar import Place, Takes, told
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 

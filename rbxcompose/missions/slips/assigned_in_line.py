@@ -7,9 +7,9 @@ import re
 from rbxcompose.findings import replacement
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes, told
+from rbxcompose.missions.language.grammar import Place, Takes, told
+from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.slips import slip
-from rbxcompose.missions.spans import inner_span
 from rbxcompose.slips import Repair
 
 _WRITTEN = re.compile(

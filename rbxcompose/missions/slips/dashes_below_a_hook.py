@@ -5,7 +5,7 @@ from __future__ import annotations
 from rbxcompose.findings import Edit, Fix
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Sequence
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import Place, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.steps_below_a_hook import is_step, steps_below_a_hook
 from rbxcompose.slips import Repair

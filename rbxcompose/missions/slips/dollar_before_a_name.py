@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from rbxcompose.findings import replacement
 from rbxcompose.manifest.tree import Node, Scalar
-from rbxcompose.missions.grammar import Place, Takes
-from rbxcompose.missions.naming import NAME, no_name
+from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.names import NAME, no_name
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from rbxcompose.findings import replacement
 from rbxcompose.manifest.tree import Node, Scalar
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import Place, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 

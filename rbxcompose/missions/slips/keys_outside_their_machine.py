@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from rbxcompose.manifest.tree import Entry, Mapping, Node, children, with_children
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes
-from rbxcompose.missions.machines import MACHINE_KEYS
+from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.program.machines import MACHINE_KEYS
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from rbxcompose.manifest.brackets import bracketed, without_brackets
 from rbxcompose.manifest.tree import Node, Scalar, Sequence
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.slips import slip
-from rbxcompose.missions.spans import inner_span
 from rbxcompose.slips import Repair
 
 

@@ -9,9 +9,9 @@ from dataclasses import replace
 from rbxcompose.findings import Edit, Finding, Fix, nearest
 from rbxcompose.manifest.tree import Entry, Key, Node, Scalar, with_children
 from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.missions.grammar import Place, Takes
-from rbxcompose.missions.machines import ENDS
-from rbxcompose.missions.naming import NAME, cure, no_name
+from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.names import NAME, cure, no_name
+from rbxcompose.missions.program.machines import ENDS
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 

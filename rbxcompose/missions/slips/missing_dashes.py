@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.findings import Edit, Fix
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes, Words, told
+from rbxcompose.missions.language.grammar import Place, Takes, Words, told
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 

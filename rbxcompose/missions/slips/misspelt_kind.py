@@ -5,7 +5,7 @@ from __future__ import annotations
 from rbxcompose.findings import nearest
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import Place, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.tight_dashes import tight_dashes
 from rbxcompose.slips import Repair

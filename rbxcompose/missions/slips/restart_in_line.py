@@ -7,10 +7,10 @@ import re
 from rbxcompose.findings import Edit, Fix
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes
-from rbxcompose.missions.program import RESTART
+from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.spans import inner_span
+from rbxcompose.missions.program.program import RESTART
 from rbxcompose.missions.slips import slip
-from rbxcompose.missions.spans import inner_span
 from rbxcompose.slips import Repair
 
 _IN_LINE = re.compile(rf"{RESTART}:?\s+(?P<name>[a-z][a-z0-9_]*)")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rbxcompose.findings import Edit, Finding, Fix
 from rbxcompose.manifest.tree import Mapping, Node
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes, Words
+from rbxcompose.missions.language.grammar import Place, Takes, Words
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.keys_outside_their_machine import keys_outside_their_machine
 from rbxcompose.missions.slips.misspelt_kind import misspelt_kind

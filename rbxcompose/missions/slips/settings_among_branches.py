@@ -5,7 +5,7 @@ from __future__ import annotations
 from rbxcompose.findings import Edit, Finding, Fix
 from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import Place, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.unknown_settings import is_setting, unknown_settings
 from rbxcompose.slips import Repair

@@ -8,8 +8,8 @@ from rbxcompose.findings import Finding, nearest
 from rbxcompose.manifest.tree import Mapping as Tree
 from rbxcompose.manifest.tree import Node, Scalar
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes, Words, told
-from rbxcompose.missions.moments import DEEDS, OPTIONS
+from rbxcompose.missions.language.grammar import Place, Takes, Words, told
+from rbxcompose.missions.program.moments import DEEDS, OPTIONS
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 

@@ -7,7 +7,7 @@ import re
 from rbxcompose.findings import Edit, Fix
 from rbxcompose.manifest.tree import Mapping, Node, Scalar
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes, without_word
+from rbxcompose.missions.language.grammar import Place, Takes, without_word
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 

@@ -9,7 +9,7 @@ from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Mapping as Tree
 from rbxcompose.manifest.tree import Node, Scalar
 from rbxcompose.missions import codes
-from rbxcompose.missions.grammar import Place, Takes, Words, without_word
+from rbxcompose.missions.language.grammar import Place, Takes, Words, without_word
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 from rbxcompose.units import UnitError, parse_quantity

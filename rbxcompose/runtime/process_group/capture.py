@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TextIO
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 
 Told = Callable[[Level, str, str], None]  # level, text, detail; called by whichever thread printed
 

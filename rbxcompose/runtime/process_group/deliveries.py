@@ -9,7 +9,7 @@ from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.refusals import sentence
 from rbxcompose.bus.topics import Subscription
 from rbxcompose.clock import Clock
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.runtime.process_group.statuses import Statuses
 from rbxcompose.scheduler import Scheduler
 

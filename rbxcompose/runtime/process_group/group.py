@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import DISPUTE, ExternalClock, MonotonicClock, SteppedClock, Turn
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.msgs.rosgraph_msgs import Clock as ClockMessage
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.plan.dump import load
@@ -37,7 +37,7 @@ from rbxcompose.scheduler import Scheduler
 from rbxcompose.typed_json import to_data
 
 if TYPE_CHECKING:
-    from rbxcompose.runtime.process_group.taping import Taping
+    from rbxcompose.runtime.process_group.run_recorder import Taping
 
 LONGEST_CONFIGURE = 30.0  # [s]
 LONGEST_CLOSE = 1.0  # [s] to deactivate, clean up and leave the bus
@@ -181,7 +181,7 @@ class Group:
             self._scheduler.advance(time)
         instances = self._plan.of_group(self._name)
         if self._options.record is not None:
-            from rbxcompose.runtime.process_group.taping import Taping  # only a recorded run needs MCAP
+            from rbxcompose.runtime.process_group.run_recorder import Taping  # only a recorded run needs MCAP
 
             self._taping = Taping(
                 self._options.record, self._plan, self._clock, lambda text: self._complain("robot", text)

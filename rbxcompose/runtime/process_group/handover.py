@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 from rbxcompose.clock import Clock
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.requests import Command, Query
 from rbxcompose.robot_events import RobotEvent
 from rbxcompose.runtime.process_group.worker import Worker

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import Clock
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.requests import Command, Refused, Request, as_data
 from rbxcompose.robot_events import RobotEvent

@@ -12,14 +12,14 @@ from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import admin_key
 from rbxcompose.clock import Clock
 from rbxcompose.config import Config
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.requests import Command, Query, Refused, Request, as_data
 from rbxcompose.robot_events import RobotEvent
 from rbxcompose.runtime.channel import Repeated
-from rbxcompose.runtime.process_group.binding import bind
 from rbxcompose.runtime.process_group.frames import Frames
 from rbxcompose.runtime.process_group.handover import HandedOver, handed_over
+from rbxcompose.runtime.process_group.live_ports import bind
 from rbxcompose.runtime.process_group.statuses import Statuses
 from rbxcompose.runtime.process_group.worker import Worker
 from rbxcompose.scheduler import Scheduler

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import Clock
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.msgs.rcl_interfaces import Log
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.qos import Qos

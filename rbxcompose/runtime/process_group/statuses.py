@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import Clock
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header

@@ -9,7 +9,7 @@ from enum import StrEnum
 from rbxcompose.config import HIDDEN, Config, Live, Secret
 from rbxcompose.plan.diff import WHOLE, Change, difference
 from rbxcompose.plan.model import Instance, Plan
-from rbxcompose.runtime.supervision.blocking import is_commanding
+from rbxcompose.runtime.supervision.dependents import is_commanding
 
 WORLD = "world"  # the process group of simulated truth, which cannot come back as it was
 DOWN_AND_UP = "needs 'down' and 'up'"

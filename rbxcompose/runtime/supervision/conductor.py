@@ -10,16 +10,16 @@ from dataclasses import replace
 from itertools import takewhile
 from typing import Any
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.robot_events import MissionOver
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.options import RunOptions
-from rbxcompose.runtime.supervision.blocking import blocked_by, blocked_text, is_commanding
 from rbxcompose.runtime.supervision.changes import WORLD, Changes
-from rbxcompose.runtime.supervision.changing import LONGEST, Changing, Done, text_of
-from rbxcompose.runtime.supervision.closing import DOWN_BOUND, REST_BOUND, Closing
+from rbxcompose.runtime.supervision.dependents import blocked_by, blocked_text, is_commanding
 from rbxcompose.runtime.supervision.members import Effects, Member, Phase
+from rbxcompose.runtime.supervision.plan_change import LONGEST, Changing, Done, text_of
+from rbxcompose.runtime.supervision.shutdown import DOWN_BOUND, REST_BOUND, Closing
 from rbxcompose.runtime.supervision.silence import LOOK, Silence
 from rbxcompose.scheduler import Scheduler
 

@@ -15,7 +15,7 @@ import setproctitle
 
 from rbxcompose.bus import shared_memory
 from rbxcompose.clock import MonotonicClock
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.faults import explain
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, title

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.plan.dump import PlanTextError, load
 from rbxcompose.plan.model import Instance
 from rbxcompose.requests import Command, Refused, Request, as_data, requests

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from types import FrameType
 
 from rbxcompose.clock import MonotonicClock
-from rbxcompose.diagnostics.levels import Level
+from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.control import ControlServer

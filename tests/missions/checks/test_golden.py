@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.checking import all_checks
+from rbxcompose.check_runner import all_checks
 from rbxcompose.compiler import compile_robot
-from rbxcompose.missions.checking import mission_checks
-from rbxcompose.pages import all_kinds
+from rbxcompose.finding_pages import all_kinds
+from rbxcompose.missions.analysis.check_runner import mission_checks
 from rbxcompose.rendering.text import render_text
 from rbxcompose.sdk import skill
 from rbxcompose.testing.golden import Golden

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from rbxcompose.findings import Report
-from rbxcompose.missions.checking import check_program
-from rbxcompose.missions.facts import constants_of
-from rbxcompose.missions.program import Program
-from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.missions.analysis.facts import constants_of
+from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.program.program import Program
 from tests.missions.simulated import ROBOT, program_of, tree
 
 TOUR = program_of("name: tour\ninputs: {rounds: {type: count, default: 1}}\ndo: {repeat: $rounds, do: a}")

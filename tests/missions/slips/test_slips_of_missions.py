@@ -8,8 +8,8 @@ import pytest
 
 from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Node
-from rbxcompose.missions.grammar import Place, Takes
-from rbxcompose.missions.reading import read_program
+from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.slips import slip
 from rbxcompose.rendering.text import render_text
 from rbxcompose.slips import Repair

@@ -1,0 +1,197 @@
+"""Looks at a running robot again and again: its state file, its processes, its log, and its bus."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from rbxcompose.bus.graph import End, Graph, Name
+from rbxcompose.cli.bus.guest import Guest, Heard
+from rbxcompose.cli.missions.replicas import MissionsSeen
+from rbxcompose.cli.robots.lookup import known_state
+from rbxcompose.cli.robots.picture import MOST_WARNINGS, Load, Part, Picture, Tree
+from rbxcompose.inspection.mission_text import running_lines
+from rbxcompose.levels import Level, level_of
+from rbxcompose.missions.view.mirror import ACTIVE, status_list
+from rbxcompose.missions.view.picture import picture_from_data
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.cdr import CdrError, decode
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
+from rbxcompose.runtime.folder import ComponentState, Gauge, RobotFolder, RobotState
+from rbxcompose.runtime.follow import Follower
+from rbxcompose.runtime.log import NAME
+from rbxcompose.runtime.processes import Process
+from rbxcompose.runtime.records import Record
+from rbxcompose.units import UNITS
+
+_HEALTH = "/diagnostics_agg"
+_SUPERVISOR = "supervisor"
+_WIDEST = 200  # columns of a line of a mission
+
+
+class Sampler:
+    """Makes a picture of a robot; rates and shares are those since the picture before.
+
+    Messages are counted by their senders. Only topics that are neither latched nor sent with best effort are
+    subscribed to: those of the class `bulk` may be large, and somebody who looks on must cost little.
+    """
+
+    def __init__(self, folder: RobotFolder, guest: Guest) -> None:
+        self._folder, self._guest = folder, guest
+        self._follower = Follower(folder.path / NAME)
+        self._warnings: deque[Record] = deque(maxlen=MOST_WARNINGS)
+        self._statuses: Mapping[str, DiagnosticStatus] = {}
+        self._gauges: Mapping[str, Gauge] = {}  # by topic
+        self._charges: dict[str, float] = {}  # ratios, by topic
+        self._listened: set[str] = set()
+        self._counts: Counter[bytes] = Counter()
+        self._times: dict[Process, float] = {}
+        self._then: float | None = None
+        self._missions: MissionsSeen | None = None
+
+    def close(self) -> None:
+        """Give the log back."""
+        self._follower.close()
+
+    @property
+    def is_complete(self) -> bool:
+        """Tell whether diagnostics and batteries have been heard and the missions seen, if there are any."""
+        is_healthy = _HEALTH not in self._listened or bool(self._statuses)
+        is_charged = self._charges.keys() >= self._gauges.keys() & self._listened
+        return is_healthy and is_charged and (self._missions is None or self._missions.is_complete)
+
+    def sample(self) -> Picture | None:
+        """Return how things are now, or None if the robot is down."""
+        now, state = self._guest.clock.now(), known_state(self._folder)
+        if state is None:
+            return None
+        elapsed = None if self._then is None else now - self._then
+        self._then = now
+        graph = self._guest.graph()
+        self._gauges = {one.topic: one for one in state.batteries.values()}
+        self._listen(graph)
+        self._warnings.extend(one for one in self._follower.read() if one.level is not Level.OK)
+        return self._picture(state, self._rates(graph, elapsed), self._loads(state, elapsed))
+
+    def _listen(self, graph: Graph) -> None:
+        for topic in graph.topics:
+            is_wanted = topic.name == _HEALTH or topic.name in self._gauges or _is_light(topic)
+            if topic.name not in self._listened and topic.givers and is_wanted:
+                self._listened.add(topic.name)
+                self._guest.listen(topic, partial(self._heard, topic.name))
+
+    def _trees(self, state: RobotState) -> list[Tree]:
+        """Follow the missions of a robot that has some, and return those that run, if their process lives."""
+        alive = state.alive()
+        if not any(one.name == state.executive and one.process in alive for one in state.components):
+            return []
+        if self._missions is None:
+            self._missions = MissionsSeen(self._guest, state.robot)
+        self._missions.look()
+        active = {name: seen for name, seen in self._missions.by_name.items() if seen["state"] in ACTIVE}
+        return [_tree(name, seen) for name, seen in sorted(active.items())]
+
+    def _heard(self, topic: str, heard: Heard) -> None:
+        self._counts[heard.sender] += 1
+        if topic == _HEALTH:
+            self._healthy(heard)
+        elif gauge := self._gauges.get(topic):
+            charge = _charge(gauge, heard)
+            self._charges |= {} if charge is None else {topic: charge}
+
+    def _healthy(self, heard: Heard) -> None:
+        if heard.kind.type != DiagnosticArray.TYPE:
+            return
+        try:
+            told = decode(DiagnosticArray, heard.arrival.payload)
+        except CdrError:
+            return  # the next one comes within a second
+        self._statuses = {one.name: one for one in told.status}
+
+    def _rates(self, graph: Graph, elapsed: float | None) -> dict[str, float]:
+        """Return the messages of each component [1/s]; nothing of those that publish nothing that is counted."""
+        if elapsed is None:
+            return {}
+        rates: dict[str, float] = {}
+        for end in (end for topic in graph.topics if topic.name in self._listened for end in topic.givers):
+            name = _component(end)
+            rates[name] = rates.get(name, 0.0) + self._counts[end.gid] / elapsed
+        self._counts.clear()
+        return rates
+
+    def _loads(self, state: RobotState, elapsed: float | None) -> list[Load]:
+        loads, times = [], {}
+        for name, process in {_SUPERVISOR: state.supervisor, **state.processes}.items():
+            usage = process.usage
+            if usage is not None:
+                times[process], memory = usage
+                before = self._times.get(process)
+                cpu = None if elapsed is None or before is None else (times[process] - before) / elapsed
+                loads.append(Load(name, process.pid, cpu, memory))
+        self._times = times
+        return loads
+
+    def _picture(self, state: RobotState, rates: Mapping[str, float], loads: list[Load]) -> Picture:
+        leaves = {name.rpartition("/")[2]: one for name, one in self._statuses.items() if name.count("/") > 1}
+        alive = state.alive()
+        parts = [_part(one, one.process in alive, rates, leaves.get(one.name)) for one in state.components]
+        missions = [one.message for one in parts if one.name == state.executive and one.message]
+        batteries = [
+            (name, f"{100 * self._charges[one.topic]:.1f} %")
+            for name, one in state.batteries.items()
+            if one.topic in self._charges
+        ]
+        groups = [one for one in self._statuses.values() if one.name.count("/") == 1]
+        return Picture(
+            robot=state.robot,
+            is_supervised=state.is_supervised,
+            router=state.router if "router" in alive or "router" not in state.processes else None,
+            mission=missions[0] if missions else "",
+            batteries=batteries,
+            parts=parts,
+            loads=loads,
+            health=[(one.name.lstrip("/"), level_of(one.level), one.message) for one in groups],
+            warnings=list(self._warnings),
+            trees=self._trees(state),
+        )
+
+
+def _is_light(topic: Name) -> bool:
+    return all(end.qos is not None and end.qos.is_reliable and not end.qos.is_transient_local for end in topic.givers)
+
+
+def _component(end: End) -> str:
+    return end.node.rpartition("/")[2]
+
+
+def _charge(gauge: Gauge, heard: Heard) -> float | None:
+    """Return the charge that a message tells (a ratio); None if it tells none."""
+    try:
+        message = decode(registry.message(heard.kind.type), heard.arrival.payload)
+    except (CdrError, KeyError):  # broken, or of a package that is not here
+        return None
+    values = [getattr(message, name) for name in message.FIELDS]
+    if heard.kind.type != gauge.message or len(values) != 1 or not isinstance(values[0], int | float):
+        return None
+    unit = UNITS.get(gauge.unit)
+    return unit.to_si(values[0]) if unit else float(values[0])
+
+
+def _tree(name: str, seen: Mapping[str, Any]) -> Tree:
+    picture = picture_from_data(seen["picture"])
+    return Tree(name, seen["state"], running_lines(picture, status_list(seen, picture.count), _WIDEST))
+
+
+def _part(one: ComponentState, is_alive: bool, rates: Mapping[str, float], told: DiagnosticStatus | None) -> Part:
+    return Part(
+        one.name,
+        one.type,
+        one.state if is_alive else "dead",
+        one.process,
+        one.restarts,
+        rates.get(one.name) if is_alive else None,
+        None if told is None else level_of(told.level),
+        "" if told is None else told.message,
+    )

@@ -1,0 +1,62 @@
+"""Which file includes which, so that a finding inside an included file tells how the robot came to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+from rbxcompose.findings import Finding, Related, Span
+from rbxcompose.manifest.given_values import told_where_given
+
+_MOST_CHAINS = 3  # of one finding: a part may have many instances
+
+
+@dataclass(frozen=True, slots=True)
+class Inclusion:
+    """One instance of a file: its path (`arm.hand`) and the entries that lead to it, the nearest first."""
+
+    instance: str
+    chain: tuple[Span, ...]
+
+    @property
+    def related(self) -> Iterator[Related]:
+        """Yield the chain, from the entry that includes the file up to the robot's own."""
+        names = self.instance.split(".")
+        for length, span in zip(range(len(names), 0, -1), self.chain, strict=True):
+            yield Related(span, f"included here as '{'.'.join(names[:length])}'")
+
+
+@dataclass(slots=True)
+class Inclusions:
+    """All instances, by the name that findings show of their file."""
+
+    of_file: dict[str, list[Inclusion]] = field(default_factory=dict)
+
+    def add(self, file: str, inclusion: Inclusion) -> None:
+        """Keep one instance."""
+        self.of_file.setdefault(file, []).append(inclusion)
+
+    def told(self, findings: Iterable[Finding]) -> list[Finding]:
+        """Return the findings with the chain of includes for each one inside a part.
+
+        A mistake of a part that has several instances is told once, one in a given value where that was given.
+        """
+        said: set[tuple[str, Span]] = set()
+        out = []
+        for finding in map(told_where_given, findings):
+            inclusions = self.of_file.get(finding.span.file, []) if finding.span else []
+            if not inclusions or finding.span is None:
+                out.append(finding)
+            elif (finding.code, finding.span) not in said:
+                said.add((finding.code, finding.span))
+                out.append(_with_chain(finding, inclusions))
+        return out
+
+
+def _with_chain(finding: Finding, inclusions: list[Inclusion]) -> Finding:
+    chain = [related for one in inclusions[:_MOST_CHAINS] for related in one.related]
+    fix = finding.fix
+    prefixes = {one.instance.replace(".", "_") + "_" for one in inclusions}
+    if fix and any(prefix in edit.text for edit in fix.edits for prefix in prefixes):
+        fix = None  # it would write a name of the robot into the part, which has its own names
+    return replace(finding, related=tuple(dict.fromkeys([*finding.related, *chain])), fix=fix)

@@ -1,0 +1,160 @@
+"""What a part brings, under the names that it has in the file that includes it.
+
+Names of the instance `head` get `head_` in front, and what the part says of them follows. Topics get nothing in front:
+a mux is named after its topic, so it keeps its name; `connect` gives a topic of the part another name, and with it a
+mux, or one of its inputs. A name that the part itself does not have is one of the file that includes it. What holds
+`${` is filled in later and stays as it is. Which names a section has and where it refers to some, its descriptor tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from rbxcompose.manifest.registry import naming, section_named, sections
+from rbxcompose.manifest.renamer import Topic
+from rbxcompose.manifest.section import Section
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence, at
+from rbxcompose.references import ANYTHING, COMPONENT, PORT, TOPIC
+
+Rename = Callable[[str], str]
+
+
+@dataclass(slots=True)
+class Renaming:
+    """How the names of one instance change; `used` are the topics of `connect` that the part has."""
+
+    prefix: str
+    connect: dict[str, Topic]
+    own: dict[str, frozenset[str]]  # by section
+    used: set[str] = field(default_factory=set)
+
+    @classmethod
+    def of(cls, prefix: str, connect: dict[str, Topic], roots: Iterable[Mapping]) -> Renaming:
+        """Return the renaming for what `roots` bring: the file of a part and all that it includes."""
+        trees = list(roots)
+        named = [one for one in sections() if one.names and one.is_composed]
+        own = {one.name: frozenset(name for root in trees for name in one.names_in(root)) for one in named}
+        return cls(prefix, connect, own)
+
+    @property
+    def running(self) -> frozenset[str]:
+        """Return the names of all that the part runs."""
+        return frozenset(name for one in naming(COMPONENT) for name in self.own[one.name])
+
+    def root(self, root: Mapping) -> Mapping:
+        """Return the sections of a part under their new names."""
+        entries = {}
+        for name, entry in root.entries.items():
+            section = section_named(name)
+            entries[name] = Entry(entry.key, self._section(section, entry.value)) if section else entry
+        return replace(root, entries=entries)
+
+    def topic(self, topic: str) -> str:
+        """Return the name that a topic of the part has outside; an input of a mux follows its mux."""
+        if found := self.connect.get(topic):
+            self.used.add(topic)
+            return found.name
+        above, slash, name = topic.rpartition("/")
+        if slash and above in self.connect and self._is_own_topic(above):
+            return f"{self.topic(above)}/{name}"
+        return topic
+
+    def written(self, topic: str) -> Topic:
+        """Return what gives a topic its other name: itself, or the topic that it stands below."""
+        return self.connect.get(topic) or self.connect[topic.rpartition("/")[0]]
+
+    def component(self, name: str) -> str:
+        """Return the new name of something that runs; `component.port` keeps its port."""
+        return self.name(PORT, name)
+
+    def name(self, kind: str, name: str) -> str:
+        """Return what the name of something of a kind becomes."""
+        if kind == TOPIC:
+            return self.topic(name)
+        if kind == ANYTHING:
+            return self.any_name(name)
+        head, dot, rest = name.partition(".") if kind in (PORT, COMPONENT) else (name, "", "")
+        for section in naming(COMPONENT if kind == PORT else kind):
+            if head in self.own.get(section.name, ()):
+                return f"{self._new(section, head)}{dot}{rest}"
+        return name
+
+    def any_name(self, name: str) -> str:
+        """Return what a word becomes that may name anything of the part: a value given by `with:`."""
+        kinds = (one.names for one in sections() if one.is_map and one.is_composed)
+        changed = (self.name(kind, name) for kind in (COMPONENT, *kinds))
+        return next((one for one in changed if one != name), name)
+
+    def values(self, given: Mapping) -> Mapping:
+        """Return the values that a part gives to one that it includes."""
+        entries = {name: Entry(one.key, self.texts(one.value, self.any_name)) for name, one in given.entries.items()}
+        return replace(given, entries=entries)
+
+    def texts(self, node: Node, change: Rename) -> Node:
+        """Return a node with every text below it changed, but for those that are filled in later."""
+        match node:
+            case Scalar(text=text):
+                changed = text if "${" in text else change(text)
+                return node if changed == text else replace(node, text=changed)
+            case Sequence(items=items):
+                return replace(node, items=tuple(self.texts(item, change) for item in items))
+            case Mapping(entries=entries):
+                return replace(node, entries={n: Entry(e.key, self.texts(e.value, change)) for n, e in entries.items()})
+
+    def topics(self, node: Node, above: str = "") -> Node:
+        """Return a map whose keys are topics (below `above`, if given) with these changed; what is no map stays."""
+        if not isinstance(node, Mapping):
+            return node
+        entries = {}
+        for name, entry in node.entries.items():
+            topic = f"{above}{name}"
+            changed = self.topic(topic).removeprefix(self.topic(above.removesuffix("/")) + "/" if above else "")
+            # A name that is wrong is shown where it was given.
+            span = self.connect[topic].span if topic in self.connect else entry.key.span
+            entries[changed] = Entry(replace(entry.key, text=changed, span=span), entry.value)
+        return replace(node, entries=entries)
+
+    def _is_own_topic(self, topic: str) -> bool:
+        return any(one.has_topics and topic in self.own.get(one.name, ()) for one in sections())
+
+    def _new(self, section: Section[Any, Any], name: str) -> str:
+        return self.topic(name) if section.has_topics else f"{self.prefix}{name}"
+
+    def _section(self, section: Section[Any, Any], node: Node) -> Node:
+        node = section.with_references(node, lambda kind, one: self.texts(one, lambda text: self.name(kind, text)))
+        if section.at and isinstance(node, Mapping):
+            return _with(node, section.at[0], lambda named: self._named(section, named))
+        return self._named(section, node) if section.names else node
+
+    def _named(self, section: Section[Any, Any], node: Node) -> Node:
+        if not isinstance(node, Mapping):
+            return node
+        values = {name: section.rename(self, name, entry.value) for name, entry in node.entries.items()}
+        changed = {name: Entry(entry.key, values[name]) for name, entry in node.entries.items()}
+        if section.has_topics:
+            return self.topics(replace(node, entries=changed))
+        new = {name: f"{self.prefix}{name}" for name in changed}
+        entries = {new[name]: Entry(replace(one.key, text=new[name]), one.value) for name, one in changed.items()}
+        return replace(node, entries=entries)
+
+
+def topics_of(roots: Iterable[Mapping]) -> set[str]:
+    """Return the topics that trees have, as `connect:` of an instance may name them."""
+    return {
+        topic
+        for root in roots
+        for section in sections()
+        for name in section.names_in(root)
+        if (node := at(root, (section.name, *section.at, name))) is not None
+        for topic in section.topics(name, node)
+    }
+
+
+def _with(node: Mapping, key: str, change: Callable[[Node], Node]) -> Mapping:
+    """Return a map with the value of `key` changed, if it has it."""
+    if key not in node.entries:
+        return node
+    entry = node.entries[key]
+    return replace(node, entries={**node.entries, key: Entry(entry.key, change(entry.value))})

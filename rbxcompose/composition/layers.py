@@ -1,0 +1,129 @@
+"""The layers of a robot, one over the other: parts -> robot -> profiles -> overlays -> `--set`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from rbxcompose.composition.history import ROBOT_LAYER, History, Step
+from rbxcompose.composition.includes import Instance, Parts
+from rbxcompose.composition.overlay import NOTHING_TO_CHANGE, compose, join, settled
+from rbxcompose.composition.set_options import read_sets
+from rbxcompose.findings import Finding, Span
+from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.file_models import file_model
+from rbxcompose.manifest.files import find, shown_name
+from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.section import OVERLAY, Contents
+from rbxcompose.manifest.tree import Mapping
+from rbxcompose.printable import plain
+from rbxcompose.sections.include import include
+from rbxcompose.sections.profiles import profiles
+
+PROFILE = "--profile"
+INCLUDE = include.name
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """What a command lays over the robot's file: profiles by name, overlays by path, single values."""
+
+    profiles: Sequence[str] = ()
+    overlays: Sequence[str] = ()
+    sets: Sequence[str] = ()
+
+
+@dataclass(slots=True)
+class Composed:
+    """A robot with nothing filled in yet: its sections, its `include:`, and the instances of its parts."""
+
+    root: Mapping
+    include: Mapping
+    instances: tuple[Instance, ...]
+    parts: Parts
+    history: History = field(default_factory=History)
+
+
+def compose_robot(root: Mapping, file: Path, chosen: Chosen, documents: Documents) -> Composed:
+    """Return a robot's file with its parts below and what was chosen on top."""
+    report, history = documents.report, History()
+    overlays = [*_profiles(root, file, chosen.profiles, documents), *_overlays(chosen.overlays, documents)]
+    own = _without(root, profiles.name)
+    included = _include(own, overlays, chosen.sets, history, documents)
+    parts = Parts(documents, file)
+    instances = tuple(parts.instances(included))
+    own = _without(own, INCLUDE)
+    if instances:
+        brought = join([(one.root, one.name, one.span) for one in instances], report, history)
+        composed = compose(replace(brought, span=root.span), [(own, ROBOT_LAYER)], report, history)
+        order = dict.fromkeys((*own.entries, *composed.entries))  # as the robot's file has it
+        composed = replace(composed, entries={name: composed.entries[name] for name in order if name in composed})
+    else:
+        composed = settled(own, report)
+        for name, entry in composed.entries.items():
+            history.write((name,), Step(ROBOT_LAYER, entry.value, entry.value.span))
+    composed = compose(composed, [(_without(tree, INCLUDE), name) for tree, name in overlays], report, history)
+    if chosen.sets:
+        composed = compose(composed, read_sets(chosen.sets, composed, report, documents.sources), report, history)
+    return Composed(composed, included, instances, parts, history)
+
+
+def _include(
+    root: Mapping, overlays: list[tuple[Mapping, str]], sets: Sequence[str], history: History, documents: Documents
+) -> Mapping:
+    """Return the section `include` as all layers have it: what it names is read before anything else is composed."""
+    included = settled(only(root, INCLUDE), documents.report)
+    for entry in included.entries.values():
+        history.write((INCLUDE,), Step(ROBOT_LAYER, entry.value, entry.value.span))
+    changes = [(only(tree, INCLUDE), name) for tree, name in overlays]
+    included = compose(included, changes, documents.report, history)
+    lines = read_sets(sets, included, documents.report, documents.sources, of_include=True)
+    return compose(included, lines, documents.report, history)
+
+
+def only(root: Mapping, key: str) -> Mapping:
+    """Return a tree with nothing but one of its keys."""
+    return replace(root, entries={name: entry for name, entry in root.entries.items() if name == key})
+
+
+def _without(root: Mapping, key: str) -> Mapping:
+    return replace(root, entries={name: entry for name, entry in root.entries.items() if name != key})
+
+
+def _profiles(root: Mapping, file: Path, chosen: Sequence[str], documents: Documents) -> Iterator[tuple[Mapping, str]]:
+    """Yield the chosen profiles, in the order of the command."""
+    named = Contents(root, file, documents).of(profiles)
+    if chosen:
+        documents.sources[PROFILE] = "\n".join(map(plain, chosen))
+    for line, name in enumerate(chosen if named is not None else (), 1):
+        overlay = named[name].value if named and name in named else None
+        if isinstance(overlay, Mapping):
+            yield overlay, f"profile '{name}'"
+        else:
+            span = Span(PROFILE, line, 1, line, len(name) + 1)
+            message = f"the robot has no profile '{name}'"
+            documents.report.add(NOTHING_TO_CHANGE.misspelt(span, message, name, named or (), "profiles"))
+
+
+def profile_spans(root: Mapping) -> dict[str, Span]:
+    """Return where each profile of a robot's file stands, from its name to its end."""
+    there = root.get(profiles.name)
+    named = there.entries if isinstance(there, Mapping) else {}
+    return {
+        name: one.key.span._replace(end_line=one.value.span.end_line, end_column=one.value.span.end_column)
+        for name, one in named.items()
+        if isinstance(one.value, Mapping)
+    }
+
+
+def _overlays(chosen: Sequence[str], documents: Documents) -> Iterator[tuple[Mapping, str]]:
+    """Yield the files of `-f`, in the order of the command; the header is their own."""
+    for written in chosen:
+        file = find(written)
+        if isinstance(file, Finding):
+            documents.report.add(file)
+        elif (root := documents.read(file, OVERLAY)) is not None:
+            documents.check(file_model(OVERLAY), root)
+            sections = {name: entry for name, entry in root.entries.items() if name not in Header.model_fields}
+            yield replace(root, entries=sections), f"overlay '{shown_name(file)}'"

@@ -1,0 +1,280 @@
+"""Composition: parts -> robot -> profile -> overlays -> `--set`.
+
+Maps merge by key, the rest is replaced; each value keeps its place, and a `History` keeps what it replaced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from operator import is_
+
+from rbxcompose.composition.history import History, Step
+from rbxcompose.findings import Related, Report, Span, correction, kind, suggest
+from rbxcompose.manifest.registry import section_named
+from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar
+from rbxcompose.manifest.tree import Sequence as NodeSequence
+from rbxcompose.manifest.walk import REMOVE
+
+NOTHING_TO_CHANGE = kind(
+    "RBX1302",
+    """A profile, an overlay or `--set` changes what does not exist
+
+An overlay may add a new entry to a section, such as a component with its `type:`. What it changes or removes must be
+there, or else the name is misspelt.
+
+Bad:
+```yaml
+profiles:
+  tired:
+    components:
+      batery:
+        runtime: 30 s
+```
+Good:
+```yaml
+profiles:
+  tired:
+    components:
+      battery:
+        runtime: 30 s
+```
+""",
+    is_fixable=True,
+)
+NOT_AN_OVERLAY = kind(
+    "RBX1305",
+    """`!remove` where nothing lies below
+
+`!remove` in a profile or an overlay takes something out of the robot, and in the robot's file something that a part
+brought. Where nothing lies below there is nothing to take it from.
+
+Bad:
+```yaml
+components:
+  charger: !remove
+```
+Good:
+```yaml
+profiles:
+  bare:
+    components:
+      charger: !remove
+```
+""",
+)
+
+TWO_PARTS = kind(
+    "RBX1307",
+    """Two parts bring the same thing
+
+What a part brings gets the name of its instance in front, but topics do not: two parts may not bring the same input or
+lock of a mux. `connect:` gives one of them another topic.
+
+Bad:
+```yaml
+include:
+  gamepad: rbx:parts/teleop.yaml
+  keyboard: rbx:parts/teleop.yaml
+```
+Good:
+```yaml
+include:
+  gamepad: rbx:parts/teleop.yaml
+  keyboard:
+    part: rbx:parts/teleop.yaml
+    with:
+      priority: 90
+    connect:
+      cmd_vel/teleop: cmd_vel/keyboard
+```
+""",
+)
+
+SET = "--set"
+
+
+def compose(
+    base: Mapping, overlays: Iterable[tuple[Mapping, str]], report: Report, history: History | None = None
+) -> Mapping:
+    """Return `base`, which is settled, changed by each overlay in turn; each comes with its name for findings."""
+    composed = base
+    for overlay, name in overlays:
+        composed = _Merge(name, report, history or History()).mapping(composed, _spelt_out(overlay), ())
+    return composed
+
+
+def join(parts: Iterable[tuple[Mapping, str, Span]], report: Report, history: History) -> Mapping:
+    """Return what several parts bring together; each comes with its instance and the place that includes it.
+
+    A part stands behind those that it includes, and may change them; what else two parts bring is a finding.
+    """
+    joined = Mapping()
+    for root, instance, span in parts:
+        joined = _Join(instance, span, report, history).mapping(joined, _spelt_out(root), ())
+    return joined
+
+
+def part_layer(instance: str) -> str:
+    """Return how findings call what an instance of a part brings."""
+    return f"part '{instance}'"
+
+
+def settled(root: Mapping, report: Report) -> Mapping:
+    """Return a tree that nothing lies below: short forms written in full, and a finding for each `!remove`."""
+    return _settled_map(_spelt_out(root), report)
+
+
+def _spelt_out(root: Mapping) -> Mapping:
+    """Write the short forms of section entries in full, so that every layer can change a part of them."""
+    entries = dict(root.entries)
+    for name, entry in root.entries.items():
+        short = section.short if (section := section_named(name)) else None
+        if short is not None and short.is_merged and isinstance(named := entry.value, Mapping):
+            full = {key: replace(one, value=_in_full(one.value, short.key)) for key, one in named.entries.items()}
+            entries[name] = replace(entry, value=replace(named, entries=full))
+    return replace(root, entries=entries)
+
+
+def _in_full(value: Node, key: str) -> Node:
+    if not isinstance(value, Scalar):
+        return value
+    return Mapping({key: Entry(Scalar(key, value.span), value)}, value.span)
+
+
+class _Merge:
+    """One overlay laid over a tree."""
+
+    def __init__(self, overlay: str, report: Report, history: History) -> None:
+        self.overlay = overlay
+        self.report = report
+        self.history = history
+
+    def mapping(self, base: Mapping, over: Mapping, path: Path) -> Mapping:
+        entries = dict(base.entries)
+        for name, entry in over.entries.items():
+            self.entry(entries, entry, (*path, name))
+        return replace(base, entries=entries)
+
+    def entry(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
+        """Lay one entry over those of the map above it."""
+        name = entry.key.text
+        below = entries.get(name)
+        is_gone = is_removal(entry.value)
+        if below is None:
+            (self._nothing_to_remove if is_gone else self._add)(entries, entry, path)
+        elif isinstance(below.value, Mapping) and isinstance(entry.value, Mapping) and not entry.value.tag:
+            if self.may_merge(path):
+                entries[name] = replace(below, value=self.mapping(below.value, entry.value, path))
+            else:
+                self._clash(below, entry, path)
+        elif not self.may_change(path):
+            self._clash(below, entry, path)
+        elif is_gone:
+            del entries[name]
+            self.history.write(path, Step(self.overlay, None, entry.key.span))
+        else:
+            self._enter(entries, entry, path)
+
+    def may_merge(self, path: Path) -> bool:
+        """Tell whether this layer may add to the map at `path`."""
+        return True
+
+    def may_change(self, path: Path) -> bool:
+        """Tell whether this layer may replace or remove what is at `path`."""
+        return True
+
+    def _enter(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
+        value = _settled(entry.value, self.report)
+        entries[entry.key.text] = Entry(entry.key, value)
+        self.history.write(path, Step(self.overlay, value, value.span))
+
+    def _nothing_to_remove(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
+        name = entry.key.text
+        where = f" in '{'.'.join(map(str, path[:-1]))}'" if path[1:] else ""
+        message = f"{self.overlay} removes '{name}', which does not exist{where}"
+        self.report.add(NOTHING_TO_CHANGE.misspelt(entry.key.span, message, name, entries))
+
+    def _add(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
+        name = entry.key.text
+        section = section_named(path[0]) if len(path) == 2 else None
+        one, needed = (section.entry, section.needs) if section else ("", "")
+        if needed and isinstance(entry.value, Mapping) and needed not in entry.value:
+            message = f"{self.overlay} changes the {one} '{name}', which the robot does not have"
+            help_text = suggest(name, entries, str(path[0])) or f"a new {one} needs a '{needed}:'"
+            fix = correction(name, entries, entry.key.span)
+            self.report.add(NOTHING_TO_CHANGE.at(entry.key.span, message, help=help_text, fix=fix))
+        else:
+            self._enter(entries, entry, path)
+
+    def _clash(self, below: Entry, entry: Entry, path: Path) -> None:
+        """Say that this layer may not change what is at `path`."""
+        raise AssertionError("an overlay may change everything")
+
+
+class _Join(_Merge):
+    """One part laid beside others."""
+
+    def __init__(self, instance: str, span: Span, report: Report, history: History) -> None:
+        super().__init__(part_layer(instance), report, history)
+        self.span = span
+        self.included = part_layer(f"{instance}.").removesuffix("'")  # how the layers of what it includes begin
+
+    def may_merge(self, path: Path) -> bool:
+        return _is_shared(path) or self.may_change(path)
+
+    def may_change(self, path: Path) -> bool:
+        return self.history.layer(path).startswith(self.included)
+
+    def _clash(self, below: Entry, entry: Entry, path: Path) -> None:
+        name, *names = map(str, path)
+        other, section = self.history.layer(path), section_named(name)
+        what = f"'{names[-1]}' of '{name}'" if names else f"'{name}'"
+        help_text = "rename one of the two instances" if names else f"a robot has one '{name}': leave one out"
+        if section and (told := section.clash(names)):
+            what, help_text = told
+        message = f"{self.overlay} and {other} both bring {what}"
+        related = [Related(below.key.span, f"from {other}"), Related(entry.key.span, f"from {self.overlay}")]
+        self.report.add(TWO_PARTS.at(self.span, message, label="the second", help=help_text, related=related))
+
+
+def _is_shared(path: Path) -> bool:
+    """Tell whether several parts may add to the map at `path`."""
+    section = section_named(path[0])
+    return section is not None and section.is_shared(path[1:])
+
+
+def _settled(node: Node, report: Report) -> Node:
+    """Return a node without the tags of maps: nothing lies below it that they could speak of.
+
+    A list keeps its `!replace`, which says that what is not in it any more was meant to go.
+    """
+    match node:
+        case Scalar():
+            return node
+        case Mapping():
+            return _settled_map(node, report)
+        case NodeSequence(items=items):
+            inner = tuple(_settled(item, report) for item in items)
+            return node if all(map(is_, inner, items)) else replace(node, items=inner)
+
+
+def is_removal(node: Node) -> bool:
+    """Tell whether a layer takes away what lies below it."""
+    return isinstance(node, Mapping) and node.tag == REMOVE
+
+
+def _settled_map(node: Mapping, report: Report) -> Mapping:
+    """Return a map without tags; the same object if there are none."""
+    changed: dict[str, Entry] = {}
+    for name, entry in node.entries.items():
+        value = entry.value
+        if isinstance(value, Scalar):
+            continue
+        if is_removal(value):
+            message = f"'!remove' has nothing to remove '{name}' from"
+            report.add(NOT_AN_OVERLAY.at(value.span, message, help="it belongs in a profile"))
+            changed[name] = Entry(entry.key, Scalar("", value.span, filled=BROKEN))  # so that nobody misses it
+        elif (inner := _settled(value, report)) is not value:
+            changed[name] = Entry(entry.key, inner)
+    return Mapping({**node.entries, **changed}, node.span) if changed or node.tag else node

@@ -1,0 +1,108 @@
+"""A robot's file from text to `RobotManifest`, and every other manifest up to its checked header."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as AnyMapping
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from rbxcompose.composition.includes import included_parts
+from rbxcompose.composition.layers import Chosen, Composed, compose_robot, profile_spans
+from rbxcompose.composition.robot_manifest import RobotManifest
+from rbxcompose.composition.scopes import fill_scopes
+from rbxcompose.composition.section_reader import read_sections
+from rbxcompose.findings import Finding, Report
+from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.file_models import file_model
+from rbxcompose.manifest.files import find, project_of, shown_name
+from rbxcompose.manifest.fill import fill
+from rbxcompose.manifest.fill_names import names_of
+from rbxcompose.manifest.garbage_collection import paused_collection
+from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.mission_data import is_moderate
+from rbxcompose.manifest.secrets import Secrets
+from rbxcompose.manifest.section import ROBOT
+from rbxcompose.manifest.tree import Mapping, Scalar
+
+MISSION = "Mission"
+
+
+@paused_collection()
+def load_robot(
+    path: str | Path,
+    *,
+    report: Report,
+    sources: dict[str, str],
+    profiles: Sequence[str] = (),
+    overlays: Sequence[str] = (),
+    sets: Sequence[str] = (),
+    sim: bool = True,
+    environment: AnyMapping[str, str] | None = None,
+) -> RobotManifest | None:
+    """Read a robot's file with its parts, profiles, overlays and `--set` changes; mistakes go into `report`.
+
+    Returns None if there is no robot to speak of, or one of its parts cannot be read; a robot with mistakes is returned
+    as far as it could be read.
+    """
+    file = find(str(path))
+    if isinstance(file, Finding):
+        report.add(file)
+        return None
+    documents = Documents(report, sources)
+    root = documents.read(file, ROBOT)
+    if root is None:
+        return None
+    composed = compose_robot(root, file, Chosen(profiles, overlays, sets), documents)
+    manifest = _manifest(composed, file, sim, environment or {}, documents)
+    if manifest is not None:
+        named = (find(one) for one in overlays)
+        shown = tuple(shown_name(one) for one in named if not isinstance(one, Finding))
+        manifest = replace(manifest, profiles=profile_spans(root), overlays=shown)
+    report.findings = composed.parts.inclusions.told(report.findings)
+    return manifest
+
+
+def _manifest(
+    composed: Composed, file: Path, sim: bool, environment: AnyMapping[str, str], documents: Documents
+) -> RobotManifest | None:
+    if not composed.parts.is_complete:
+        return None  # what a missing part was to bring would be missing everywhere
+    documents.check(file_model(ROBOT), composed.root)
+    names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
+    root, include = fill_scopes(composed, names)
+    manifest = read_sections(root, file, sim, documents)
+    return replace(
+        manifest,
+        parts=included_parts(composed.instances),
+        include=include,
+        history=composed.history,
+        files=documents.files,
+        inclusions=composed.parts.inclusions,
+    )
+
+
+@paused_collection()
+def read_mission(
+    path: Path,
+    *,
+    robot: str,
+    report: Report,
+    sources: dict[str, str],
+    sim: bool = True,
+    environment: AnyMapping[str, str] | None = None,
+) -> Mapping | None:
+    """Read a mission's file, check its header and fill in `${...}`; what it does is left as nodes."""
+    documents = Documents(report, sources)
+    root = documents.read(path, MISSION)
+    if root is None:
+        return None
+    header = {name: entry for name, entry in root.entries.items() if name in Header.model_fields}
+    documents.check(Header, replace(root, entries=header))
+    filled = fill(root, names_of(robot, sim, environment or {}), report, runs=True)
+    return filled if is_moderate(filled.get("data"), "datum", report) else None
+
+
+def _name(root: Mapping) -> str:
+    name = root.get("name")
+    return name.text if isinstance(name, Scalar) else ""

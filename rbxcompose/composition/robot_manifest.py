@@ -1,0 +1,123 @@
+"""The robot as it comes out of the front end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as AnyMapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+from rbxcompose.composition.history import History
+from rbxcompose.composition.inclusions import Inclusions
+from rbxcompose.config import Place
+from rbxcompose.findings import Span
+from rbxcompose.manifest.section import Contents
+from rbxcompose.manifest.tree import Mapping
+from rbxcompose.sections.body import Description, body
+from rbxcompose.sections.bus import Bus, bus
+from rbxcompose.sections.components import ComponentEntry, components
+from rbxcompose.sections.diagnostics import Diagnostics, diagnostics
+from rbxcompose.sections.missions import MissionEntry, missions
+from rbxcompose.sections.muxes import Mux, muxes
+from rbxcompose.sections.places import places
+from rbxcompose.sections.start import start
+from rbxcompose.sections.values import Value, values
+
+
+class About(StrEnum):
+    """What a claim of a part is about."""
+
+    NEED = "a topic that it needs"
+    PORT = "a topic that it gives"
+    SKILL = "a skill"
+    VALUE = "a value"
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """One thing that a part needs or provides, by the name that it has in the robot; `type` is that of a topic."""
+
+    about: About
+    name: str
+    type: str
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class IncludedPart:
+    """An instance of a part: what it brought, by the names that this has in the robot.
+
+    `name` is the path of the instance (`arm.hand`); what a part includes belongs to it too.
+    """
+
+    name: str
+    file: str  # as findings show it
+    span: Span  # of the entry that includes it
+    components: frozenset[str]
+    muxes: frozenset[str]  # those that it has an input or a lock of
+    values: frozenset[str]
+    claims: tuple[Claim, ...]  # what it needs and provides
+
+
+@dataclass(frozen=True, slots=True)
+class RobotManifest:
+    """A robot after composition: everything that its file says, in the order in which it says it."""
+
+    name: str
+    about: str
+    path: Path
+    root: Mapping  # composed and filled; the places of everything below
+    is_simulated: bool
+    contents: Contents
+    parts: AnyMapping[str, IncludedPart] = field(default_factory=dict)
+    profiles: AnyMapping[str, Span] = field(default_factory=dict)  # from the name to the end of what it changes
+    include: Mapping = field(default_factory=Mapping)  # composed; what it names is part of `root` already
+    history: History = field(default_factory=History)
+    overlays: tuple[str, ...] = ()  # the files of `-f`, as findings show them
+    files: AnyMapping[str, Path] = field(default_factory=dict)  # every file that was read, by the name that is shown
+    inclusions: Inclusions = field(default_factory=Inclusions)
+
+    @property
+    def components(self) -> AnyMapping[str, ComponentEntry]:
+        """Return the components that the user wrote."""
+        return self.contents.of(components)
+
+    @property
+    def muxes(self) -> AnyMapping[str, Mux]:
+        """Return the muxes."""
+        return self.contents.of(muxes)
+
+    @property
+    def places(self) -> AnyMapping[str, Place]:
+        """Return the places."""
+        return self.contents.of(places)
+
+    @property
+    def values(self) -> AnyMapping[str, Value]:
+        """Return the values."""
+        return self.contents.of(values)
+
+    @property
+    def missions(self) -> AnyMapping[str, MissionEntry]:
+        """Return the missions."""
+        return self.contents.of(missions)
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        """Return how the states of components are grouped."""
+        return self.contents.of(diagnostics)
+
+    @property
+    def bus(self) -> Bus:
+        """Return how messages travel."""
+        return self.contents.of(bus)
+
+    @property
+    def body(self) -> Description | None:
+        """Return what describes the body."""
+        return self.contents.of(body)
+
+    @property
+    def start(self) -> str | None:
+        """Return the mission to start; None also if that mission has mistakes, which were said."""
+        return self.contents.of(start)

@@ -1,0 +1,100 @@
+"""Arguments of the robot and of the instances of parts, and filling in what names them, each in its own scope."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rbxcompose.composition.history import ROBOT_LAYER, History
+from rbxcompose.composition.includes import Instance, Parts
+from rbxcompose.composition.layers import Composed, only
+from rbxcompose.expressions.types import UNKNOWN
+from rbxcompose.findings import Related, Report, Span, kind
+from rbxcompose.manifest.arguments import Argument
+from rbxcompose.manifest.fill import fill
+from rbxcompose.manifest.fill_names import Names, Typed, with_arguments
+from rbxcompose.manifest.section import Contents
+from rbxcompose.manifest.tree import BROKEN, Mapping
+from rbxcompose.manifest.validate import UNKNOWN_KEY
+from rbxcompose.sections.args import args
+
+NO_VALUE = kind(
+    "RBX1206",
+    """An argument without a value
+
+An argument gets its value from `default:`, a profile, or `--set args.NAME=VALUE`; that of a part from `with:`.
+
+Bad:
+```yaml
+args:
+  speed:
+    type: speed
+```
+Good:
+```yaml
+args:
+  speed:
+    type: speed
+    default: 0.3 m/s
+```
+""",
+)
+
+
+def fill_scopes(composed: Composed, names: Names) -> tuple[Mapping, Mapping]:
+    """Return the robot's sections and its `include:` with every `${...}` filled in.
+
+    The arguments' own values come first: those of the robot, then those of each instance, which are given in the scope
+    of the file that includes it.
+    """
+    root, parts = composed.root, composed.parts
+    report = parts.documents.report
+    arguments = fill(only(root, args.name), names, report)
+    declared = Contents(arguments, parts.robot, parts.documents).of(args)
+    values = {name: _own_value(name, one, composed.history, report) for name, one in declared.items()}
+    names = with_arguments(names, values)
+    include = fill(composed.include, names, report)
+    for instance in reversed(composed.instances):  # what includes stands behind what it includes
+        names = with_arguments(names, _given_values(instance, names, parts), instance.name)
+    others = {name: entry for name, entry in root.entries.items() if name != args.name}
+    filled = {**arguments.entries, **fill(replace(root, entries=others), names, report).entries}
+    return replace(root, entries={name: filled[name] for name in root.entries}), include
+
+
+def _own_value(name: str, declared: tuple[Argument | None, Span], history: History, report: Report) -> Typed:
+    argument, span = declared
+    if argument is None:
+        return Typed(UNKNOWN, BROKEN)
+    if argument.default is None:
+        message = f"the argument '{name}' has no value"
+        report.add(NO_VALUE.at(span, message, help=f"give it a 'default:', or --set args.{name}=VALUE"))
+        return Typed(argument.type, BROKEN)
+    is_given = history.layer(("args", name, "default")) != ROBOT_LAYER
+    return Typed(argument.type, argument.read(argument.default, report), argument.default.span if is_given else None)
+
+
+def _given_values(instance: Instance, names: Names, parts: Parts) -> dict[str, Typed]:
+    """Return the values of a part's arguments: given by `with:`, else their defaults."""
+    report = parts.documents.report
+    declared = Contents(fill(instance.arguments, names, report), parts.robot, parts.documents).of(args)
+    given = fill(instance.given, names, report)
+    for name, entry in given.entries.items():
+        if name not in declared:
+            message = f"part '{instance.name}' has no argument '{name}'"
+            finding = UNKNOWN_KEY.misspelt(
+                entry.key.span, message, name, declared, "its arguments", taken=given.entries
+            )
+            report.add(finding)
+    values: dict[str, Typed] = {}
+    for name, (argument, span) in declared.items():
+        node = given.get(name) or (argument.default if argument else None)
+        if argument is None:
+            values[name] = Typed(UNKNOWN, BROKEN)
+        elif node is None:
+            message = f"part '{instance.name}' needs a value for its argument '{name}'"
+            related = [Related(span, "declared here")]
+            help_text = f"give it one: 'with: {{{name}: ...}}'"
+            report.add(NO_VALUE.at(instance.span, message, help=help_text, related=related))
+            values[name] = Typed(argument.type, BROKEN)
+        else:
+            values[name] = Typed(argument.type, argument.read(node, report), node.span if name in given else None)
+    return values

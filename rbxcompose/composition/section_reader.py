@@ -1,0 +1,100 @@
+"""The sections of a composed robot, one by one: a mistake in one entry hides nothing of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rbxcompose.composition.robot_manifest import RobotManifest
+from rbxcompose.findings import Finding, Related, kind
+from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.registry import broken_sections, naming, sections
+from rbxcompose.manifest.section import ROBOT, Contents, Section
+from rbxcompose.manifest.tree import Mapping, Scalar, key_span
+from rbxcompose.references import COMPONENT
+
+TAKEN_NAME = kind(
+    "RBX1007",
+    """A name that is taken
+
+Everything that runs has a name of its own. The names of sections, of muxes and of the components that every robot
+runs cannot be given to a component.
+
+Bad:
+```yaml
+components:
+  diagnostics:
+    type: battery_sim
+    runtime: 45 s
+```
+Good:
+```yaml
+components:
+  battery:
+    type: battery_sim
+    runtime: 45 s
+```
+""",
+)
+ALWAYS_THERE = ("transforms", "mission")
+"""Components that every robot runs, beside `diagnostics`."""
+
+RESERVED = ("buses", "actuators", "joints", "controllers", "safety", "devices", "console", "security", "record")
+"""The words of sections that a robot's file will have."""
+
+
+def read_sections(root: Mapping, file: Path, sim: bool, documents: Documents) -> RobotManifest:
+    """Return the robot that a composed and filled tree describes; entries with mistakes are left out."""
+    documents.report.extend([*broken_sections(), *_taken_names(root)])
+    contents = Contents(root, file, documents, sections())
+    for section in sections(ROBOT):
+        if section.is_composed:
+            contents.of(section)
+    return RobotManifest(
+        name=_text(root, "name"), about=_text(root, "about"), path=file, root=root, is_simulated=sim, contents=contents
+    )
+
+
+def reserved_names() -> frozenset[str]:
+    """Return the words that a section of a robot's file has or will have."""
+    return frozenset((*RESERVED, *(one.name for one in sections(ROBOT))))
+
+
+def _text(root: Mapping, key: str) -> str:
+    value = root.get(key)
+    return value.text if isinstance(value, Scalar) else ""
+
+
+def _taken_names(root: Mapping) -> Iterator[Finding]:
+    """Yield a finding for each name of something that runs which something else has already."""
+    running = list(naming(COMPONENT))
+    for index, section in enumerate(running):
+        for name in () if section.has_topics else section.names_in(root):
+            span = key_span(root, (section.name, *section.at, name))
+            if message := _own_name(name, section):
+                yield TAKEN_NAME.at(span, message)
+            elif found := _other_owner(root, name, section, running[index + 1 :]):
+                message, label, other = found
+                yield TAKEN_NAME.at(span, message, related=[Related(key_span(root, other), label)])
+
+
+def _own_name(name: str, section: Section[Any, Any]) -> str:
+    """Return why nothing that a user writes may have a name, or nothing."""
+    if name in reserved_names():
+        return f"a {section.entry} cannot be named like the section '{name}'"
+    return f"every robot runs a component '{name}' already" if name in ALWAYS_THERE else ""
+
+
+def _other_owner(
+    root: Mapping, name: str, section: Section[Any, Any], others: list[Section[Any, Any]]
+) -> tuple[str, str, tuple[str, ...]] | None:
+    """Return what else has a name: in words, as a label, and its path."""
+    for one in sections(ROBOT):
+        if name in one.brings and one.name in root:
+            return f"the {one.name} brings a component '{name}' already", f"the {one.name}", (one.name,)
+    for one in others:
+        if name in one.names_in(root):
+            words = f"a {section.entry} and a {one.entry} are both named '{name}'"
+            return words, f"the {one.entry}", (one.name, *map(str, one.at), name)
+    return None

@@ -1,0 +1,165 @@
+"""One mission that runs: its engine with its world, its story, its log, what can be seen of it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rbxcompose.executive.world import RobotWorld
+from rbxcompose.expressions.values import NOT_ARRIVED, Value
+from rbxcompose.levels import Level
+from rbxcompose.missions.engine import logbook
+from rbxcompose.missions.engine.condition_watches import POSE
+from rbxcompose.missions.engine.engine import Engine
+from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Transition
+from rbxcompose.missions.engine.logbook import Logged
+from rbxcompose.missions.engine.story import Story
+from rbxcompose.missions.engine.world import PLAIN, Settings, World
+from rbxcompose.missions.program.program import Program, RobotNames, Skill
+from rbxcompose.missions.program.results import Result
+from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING
+from rbxcompose.missions.view.mirror import Mirror
+
+PATIENCE = 60.0  # [s] of waiting for values before the mission begins, after which it is told, and told again
+ROUNDING = 1e-6  # [s]
+LAST = 20  # transitions that a viewer is shown
+
+MakeWorld = Callable[[Callable[[int, Result], None], Callable[[MissionEvent], None]], tuple[World, RobotWorld]]
+Tell = Callable[[Level, str], None]
+
+
+class Running:
+    """Runs a mission in time that it is told; `tell` takes the lines of its story, `write` the records of its log."""
+
+    def __init__(
+        self,
+        program: Program,
+        names: RobotNames,
+        inputs: Mapping[str, Value],
+        make: MakeWorld,
+        tell: Tell,
+        write: logbook.Write,
+        *,
+        name: str,
+        settings: Settings = PLAIN,
+    ) -> None:
+        self.name = name
+        self.is_paused = False
+        self.end: MissionEnded | None = None
+        self.began: float | None = None  # [s] of robot time
+        self.patient_until: float | None = None  # [s] while it waits for values to begin with
+        self.story = Story(name, names.skills)
+        self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
+        self._tell, self._now = tell, 0.0
+        world, self.robot = make(self._ended, self._said)
+        self.log = Logged(world, lambda record: write({"time": self._now, "mission": name, **record}))
+        self.engine = Engine(program, names, inputs, self.log, settings)
+        self.claims = claims_of(self.engine.program, self.engine.robot.skills)  # parts of the robot, for itself alone
+        self.mirror = Mirror(self.engine)
+        self._known = frozenset(names.values) | {POSE}
+        self._inputs, self._settings = inputs, settings
+
+    @property
+    def is_over(self) -> bool:
+        """Tell whether it has ended, by itself or not."""
+        return self.end is not None
+
+    @property
+    def state(self) -> str:
+        """Return in a word how it stands."""
+        if self.end is not None:
+            return self.end.outcome or self.end.result
+        if self.is_paused:
+            return "paused"
+        return "waiting" if self.engine.status == IDLE else NAMES[self.engine.status]
+
+    def missing(self) -> list[str]:
+        """Return the names that it reads and of which nothing has come yet."""
+        reads = self.engine.program.reads() & self._known
+        return sorted(name for name in reads if self.robot.value(name) is NOT_ARRIVED)
+
+    def loses_patience(self, now: float) -> bool:
+        """Tell, while it waits for values to begin with, whether another `PATIENCE` has passed."""
+        if self.patient_until is None:
+            self.patient_until = now + PATIENCE
+        if now < self.patient_until - ROUNDING:
+            return False
+        self.patient_until = now + PATIENCE
+        return True
+
+    def reads(self, name: str) -> bool:
+        """Tell whether a new value of this name is worth a tick."""
+        return not self.is_over and (self.engine.status == IDLE or name in self.engine.reads())
+
+    def tick(self, now: float) -> None:
+        """Do what is due at `now` [s]."""
+        self._now = now
+        if self.began is None:
+            self.began = now
+            self.log.begin(self._inputs, self._settings)
+        self.robot.look()
+        self._do(logbook.TICK, lambda: self.engine.tick(now), now)
+
+    def next_wake(self) -> float | None:
+        """Return when to tick it next [s]."""
+        if self.is_over or self.is_paused:
+            return None
+        due = (self.engine.next_wake(), self.robot.next_look())
+        return min((time for time in due if time is not None), default=None)
+
+    def pause(self, now: float) -> None:
+        """Hold it: its timers stand still."""
+        self.is_paused = True
+        self._do(logbook.PAUSE, lambda: self.engine.pause(now), now)
+
+    def resume(self, now: float) -> None:
+        """Go on."""
+        self.is_paused = False
+        self._do(logbook.RESUME, lambda: self.engine.resume(now), now)
+
+    def abort(self, now: float) -> None:
+        """End it from outside."""
+        if self.engine.status == RUNNING:
+            self._do(logbook.ABORT, lambda: self.engine.abort(now), now)
+        elif not self.is_over:
+            self._now = now
+            self._said(MissionEnded("halted"))
+
+    def seen(self, since: int = 0) -> dict[str, Any]:
+        """Return for a viewer what is new since a version of its own, 0 for the whole."""
+        more = {"state": self.state, "began": self.began, "transitions": list(self.transitions)}
+        return {"mission": self.name, **self.mirror.look(since), **more}
+
+    def _do(self, what: str, call: Callable[[], object], now: float) -> None:
+        """Do something with the engine and write down what it read for it."""
+        self._now = now
+        call()
+        self.log.did(what)
+
+    def _ended(self, leaf: int, result: Result) -> None:
+        self.log.arrived(leaf, result)
+        self.engine.ended(leaf, result)
+
+    def _said(self, event: MissionEvent) -> None:
+        level, text = self.story.tell(event)
+        if isinstance(event, MissionEnded):
+            self.end = event
+        if isinstance(event, Transition):
+            self.transitions.append(
+                {
+                    "time": self._now,
+                    "machine": event.machine,
+                    "state": event.state,
+                    "outcome": event.outcome,
+                    "to": event.to,
+                }
+            )
+        if text:
+            self._tell(level, text)
+
+
+def claims_of(program: Program, skills: Mapping[str, Skill]) -> frozenset[str]:
+    """Return the parts of the robot that the skills of a linked mission need for themselves."""
+    used = {node.skill for node in program.nodes}
+    return frozenset(skills[name].claims for name in used if name in skills and skills[name].claims)

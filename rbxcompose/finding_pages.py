@@ -1,0 +1,84 @@
+"""The pages of the kinds of findings: what a code means, why it matters, how it is wrong and how it is right."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import re
+from pathlib import Path
+
+import rbxcompose
+from rbxcompose.check_runner import all_checks
+from rbxcompose.findings import KINDS, Kind
+from rbxcompose.missions.analysis.check_runner import mission_checks
+
+FAMILIES = {
+    "10": "keys and values",
+    "11": "YAML",
+    "12": "filling in",
+    "13": "files and composition",
+    "20": "body",
+    "30": "wiring",
+    "31": "muxes",
+    "35": "rates and units",
+    "41": "missions",
+    "42": "tests of missions",
+    "50": "diagnostics",
+    "60": "placement",
+    "70": "overlays",
+    "80": "simulated and real",
+    "90": "commands and running robots",
+    "91": "new manifests",
+    "92": "recordings",
+    "93": "plug-ins of other packages",
+    "94": "this machine, and what runs on it",
+}
+"""What the first two digits of a code stand for."""
+
+_DECLARES = re.compile(r"^(\w+ = kind\(|@check\()", re.MULTILINE)
+_BLOCK = re.compile(r"^```\w*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def all_kinds() -> dict[str, Kind]:
+    """Import every module that declares a kind of finding, those of installed plug-ins too, and return all by code."""
+    for folder in rbxcompose.__path__:
+        for module in pkgutil.walk_packages([folder], "rbxcompose."):
+            path = Path(folder, *module.name.split(".")[1:]).with_suffix(".py")
+            if not module.ispkg and _DECLARES.search(path.read_text(encoding="utf-8")):
+                importlib.import_module(module.name)
+    all_checks()
+    mission_checks()
+    return dict(sorted(KINDS.items()))
+
+
+def title_of(kind: Kind) -> str:
+    """Return the first line of a kind's page."""
+    return kind.doc.strip().partition("\n")[0].rstrip(".")
+
+
+def body_of(kind: Kind) -> str:
+    """Return a kind's page without its title."""
+    return kind.doc.strip().partition("\n")[2].strip()
+
+
+def family_of(kind: Kind) -> str:
+    """Return what the kinds with the same first two digits are about."""
+    return FAMILIES.get(kind.code.removeprefix("RBX")[:2], "other")
+
+
+def facts_of(kind: Kind) -> str:
+    """Return what is known of a kind, in one line: "error; keys and values; fix: automatic"."""
+    fix = ["fix: automatic ('check --fix')"] if kind.is_fixable else []
+    return "; ".join([kind.severity.value, family_of(kind), *fix])
+
+
+def markdown_of(kind: Kind) -> str:
+    """Return a kind's page for the documentation."""
+    body = re.sub(r"\n{3,}", "\n\n", body_of(kind))
+    return f"# {kind.code}: {title_of(kind)}\n\n*{facts_of(kind)}*\n\n{body}\n"
+
+
+def text_of(kind: Kind) -> str:
+    """Return a kind's page for a terminal: examples are indented instead of fenced."""
+    body = _BLOCK.sub(lambda block: re.sub(r"^(?=.)", "    ", block[1], flags=re.MULTILINE).rstrip(), body_of(kind))
+    return f"{kind.code}: {title_of(kind)}\n({facts_of(kind)})\n\n{body}\n"

@@ -1,0 +1,238 @@
+"""A robot as boxes and wires: what every kind of graph draws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from rbxcompose.bus.names import resolve
+from rbxcompose.inspection.wire_keys import qos_of
+from rbxcompose.missions.analysis.effects import sent_by
+from rbxcompose.missions.engine.condition_watches import POSE
+from rbxcompose.missions.program.sources import Way
+from rbxcompose.model.robot import Part, Robot, RobotMission
+from rbxcompose.model.wires import End
+from rbxcompose.sdk.capabilities import Forwards
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction
+
+MISSION = "mission"  # the part that runs missions
+TRANSFORMS = ("/tf", "/tf_static")  # what a look-up reads
+STATUSES = "/diagnostics"  # where every component reports, though none declares it
+
+
+class Shape(StrEnum):
+    """What a box stands for."""
+
+    COMPONENT = "component"
+    MUX = "mux"
+    PROGRAM = "mission"
+
+
+class Line(StrEnum):
+    """What a wire carries."""
+
+    TOPIC = "topic"
+    SERVICE = "service"
+    ACTION = "action"
+    LOOK_UP = "look-up"
+
+
+# By which a mission reaches its skills; those in Python are within it.
+_LINES = {Way.ACTION: Line.ACTION, Way.SERVICE: Line.SERVICE, Way.TOPIC: Line.TOPIC}
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A component, or the program of a mission; `key` is unique, `group` is its process."""
+
+    key: str
+    name: str
+    type: str
+    group: str
+    shape: Shape
+    about: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Tip:
+    """Where a wire begins or ends at a box; `note` is a word beside it, such as a priority."""
+
+    box: str
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """A topic, service or action: from who sends or asks to who takes or answers."""
+
+    name: str
+    kind: Line
+    type: str
+    qos: str
+    sources: tuple[Tip, ...]
+    targets: tuple[Tip, ...]
+    about: str = ""
+
+    @property
+    def short_type(self) -> str:
+        """Return the type without its package."""
+        return self.type.rpartition("/")[2]
+
+    @property
+    def note(self) -> str:
+        """Return the word beside its only target, if there is only one."""
+        return self.targets[0].note if len(self.targets) == 1 else ""
+
+    @property
+    def is_pair(self) -> bool:
+        """Tell whether it leads from one box to one other."""
+        return len(self.sources) == len(self.targets) == 1
+
+
+@dataclass(frozen=True, slots=True)
+class Diagram:
+    """A whole robot. `runs` are the executive with each program, the one that `up` starts first."""
+
+    robot: str
+    about: str
+    groups: tuple[str, ...]
+    boxes: tuple[Box, ...]
+    wires: tuple[Wire, ...]
+    runs: tuple[tuple[str, str], ...] = ()
+    start: str = ""
+
+    def of_group(self, group: str) -> tuple[Box, ...]:
+        """Return the boxes of a process."""
+        return tuple(box for box in self.boxes if box.group == group)
+
+
+@dataclass(slots=True)
+class _Open:
+    """A wire that is being put together."""
+
+    kind: Line
+    type: str
+    qos: str = ""
+    sources: list[Tip] = field(default_factory=list)
+    targets: list[Tip] = field(default_factory=list)
+
+
+def diagram_of(robot: Robot) -> Diagram:
+    """Return a robot as boxes and wires; one with mistakes as far as it could be read."""
+    boxes = [*_boxes(robot)]
+    runs = tuple((MISSION, key_of(name)) for name in _programs(robot))
+    return Diagram(
+        robot=robot.manifest.name,
+        about=robot.manifest.about,
+        groups=tuple(dict.fromkeys(box.group for box in boxes)),
+        boxes=tuple(boxes),
+        wires=tuple(_wires(robot)),
+        runs=runs,
+        start=key_of(robot.manifest.start) if robot.manifest.start in robot.missions else "",
+    )
+
+
+def key_of(mission: str | None) -> str:
+    """Return the key of a mission's box."""
+    return f"mission:{mission}"
+
+
+def _programs(robot: Robot) -> list[str]:
+    """Return the missions, the one that `up` starts first."""
+    return sorted(robot.missions, key=lambda name: name != robot.manifest.start) if MISSION in robot.parts else []
+
+
+def _boxes(robot: Robot) -> Iterator[Box]:
+    for part in robot.parts.values():
+        shape = Shape.MUX if part.declared(Forwards) else Shape.COMPONENT
+        about = (part.cls.__doc__ or "").strip().partition("\n")[0]
+        yield Box(part.name, part.name, part.type_name, part.process, shape, about)
+    for name in _programs(robot):
+        program = robot.missions[name].program
+        yield Box(key_of(name), name, "mission", robot.parts[MISSION].process, Shape.PROGRAM, program.about)
+
+
+def _wires(robot: Robot) -> Iterator[Wire]:
+    """Yield the wires by what they carry and by name; nothing is drawn that nobody uses."""
+    found: dict[tuple[Line, str], _Open] = {}
+    for part in robot.parts.values():
+        if part.name != MISSION:  # its missions are drawn in its place
+            for end in part.ends:
+                _add(robot, part, end, found)
+    for name in _programs(robot):
+        _add_mission(robot, robot.missions[name], key_of(name), found)
+    _add_look_ups(robot, found)
+    for (kind, topic), wire in sorted(found.items(), key=lambda item: ([*Line].index(item[0][0]), item[0][1])):
+        about = "every component reports its status here" if topic == STATUSES else ""
+        yield Wire(topic, kind, wire.type, wire.qos, tuple(wire.sources), tuple(wire.targets), about)
+
+
+def _add(robot: Robot, part: Part, end: End, found: dict[tuple[Line, str], _Open]) -> None:
+    kind = _kind(end)
+    if kind is None:
+        return
+    wire = found.setdefault((kind, end.topic), _Open(kind, end.type_name))
+    wire.qos = wire.qos or qos_of(end.port)
+    tips = wire.sources if isinstance(end.port, Out | Calls | CallsAction) else wire.targets
+    tips.append(Tip(part.name, _note(robot, part, end)))
+
+
+def _kind(end: End) -> Line | None:
+    match end.port:
+        case Out() | In():
+            return Line.TOPIC
+        case Serves() | Calls():
+            return Line.SERVICE
+        case ServesAction() | CallsAction():
+            return Line.ACTION
+    return None
+
+
+def _note(robot: Robot, part: Part, end: End) -> str:
+    """Return the priority of an input or a lock of a mux."""
+    mux = robot.manifest.muxes.get(part.name)
+    if mux is None or not isinstance(end.port, In):
+        return ""
+    entry = mux.inputs.get(end.name) or mux.locks.get(end.name.removeprefix("lock_"))
+    what = "priority" if end.name in mux.inputs else "lock"
+    return f"{what} {entry.priority}" if entry else ""
+
+
+def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tuple[Line, str], _Open]) -> None:
+    """Add what a mission uses: actions, services and topics. A skill in Python runs in the mission itself."""
+
+    def lead(kind: Line, topic: str, type_name: str) -> None:
+        found.setdefault((kind, topic), _Open(kind, type_name)).sources.append(Tip(key))
+
+    def hear(topic: str, type_name: str, note: str) -> None:
+        found.setdefault((Line.TOPIC, topic), _Open(Line.TOPIC, type_name)).targets.append(Tip(key, note))
+
+    for skill in sorted({node.skill for node in mission.program.nodes} & robot.skills.keys()):
+        source = robot.skills[skill]
+        if source.way in _LINES:
+            lead(_LINES[source.way], source.topic, source.action)
+        if (halts := source.orders.halts) is not None:
+            lead(Line.TOPIC, halts.topic, halts.message)
+        if (ends := source.orders.ends) is not None:
+            hear(ends.topic, ends.message, skill)
+    published, called = sent_by([mission.program])
+    space = robot.manifest.bus.namespace or ""
+    for name in sorted(published & robot.topics.keys()):
+        lead(Line.TOPIC, resolve(name, space), robot.topics[name].message)
+    for name in sorted(called & robot.services.keys()):
+        lead(Line.SERVICE, resolve(name, space), robot.services[name])
+    for name in sorted(mission.program.reads() & robot.values.keys()):
+        value = robot.values[name]
+        hear(value.topic, value.message, f"${name}")
+
+
+def _add_look_ups(robot: Robot, found: dict[tuple[Line, str], _Open]) -> None:
+    """Let each topic of transforms lead to those that look something up, by a line of its own kind."""
+    boxes = [part.name for part in robot.parts.values() if any(isinstance(end.port, Looks) for end in part.ends)]
+    boxes = [name for name in boxes if name != MISSION]
+    boxes += [key_of(name) for name in _programs(robot) if POSE in robot.missions[name].program.reads()]
+    for topic in TRANSFORMS:
+        if (wire := found.pop((Line.TOPIC, topic), None)) is not None:
+            wire.targets += [Tip(name) for name in boxes]
+            found[Line.LOOK_UP, topic] = wire

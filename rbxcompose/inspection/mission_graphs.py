@@ -1,0 +1,94 @@
+"""A mission as a Mermaid flowchart or in DOT: a tree of nodes, states with their transitions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+
+from rbxcompose.inspection.mission_text import status_of
+from rbxcompose.missions.program.look import Form
+from rbxcompose.missions.program.statuses import NAMES
+from rbxcompose.missions.view.picture import Drawn, Picture
+
+COLOURS = {"running": "#0969da", "success": "#1a7f37", "failure": "#cf222e", "skipped": "#818b98"}
+_SAFE = str.maketrans({'"': "'", "<": "&lt;", ">": "&gt;", "#": "&num;"})
+
+
+def mission_mermaid(picture: Picture, statuses: Sequence[int] = ()) -> str:
+    """Return the text of a flowchart, with how each node stands if that is known."""
+    return "".join(f"{line}\n" for line in _mermaid(picture, statuses))
+
+
+def mission_dot(picture: Picture, statuses: Sequence[int] = ()) -> str:
+    """Return the text of a graph for Graphviz, with how each node stands if that is known."""
+    return "".join(f"{line}\n" for line in _dot(picture, statuses))
+
+
+def label_of(drawn: Drawn) -> str:
+    """Return what stands in a box, in lines."""
+    names = [one for one in dict.fromkeys((drawn.role, drawn.name)) if one]
+    title = "state" if drawn.form == Form.STATE else drawn.title
+    return "\n".join([*([": ".join(names)] if names else []), title, *drawn.notes])
+
+
+def _keys(picture: Picture) -> dict[int, str]:
+    """Return the key of each box by the identity of what is drawn."""
+    drawn = [one for root in picture.roots for one in root.all()]
+    return {id(one): f"n{number}" for number, one in enumerate(drawn)}
+
+
+def _edges(picture: Picture) -> Iterator[tuple[str, str, str, bool]]:
+    """Yield the lines: from, to, label, and whether it is a transition."""
+    keys = _keys(picture)
+    for one in (one for root in picture.roots for one in root.all()):
+        yield from ((keys[id(one)], keys[id(child)], "", False) for child in one.children)
+        states = {child.name: keys[id(child)] for child in one.children if child.form == Form.STATE}
+        for state in (child for child in one.children if child.form == Form.STATE):
+            for arrow in state.arrows:
+                to = states.get(arrow.to, f"{keys[id(one)]}_{arrow.to}")
+                yield states[state.name], to, arrow.outcome, True
+
+
+def _ends(picture: Picture) -> Iterator[tuple[str, str]]:
+    """Yield the ends of machines that are reached: key and name."""
+    keys = _keys(picture)
+    for one in (one for root in picture.roots for one in root.all()):
+        states = {child.name for child in one.children if child.form == Form.STATE}
+        reached = dict.fromkeys(arrow.to for child in one.children for arrow in child.arrows)
+        yield from ((f"{keys[id(one)]}_{name}", name) for name in reached if name not in states)
+
+
+def _mermaid(picture: Picture, statuses: Sequence[int]) -> Iterator[str]:
+    yield "flowchart LR"
+    keys = _keys(picture)
+    for one in (one for root in picture.roots for one in root.all()):
+        text = label_of(one).translate(_SAFE).replace("\n", "<br>")
+        begin, end = ("([", "])") if one.form == Form.STATE else ("[", "]") if one.children else ("(", ")")
+        style = f":::{NAMES[status_of(one, statuses)]}" if statuses and status_of(one, statuses) else ""
+        yield f'  {keys[id(one)]}{begin}"{text}"{end}{style}'
+    yield from (f'  {key}((("{name}")))' for key, name in _ends(picture))
+    for begin, end, label, is_transition in _edges(picture):
+        arrow = f'-->|"{label.translate(_SAFE)}"|' if label else "-->" if is_transition else "---"
+        yield f"  {begin} {arrow} {end}"
+    if statuses:
+        yield from (f"  classDef {name} fill:{colour},color:#fff" for name, colour in COLOURS.items())
+
+
+def _dot(picture: Picture, statuses: Sequence[int]) -> Iterator[str]:
+    yield f"digraph {_quoted(picture.name)} {{"
+    yield '  rankdir=LR node [shape=box fontname="sans-serif" fontsize=11] edge [fontname="sans-serif" fontsize=10]'
+    keys = _keys(picture)
+    for one in (one for root in picture.roots for one in root.all()):
+        shape = " shape=ellipse" if one.form == Form.STATE else " style=rounded" if not one.children else ""
+        status = NAMES[status_of(one, statuses)]
+        colour = f' color="{COLOURS[status]}" penwidth=2.5' if statuses and status in COLOURS else ""
+        yield f"  {keys[id(one)]} [label={_quoted(label_of(one))}{shape}{colour}]"
+    yield from (f"  {key} [label={_quoted(name)} shape=doublecircle]" for key, name in _ends(picture))
+    for begin, end, label, is_transition in _edges(picture):
+        more = f" [label={_quoted(label)}]" if is_transition else " [dir=none style=dotted]"
+        yield f"  {begin} -> {end}{more}"
+    yield "}"
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

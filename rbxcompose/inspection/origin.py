@@ -1,0 +1,88 @@
+"""Where a value of the composed robot comes from: its place, the layer that wrote it, and how it was written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rbxcompose.composition.dump import exact
+from rbxcompose.composition.history import ROBOT_LAYER
+from rbxcompose.composition.overlay import SET
+from rbxcompose.composition.robot_manifest import RobotManifest
+from rbxcompose.config import HIDDEN, Secret
+from rbxcompose.findings import Span
+from rbxcompose.manifest.arguments import show
+from rbxcompose.manifest.scalars import plain_value
+from rbxcompose.manifest.tree import BROKEN, Mapping, Node, Path, Scalar, Sequence
+from rbxcompose.printable import plain
+from rbxcompose.units import Quantity
+
+LONGEST = 60  # characters of a text that is shown beside a value
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """`layer` is as findings call it ("the robot", "profile 'tired'"); `written` is empty if nothing was filled in."""
+
+    span: Span
+    layer: str
+    written: str = ""
+
+    @property
+    def comment(self) -> str:
+        """Return it in one line, without the column: "robots/one/robot.yaml:12, profile 'tired'"."""
+        if self.span.file == SET:
+            return self.layer.strip("'")
+        layer = "overlay" if self.layer.startswith("overlay ") else self.layer
+        shown = [f"{self.span.file}:{self.span.line}", *([layer] if layer not in ("", ROBOT_LAYER) else [])]
+        return ", ".join(shown) + (f" = {plain(self.written, LONGEST)}" if self.written else "")
+
+
+def origin_of(manifest: RobotManifest, path: Path, node: Node) -> Origin:
+    """Return where the value at `path` comes from; `node` is what stands there, filled in."""
+    steps = manifest.history.of(path)
+    source = steps[-1].node if steps else None
+    is_filled = isinstance(source, Scalar) and "${" in source.text
+    written = source.text if is_filled and isinstance(source, Scalar) else ""
+    span = source.span if is_filled and source is not None else node.span
+    return Origin(span, manifest.history.layer(path), written)
+
+
+def is_leaf(node: Node) -> bool:
+    """Tell whether nothing stands below a node."""
+    match node:
+        case Mapping(entries=entries):
+            return not entries
+        case Sequence(items=items):
+            return not items
+    return True
+
+
+def shown(node: Node) -> str:
+    """Return a value in one line, for people; a secret is hidden."""
+    match node:
+        case Scalar() if node.filled in (None, BROKEN):
+            return node.text
+        case Scalar(filled=Secret()):
+            return HIDDEN
+        case Scalar():
+            return show(node.filled)
+        case Sequence(items=items):
+            return f"[{', '.join(map(shown, items))}]"
+        case Mapping(entries=entries):
+            return f"{{{', '.join(f'{name}: {shown(entry.value)}' for name, entry in entries.items())}}}"
+
+
+def as_data(node: Node) -> object:
+    """Return a value as data for JSON: quantities as texts with their units, secrets hidden."""
+    match node:
+        case Mapping(entries=entries):
+            return {name: as_data(entry.value) for name, entry in entries.items()}
+        case Sequence(items=items):
+            return [as_data(item) for item in items]
+        case Scalar(filled=Quantity(value=value, dimension=dimension)):
+            return exact(value, dimension)
+        case Scalar(filled=bool() | int() | float() | str()):
+            return node.filled
+        case Scalar(filled=None):
+            return plain_value(node)
+    return shown(node)

@@ -1,0 +1,18 @@
+"""Values that are handed to missions as a whole: their data and inputs."""
+
+from __future__ import annotations
+
+from rbxcompose.findings import Report
+from rbxcompose.manifest.limits import DATA_NODES
+from rbxcompose.manifest.tree import Mapping, Node, is_larger
+from rbxcompose.manifest.yaml_nodes import TOO_LARGE
+
+
+def is_moderate(section: Node | None, what: str, report: Report) -> bool:
+    """Tell whether each entry of a section holds no more than a mission takes, after a finding for each that does."""
+    entries = section.entries.values() if isinstance(section, Mapping) else ()
+    large = [entry for entry in entries if is_larger(entry.value, DATA_NODES)]
+    for entry in large:
+        message = f"the {what} '{entry.key.text}' holds more than {DATA_NODES:,} values"
+        report.add(TOO_LARGE.at(entry.key.span, message, help="a mission reads, checks and copies all of them at once"))
+    return not large

@@ -1,0 +1,91 @@
+"""Which ways of a mission the tests took: results of skills, branches, alternatives, interrupts, transitions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from rbxcompose.findings import Span
+from rbxcompose.mission_tests.mission_facts import missions_in
+from rbxcompose.missions.engine.events import InterruptStarted, MissionEvent, SkillEnded, Transition
+from rbxcompose.missions.program.possible import Key, cut, ended, led, skipped, started
+from rbxcompose.missions.program.program import Program, RobotNames
+from rbxcompose.missions.program.statuses import SKIPPED
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Way:
+    """Something that a mission may do: the place of its node, and in words."""
+
+    span: Span
+    mission: str
+    text: str
+
+
+@dataclass(slots=True)
+class Coverage:
+    """The ways of all missions that were tested; the same node is one, however often a mission is used."""
+
+    ways: set[Way] = field(default_factory=set)
+    taken: set[Way] = field(default_factory=set)
+
+    def add(self, linked: Program, robot: RobotNames, seen: set[Key]) -> None:
+        """Add what one run of a mission saw."""
+        for way, key in ways_of(linked, robot):
+            self.ways.add(way)
+            if key in seen:
+                self.taken.add(way)
+
+    @property
+    def missing(self) -> list[Way]:
+        """Return the ways that no test took, by place."""
+        return sorted(self.ways - self.taken)
+
+
+class Seen:
+    """Watches one run of a mission, and keeps the keys of the ways that it took."""
+
+    def __init__(self) -> None:
+        self.keys: set[Key] = set()
+
+    def started(self, number: int, /) -> None:
+        """Hear that a node starts."""
+        self.keys.add(started(number))
+
+    def ended(self, number: int, status: int, outcome: str, /) -> None:
+        """Hear that a node ended."""
+        if status == SKIPPED:
+            self.keys.add(skipped(number))
+
+    def hear(self, event: MissionEvent, /) -> None:
+        """Hear what the mission tells."""
+        match event:
+            case SkillEnded(leaf=leaf, result=result):
+                self.keys.add(ended(leaf, result))
+            case InterruptStarted(name=name):
+                self.keys.add(cut(name))
+            case Transition(machine=machine, state=state, outcome=outcome, to=to):
+                self.keys.add(led(machine, state, to))
+                self.keys.add(led(machine, state, to, outcome))
+
+
+def ways_of(linked: Program, robot: RobotNames) -> Iterator[tuple[Way, Key]]:
+    """Yield the ways of a linked mission, each with the key under which it is seen."""
+    owners = _owners(linked)
+    for node in linked.nodes:
+        for possible in node.step.possibilities(node, linked.nodes, robot):
+            yield Way(possible.span, owners[node.number], possible.text), possible.key
+    for program in missions_in(linked):
+        for interrupt in program.interrupts:
+            root = interrupt.root
+            seen = cut(interrupt.name) if root is None else started(root)
+            yield Way(interrupt.span, program.name, f"interrupt {interrupt.name}"), seen
+
+
+def _owners(linked: Program) -> Mapping[int, str]:
+    """Return the name of the mission of each node."""
+    owners = dict.fromkeys(range(len(linked.nodes)), linked.name)
+    for node in linked.nodes:
+        if node.inner:
+            owners.update(dict.fromkeys(range(node.number + 1, node.end), node.inner.name))
+    return owners

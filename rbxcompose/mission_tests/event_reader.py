@@ -1,0 +1,83 @@
+"""Reads `events`: what happens to the robot from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rbxcompose.findings import Span
+from rbxcompose.manifest import test_file as trials
+from rbxcompose.manifest.tree import Node, Path, at, key_span, value_span
+from rbxcompose.manifest.tree import Sequence as Listed
+from rbxcompose.manifest.validate import to_plain
+from rbxcompose.mission_tests import codes
+from rbxcompose.mission_tests.model import Deed, Event
+from rbxcompose.mission_tests.sections import Context, entries_of
+from rbxcompose.model.wires import resolve
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.plain import from_plain
+
+AT, SET, PUBLISH = "at", "set", "publish"
+
+
+def read_events(context: Context, node: Node | None, models: Sequence[trials.Event]) -> tuple[Event, ...]:
+    """Return the events in the order of the text."""
+    items = node.items if isinstance(node, Listed) else ()
+    return tuple(_event(context, item, model) for item, model in zip(items, models, strict=False))
+
+
+def _event(context: Context, node: Node, model: trials.Event) -> Event:
+    words = [word for word, _ in entries_of(node) if word != AT]
+    if not words:
+        context.report.add(codes.NEVER.at(node.span, "nothing happens here", help="give 'set', 'publish', 'stop', ..."))
+    deeds = (_deed(context, word, node, model) for word in words)
+    return Event(model.at, tuple(deed for deed in deeds if deed), value_span(node, (AT,)))
+
+
+def _deed(context: Context, word: str, node: Node, model: trials.Event) -> Deed | None:
+    if word == SET:
+        return Deed(SET, context.settings(at(node, (SET,)), {}))
+    if word == PUBLISH and model.publish:
+        return _published(context, node, model.publish)
+    return Deed(word)
+
+
+def _published(context: Context, node: Node, sent: trials.Sent) -> Deed | None:
+    """Return a message for a topic that somebody reads or writes."""
+    topics, topic = _topics(context), resolve(sent.topic, context.robot.manifest.bus.namespace or "")
+    if topic not in topics:
+        message = f"no component has the topic '{sent.topic}'"
+        span, known = value_span(node, (PUBLISH, "topic")), [name.removeprefix("/") for name in topics]
+        context.report.add(codes.UNKNOWN.misspelt(span, message, sent.topic, known, "topics of this robot"))
+        return None
+    cls, place = registry.message(topics[topic]), (PUBLISH, "message")
+    written = at(node, place)
+    data = {} if written is None else to_plain(written)
+    if not isinstance(data, dict):
+        data = {next(iter(cls.FIELDS)): data}
+    made, findings = from_plain(cls, data, Places(node, place))
+    context.report.extend(findings)
+    return Deed(PUBLISH, topic=topic, message=made) if made is not None else None
+
+
+def _topics(context: Context) -> dict[str, str]:
+    """Return the absolute names of topics with their types: those of components, and those that are values."""
+    namespace = context.robot.manifest.bus.namespace or ""
+    own = {resolve(name, namespace): message for name, message in context.names.topics.items()}
+    return {**own, **{source.topic: source.message for source in context.robot.values.values()}}
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Where the parts of a message stand."""
+
+    node: Node
+    below: Path
+
+    def key(self, path: Path) -> Span:
+        """Return the place of a field's name."""
+        return key_span(self.node, (*self.below, *path))
+
+    def value(self, path: Path) -> Span:
+        """Return the place of a field's value."""
+        return value_span(self.node, (*self.below, *path))

@@ -1,0 +1,327 @@
+"""Tries what could happen to a mission: every result of its skills, values on either side of what it compares.
+
+Breadth first, so that the script to each find is the shortest; a state that was met before is not gone into again.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
+from rbxcompose.mission_tests.model import FAILS, SUCCEEDS
+from rbxcompose.mission_tests.representatives import representatives
+from rbxcompose.missions.engine.engine import Engine
+from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Reported, SkillStarted
+from rbxcompose.missions.engine.run import STILL_HOLDS
+from rbxcompose.missions.engine.snapshot import restore, save
+from rbxcompose.missions.engine.story import Story
+from rbxcompose.missions.engine.task import Task
+from rbxcompose.missions.engine.value_text import show_briefly
+from rbxcompose.missions.program.program import Program, RobotNames
+from rbxcompose.missions.program.results import Result
+from rbxcompose.missions.program.statuses import IDLE, RUNNING
+
+_DONE = {SUCCEEDS: "succeeds", FAILS: "fails"}
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How far a mission is explored: states in all, and choices one after the other."""
+
+    states: int = 2000
+    depth: int = 30
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Something wrong, in words, and the choices that lead there."""
+
+    what: str
+    script: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class Explored:
+    """What came out: states that were met, the ends with the shortest way to each, what is wrong."""
+
+    mission: str
+    states: int = 0
+    deepest: int = 0
+    is_cut: bool = False
+    ends: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    found: list[Found] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One thing that may happen next: a call ends, time passes, a value changes."""
+
+    text: str
+    leaf: int = -1
+    outcome: str = ""
+    until: float | None = None  # [s]
+    name: str = ""
+    value: Value = None
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """Where a mission stands: the engine's snapshot and what surrounds it; None before the mission has begun."""
+
+    engine: dict[str, Any] | None
+    now: float
+    values: Mapping[str, Value]
+    calls: Mapping[int, str]  # what runs, in words, by leaf
+    held: Mapping[int, str]  # what is held
+    script: tuple[str, ...] = ()
+
+
+def explore(program: Program, robot: RobotNames, inputs: Mapping[str, Value], limits: Limits = Limits()) -> Explored:
+    """Explore a mission without mistakes."""
+    return Explorer(program, robot, inputs, limits).explore()
+
+
+class Explorer:
+    """Restores an engine to each moment, lets one more thing happen, and looks at where that leads."""
+
+    def __init__(self, program: Program, robot: RobotNames, inputs: Mapping[str, Value], limits: Limits) -> None:
+        self.limits = limits
+        self.robot = robot
+        self.out = Explored(program.name)
+        self.world = ExploredWorld(program.name, robot)
+        self.engine = Engine(program, robot, inputs, self.world)
+        self.values = representatives(self.engine.program, robot, inputs)
+        self.skills = {node.number: node.skill for node in self.engine.program.nodes}
+        self.met: set[str] = set()
+        self.said: set[str] = set()
+        first = {name: values[0] for name, values in self.values.items()}
+        self.waiting = deque([Moment(None, 0.0, first, {}, {})])
+        self.fresh = save(self.engine)
+
+    def explore(self) -> Explored:
+        """Go on until there is nothing new, or the limits are reached."""
+        while self.waiting:
+            moment = self.waiting.popleft()
+            self.out.deepest = max(self.out.deepest, len(moment.script))
+            if len(moment.script) >= self.limits.depth:
+                self.out.is_cut = True
+                continue
+            for choice in self.choices(moment):
+                if self.out.states >= self.limits.states:
+                    self.out.is_cut = True
+                    return self.out
+                self.follow(moment, choice)
+        return self.out
+
+    def choices(self, moment: Moment) -> Iterator[Choice]:
+        """Yield what may happen next."""
+        if moment.engine is None:
+            yield Choice("")
+        for leaf, words in moment.calls.items():
+            skill = self.robot.skills.get(self.skills[leaf])
+            for outcome in (SUCCEEDS, FAILS, *(skill.outcomes if skill else ())):
+                yield Choice(f"{words} {_DONE.get(outcome, f'ends {outcome}')}", leaf=leaf, outcome=outcome)
+        wake = self.wake_of(moment)
+        if wake is not None:
+            yield Choice(f"{max(0.0, wake - moment.now):.3g} s pass", until=wake)
+        for name, values in self.values.items():
+            for value in values:
+                if value != moment.values[name]:
+                    words = show_briefly(self.robot.values.get(name), value)
+                    yield Choice(f"{name} becomes {words}", name=name, value=value)
+
+    def wake_of(self, moment: Moment) -> float | None:
+        """Return when the mission wakes by itself [s]."""
+        if moment.engine is None:
+            return None
+        restore(self.engine, moment.engine)
+        return self.engine.next_wake()
+
+    def follow(self, moment: Moment, choice: Choice) -> None:
+        """Let one thing happen, and keep where it leads if that is new."""
+        engine, world = self.engine, self.world
+        restore(engine, self.fresh if moment.engine is None else moment.engine)
+        world.enter(moment)
+        script = (*moment.script, choice.text) if choice.text else moment.script
+        if choice.until is not None:
+            world.now = max(moment.now, choice.until)
+        if choice.name:
+            world.set(choice.name, choice.value)
+        if choice.leaf >= 0:
+            del world.calls[choice.leaf]
+            counts_as = self.counts_as(choice)
+            own = "" if choice.outcome in _DONE else choice.outcome
+            engine.ended(choice.leaf, Result(counts_as == SUCCEEDS, "", own))
+        if moment.engine is None and choice.name:
+            self.keep(Moment(None, 0.0, dict(world.values), {}, {}, script))
+            return
+        engine.tick(world.now)
+        self.look(script)
+
+    def counts_as(self, choice: Choice) -> str:
+        """Return what the outcome of a call counts as."""
+        skill = self.robot.skills.get(self.skills[choice.leaf])
+        return (skill.outcomes if skill else {}).get(choice.outcome, choice.outcome)
+
+    def look(self, script: tuple[str, ...]) -> None:
+        """Tell what is wrong here, and keep the moment if the mission goes on."""
+        for text in self.world.reports:
+            self.tell(text, script)
+        if self.engine.held_until is not None:
+            self.out.states += 1
+            return  # an endless loop, which was reported
+        if self.engine.status not in (IDLE, RUNNING):
+            self.out.states += 1
+            if self.world.end:
+                self.out.ends.setdefault(self.world.end.outcome or self.world.end.result, script)
+            return
+        world = self.world
+        held = dict(world.held)
+        moment = Moment(save(self.engine), world.now, dict(world.values), dict(world.calls), held, script)
+        waits_for = self.engine.reads() & self.values.keys()
+        if not moment.calls and self.engine.next_wake() is None and not waits_for:
+            self.tell("the mission waits for ever: nothing runs, nothing is due, and no value can change that", script)
+        self.keep(moment)
+
+    def keep(self, moment: Moment) -> None:
+        """Go on from a moment later, if it is new."""
+        mark = fingerprint(moment, self.engine.tasks)
+        if mark not in self.met:
+            self.met.add(mark)
+            self.out.states += 1
+            self.waiting.append(moment)
+
+    def tell(self, what: str, script: tuple[str, ...]) -> None:
+        """Keep something wrong, with the first script that leads there."""
+        if what not in self.said:
+            self.said.add(what)
+            self.out.found.append(Found(what, script))
+
+
+class ExploredWorld:
+    """A world in which nothing happens by itself."""
+
+    def __init__(self, mission: str, robot: RobotNames) -> None:
+        self.now = 0.0
+        self.values: dict[str, Value] = {}
+        self.counts: dict[str, int] = {}
+        self.calls: dict[int, str] = {}
+        self.held: dict[int, str] = {}
+        self.reports: list[str] = []
+        self.end: MissionEnded | None = None
+        self.story = Story(mission, robot.skills)
+
+    def enter(self, moment: Moment) -> None:
+        """Be as it was then."""
+        self.now = moment.now
+        self.values, self.calls, self.held = dict(moment.values), dict(moment.calls), dict(moment.held)
+        self.counts = dict.fromkeys(self.values, 1)
+        self.reports, self.end = [], None
+
+    def set(self, name: str, value: Value) -> None:
+        """Let a value come."""
+        self.values[name] = value
+        self.counts[name] += 1
+
+    def value(self, name: str, /) -> Value | NotArrived:
+        """Return a value."""
+        return self.values.get(name, NOT_ARRIVED)
+
+    def age(self, name: str, /) -> float | NotArrived:
+        """Return that every value has just come."""
+        return 0.0 if name in self.values else NOT_ARRIVED
+
+    def count(self, name: str, /) -> int:
+        """Return how many have come."""
+        return self.counts.get(name, 0)
+
+    def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
+        """Let a call run."""
+        self.calls.setdefault(leaf, skill)
+
+    def halt(self, leaf: int, /) -> None:
+        """Forget a call."""
+        self.calls.pop(leaf, None)
+        self.held.pop(leaf, None)
+
+    def pause(self, leaf: int, /) -> None:
+        """Hold a call; it does not end meanwhile."""
+        self.held[leaf] = self.calls.pop(leaf)
+
+    def resume(self, leaf: int, /) -> None:
+        """Let a call go on."""
+        self.calls[leaf] = self.held.pop(leaf)
+
+    def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
+        """Nobody listens."""
+
+    def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
+        """Let a call run."""
+        self.calls[leaf] = service
+
+    def say(self, event: MissionEvent, /) -> None:
+        """Keep what is wrong, and how calls are told."""
+        _, text = self.story.tell(event) if isinstance(event, SkillStarted) else (None, "")
+        match event:
+            case SkillStarted(leaf=leaf):
+                self.calls[leaf] = text
+            case Reported(path=path, message=message) if message != STILL_HOLDS:
+                self.reports.append(f"{path}: {message}")
+            case MissionEnded():
+                self.end = event
+
+
+def fingerprint(moment: Moment, tasks: Sequence[Task]) -> str:
+    """Return a text that is the same for moments from which the same can happen: times count from now on."""
+    values = {name: str(value) for name, value in moment.values.items()}
+    if moment.engine is None:
+        return json.dumps(values, sort_keys=True)
+    saved = moment.engine
+    engine = [saved["engine"][name] for name in ("status", "is_paused", "draws")]
+    states = [
+        _state(task, state, moment.now, saved["statuses"][task.number] == RUNNING)
+        for task, state in zip(tasks, saved["tasks"], strict=True)
+    ]
+    kept = (
+        saved["statuses"],
+        engine,
+        states,
+        saved["runs"],
+        saved["kept"],
+        values,
+        sorted(moment.calls.items()),
+        sorted(moment.held),
+    )
+    return json.dumps(kept, sort_keys=True)
+
+
+def _state(task: Task, state: Sequence[Any], now: float, runs: bool) -> list[Any]:
+    """Return what counts of a task's state: of one that does not run, what its latest run left behind is forgotten."""
+    counting = []
+    for name, value in zip(("current", *task.saved), state, strict=True):
+        is_time = name in task.times and isinstance(value, float)
+        if name not in task.told and (runs or name not in task.fresh):
+            counting.append(round(value - now, 6) if is_time else value)
+    return counting
+
+
+def text_of(explored: Explored) -> str:
+    """Return what came out, for people."""
+    reach = "as far as the limits reach" if explored.is_cut else "all there are"
+    lines = [f"{explored.mission}: {explored.states} states, {explored.deepest} choices deep; {reach}"]
+    for end, script in sorted(explored.ends.items()):
+        lines.append(f"  can end with {end}: {_script(script)}")
+    for one in explored.found:
+        lines.append(f"  WRONG: {one.what}")
+        lines.append(f"         {_script(one.script)}")
+    if not explored.found:
+        lines.append("  nothing wrong was found")
+    return "\n".join(lines)
+
+
+def _script(script: tuple[str, ...]) -> str:
+    return ", then ".join(script) if script else "at once"

@@ -1,0 +1,238 @@
+"""From the file of a test to the test, with a finding for each mistake."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.findings import Finding, Report
+from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.files import resolve, shown_name
+from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.library import PREFIX
+from rbxcompose.manifest.test_file import SECTIONS, TEST, TrialFile
+from rbxcompose.manifest.tree import Entry, Node, Scalar
+from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, validate
+from rbxcompose.mission_tests import codes
+from rbxcompose.mission_tests.event_reader import PUBLISH, read_events
+from rbxcompose.mission_tests.expectation_reader import read_expect
+from rbxcompose.mission_tests.mission_facts import Facts
+from rbxcompose.mission_tests.mock_reader import read_mocks
+from rbxcompose.mission_tests.model import Event, Mock, Trial
+from rbxcompose.mission_tests.sections import Context
+from rbxcompose.missions.engine.inputs import bind_inputs
+from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.program import Program
+from rbxcompose.model.robot import Robot
+from rbxcompose.plan.model import Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """The file of a test, before anything in it is understood; without `root` it cannot be read."""
+
+    path: Path
+    name: str
+    root: Tree | None
+    report: Report
+
+
+@dataclass(slots=True)
+class Reading:
+    """Reads the tests of one run; each robot is compiled once, and its findings are told once.
+
+    `sources` are the texts of all files, `report` has what is wrong with robots.
+    """
+
+    environment: Mapping[str, str]
+    sources: dict[str, str] = field(default_factory=dict)
+    report: Report = field(default_factory=Report)
+    _robots: dict[str, Compilation] = field(default_factory=dict)
+    _kept_back: dict[Finding, str] = field(default_factory=dict)  # what a test is told of a robot with mistakes
+
+    def read(self, path: Path) -> tuple[Trial | None, Report]:
+        """Return the test of a file, None if there is something wrong with it or with its robot; and its findings."""
+        written = self.open(path)
+        return self.understand(written), written.report
+
+    def open(self, path: Path) -> Written:
+        """Return what is written in a file; a test without a name is called like its file."""
+        report = Report()
+        root = Documents(report, self.sources).read(path, TEST)
+        name = root.get("name") if root else None
+        return Written(path, name.text if isinstance(name, Scalar) and name.text else path.name, root, report)
+
+    def understand(self, written: Written) -> Trial | None:
+        """Return the test that is written, None if it cannot run; what is wrong is added to its report."""
+        root, report = written.root, written.report
+        if root is None:
+            return None
+        Documents(report, self.sources).check(TrialFile, _without_values(root))
+        compilation = self._robot(root, written.path, report)
+        if compilation is None or compilation.robot is None or compilation.plan is None:
+            return None
+        trial = _read(root, compilation.robot, compilation.plan, report)
+        return None if report.has_errors else trial
+
+    def summed_up(self, findings: Iterable[Finding]) -> Iterator[Finding]:
+        """Yield findings, but for all tests together that a robot with mistakes keeps from running only one."""
+        kept_back: dict[str, list[Finding]] = {}
+        for one in Report(list(findings)):
+            if one in self._kept_back:
+                kept_back.setdefault(self._kept_back[one], []).append(one)
+            else:
+                yield one
+        for robot, ones in kept_back.items():
+            which = "the test" if len(ones) == 1 else f"{len(ones)} tests"
+            yield replace(ones[0], message=_no_robot(robot, which))
+
+    def _robot(self, root: Tree, path: Path, report: Report) -> Compilation | None:
+        """Return what the compiler makes of the robot, if it can run."""
+        written = _text(root, "robot", "the robot's file", report)
+        if written is None:
+            return None
+        file = written.text if written.text.startswith(PREFIX) else resolve(written.text, path, written.span)
+        if isinstance(file, Finding):
+            report.add(file)
+            return None
+        name = str(file)
+        shown = name if isinstance(file, str) else shown_name(file)
+        if name not in self._robots:
+            self._robots[name] = compile_robot(shown, environment=self.environment)
+            self.report.extend(self._robots[name].report)
+            self.sources.update(self._robots[name].sources)
+        found = self._robots[name]
+        if found.plan is None:
+            why = codes.NEVER.at(written.span, _no_robot(shown, "the test"), help="see the findings of the robot")
+            self._kept_back[why] = shown
+            report.add(why)
+        return found
+
+
+def _no_robot(robot: str, which: str) -> str:
+    return f"the robot '{robot}' has mistakes, so that {which} cannot run"
+
+
+def _without_values(root: Tree) -> Tree:
+    """Return the header and the names of the sections; what these hold is looked at where it is read."""
+    sections = {name: Entry(entry.key, Scalar("", entry.value.span)) for name, entry in root.entries.items()}
+    header = {name: entry for name, entry in root.entries.items() if name in Header.model_fields}
+    return replace(root, entries={**sections, **header})
+
+
+def _text(root: Tree, key: str, what: str, report: Report) -> Scalar | None:
+    value = root.get(key)
+    if value is None:
+        report.add(MISSING_KEY.at(root.span, f"a test needs '{key}': {what}"))
+    elif isinstance(value, Scalar) and value.text:
+        return value
+    else:
+        report.add(WRONG_TYPE.at(value.span, f"'{key}' must be {what}", label=label_of(value)))
+    return None
+
+
+def _read(root: Tree, robot: Robot, plan: Plan, report: Report) -> Trial | None:
+    chosen = _text(root, "mission", "the name of a mission", report)
+    if chosen is None:
+        return None
+    if chosen.text not in robot.missions:
+        message = f"the robot '{robot.manifest.name}' has no mission '{chosen.text}'"
+        what = "missions of this robot"
+        report.add(codes.UNKNOWN.misspelt(chosen.span, message, chosen.text, robot.missions, what))
+        return None
+    names, program = robot.names, robot.missions[chosen.text].program
+    linked = link(program, names.missions)
+    inputs = _inputs(root, robot, chosen, program, report)
+    context = Context(robot, linked, names, Facts.of(linked, names), report)
+    sections = {key: validate(model, root.entries[key].value, (key,), report) for key, model in _there(root)}
+    mocks = read_mocks(context, root.get("mocks"), sections.get("mocks") or {})
+    events = read_events(context, root.get("events"), sections.get("events") or ())
+    if (model := sections.get("expect")) is None:
+        if "expect" not in root or _is_empty(root.entries["expect"].value):
+            report.add(MISSING_KEY.at(root.span, "a test needs 'expect': what must have happened"))
+        return None
+    expect = read_expect(context, root.get("expect"), model)
+    _look_at_times(events, expect.until, report)
+    header = {key: value.text for key in ("name", "about") if isinstance(value := root.get(key), Scalar)}
+    return Trial(
+        header.get("name", ""),
+        header.get("about", ""),
+        root.span.file,
+        root.entries["name"].value.span if "name" in root else root.span,
+        chosen.text,
+        program,
+        linked,
+        names,
+        plan,
+        inputs,
+        mocks,
+        events,
+        expect,
+        _is_complete(context.facts, mocks, events),
+    )
+
+
+def _is_complete(facts: Facts, mocks: Mapping[str, Mock], events: tuple[Event, ...]) -> bool:
+    """Tell whether the mission asks for nothing but what the test gives, and nothing goes over the bus."""
+    deeds = [deed for event in events for deed in event.deeds]
+    values = {name for deed in deeds for name in deed.settings} | {name for one in mocks.values() for name in one.sets}
+    is_answered = {*facts.skills, *facts.services} <= mocks.keys()
+    return is_answered and facts.values <= values and not any(deed.word == PUBLISH for deed in deeds)
+
+
+def _there(root: Tree) -> list[tuple[str, Any]]:
+    """Return the sections that have something in them, with their models."""
+    return [(key, model) for key, model in SECTIONS.items() if key in root and not _is_empty(root.entries[key].value)]
+
+
+def _is_empty(node: Node) -> bool:
+    return isinstance(node, Scalar) and node.plain and not node.text
+
+
+def _inputs(root: Tree, robot: Robot, chosen: Scalar, program: Program, report: Report) -> Mapping[str, object]:
+    """Return the inputs: those that the test gives, then the robot's, then the defaults."""
+    given = root.get("with")
+    entries: dict[str, Entry] = {}
+    if isinstance(given, Tree):
+        entries = given.entries
+    elif given is not None and not _is_empty(given):
+        report.add(WRONG_TYPE.at(given.span, "'with' must be a map from inputs to values", label=label_of(given)))
+    of_robot = robot.manifest.missions[chosen.text].with_.entries
+    bound, findings = bind_inputs(program, {**of_robot, **entries}, robot.manifest.places, chosen.span)
+    report.extend(findings)
+    return bound
+
+
+def _look_at_times(events: tuple[Event, ...], until: float | None, report: Report) -> None:
+    """Add what can never happen: an event after the end, an order that the robot refuses."""
+    is_stopped = is_paused = False
+    latest = 0.0
+    for event in events:
+        if until is not None and event.at > until:
+            report.add(codes.NEVER.at(event.span, "this is after the end of the test ('for')"))
+        if event.at < latest:
+            report.add(codes.NEVER.at(event.span, "this is before the event above it", help="sort events by time"))
+        latest = max(latest, event.at)
+        for deed in event.deeds:
+            refuses = _REFUSED.get(deed.word)
+            if refuses and (trouble := refuses(is_stopped, is_paused)):
+                report.add(codes.NEVER.at(event.span, trouble))
+            is_stopped = {"stop": True, "release": False}.get(deed.word, is_stopped)
+            is_paused = {"stop": True, "pause": True, "resume": False}.get(deed.word, is_paused)
+
+
+def _no_resume(is_stopped: bool, is_paused: bool) -> str:
+    if is_stopped:
+        return "a robot that is stopped does not resume: 'release' it first"
+    return "" if is_paused else "the mission is not paused here, so it cannot be resumed"
+
+
+_REFUSED: Mapping[str, Callable[[bool, bool], str]] = {
+    "resume": _no_resume,
+    "pause": lambda stopped, paused: "the mission is paused here already" if paused else "",
+    "release": lambda stopped, paused: "" if stopped else "the robot is not stopped here",
+}

@@ -1,0 +1,39 @@
+"""Runs a test, in the way that it needs, and judges what happened."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rbxcompose.mission_tests.coverage import Seen
+from rbxcompose.mission_tests.judge import Problem, judge
+from rbxcompose.mission_tests.model import Trial
+from rbxcompose.mission_tests.record import Record
+from rbxcompose.mission_tests.stage import Stage
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A test that ran: what happened, what was not as expected, and which ways its mission took."""
+
+    trial: Trial
+    record: Record
+    problems: list[Problem]
+    seen: Seen
+
+    @property
+    def passed(self) -> bool:
+        """Tell whether all was as expected."""
+        return not self.problems
+
+
+def run_trial(trial: Trial) -> Verdict:
+    """Run a test: the mission alone if the test answers for all that it needs, else the whole robot."""
+    seen = Seen()
+    if trial.is_complete:
+        record = Stage(trial, seen).run()
+    else:
+        from rbxcompose.mission_tests.robot_run import RobotRun  # a robot is not needed by every test
+
+        record = RobotRun(trial, seen).run()
+    types = {name: datum.type for name, datum in trial.program.data.items()}
+    return Verdict(trial, record, judge(trial.expect, record, types), seen)

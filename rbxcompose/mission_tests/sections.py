@@ -1,0 +1,56 @@
+"""What all sections of a test are read with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from rbxcompose.expressions.types import UNKNOWN, Type
+from rbxcompose.findings import Report
+from rbxcompose.manifest.tree import Entry, Node
+from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.mission_tests import codes
+from rbxcompose.mission_tests.mission_facts import Facts
+from rbxcompose.mission_tests.model import Setting
+from rbxcompose.mission_tests.scope import check_setting, names_of, setting_of
+from rbxcompose.missions.program.program import Program, RobotNames
+from rbxcompose.model.robot import Robot
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """The robot and the mission that a test is about, what is known of them, and where mistakes go."""
+
+    robot: Robot
+    program: Program
+    names: RobotNames
+    facts: Facts
+    report: Report
+
+    def settings(self, node: Node | None, known: Mapping[str, Type]) -> dict[str, Setting]:
+        """Return what is set by name; expressions also see what is `known` beside the robot's values."""
+        found: dict[str, Setting] = {}
+        valid = names_of(self.names)
+        for name, entry in entries_of(node):
+            if name not in valid:
+                message = f"the robot has no value '{name}'"
+                self.report.add(codes.UNKNOWN.misspelt(entry.key.span, message, name, valid, "values of this robot"))
+                continue
+            inputs = {key: one.type for key, one in self.program.inputs.items()}
+            findings = list(check_setting(entry.value, valid[name], self.program, self.names, {**inputs, **known}))
+            self.report.extend(findings)
+            if not findings:
+                found[name] = setting_of(entry.value, valid[name], self.names)
+        return found
+
+    def type_of_datum(self, name: str) -> Type | None:
+        """Return the type of a datum of the mission, None if it has no such one."""
+        if name in self.program.data:
+            return self.program.data[name].type
+        return UNKNOWN if name in self.program.saved else None
+
+
+def entries_of(node: Node | None) -> Iterator[tuple[str, Entry]]:
+    """Yield the entries of a map; nothing of anything else, which was told before."""
+    if isinstance(node, Tree):
+        yield from node.entries.items()

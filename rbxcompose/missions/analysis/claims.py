@@ -1,0 +1,27 @@
+"""Which parts of the robot the branches of a parallel need for themselves at the same time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Span
+from rbxcompose.missions.program.program import Node, Program, RobotNames
+
+
+def claims_of(program: Program, robot: RobotNames, within: tuple[str, ...] = ()) -> frozenset[str]:
+    """Return what a mission claims with all that it uses."""
+    return frozenset(name for name, _ in claims_below(program.nodes, robot, within))
+
+
+def claims_below(
+    nodes: tuple[Node, ...], robot: RobotNames, within: tuple[str, ...] = ()
+) -> Iterator[tuple[str, Span]]:
+    """Yield what nodes claim, each with its place; `within` are missions that are being looked at."""
+    for node in nodes:
+        skill = robot.skills.get(node.skill)
+        if skill and skill.claims:
+            yield skill.claims, node.span
+        name = node.step.uses.text if node.step.uses else ""
+        if name in robot.missions and name not in within:
+            for claim in claims_of(robot.missions[name], robot, (*within, name)):
+                yield claim, node.span

@@ -1,0 +1,54 @@
+"""What nodes set and send, by themselves or in their hooks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from rbxcompose.missions.language.asked import Assignment
+from rbxcompose.missions.program.messages import Message
+from rbxcompose.missions.program.moments import Deeds
+from rbxcompose.missions.program.program import Node, Program
+
+
+def assignments(node: Node) -> Iterator[Assignment]:
+    """Yield what a node sets."""
+    yield from node.step.effects.assignments
+    for deeds in _deeds(node):
+        yield from deeds.assignments
+
+
+def published(node: Node) -> Iterator[Message]:
+    """Yield the messages that a node publishes."""
+    if message := node.step.effects.published:
+        yield message
+    yield from (deeds.message for deeds in _deeds(node) if deeds.message)
+
+
+def called(node: Node) -> Iterator[Message]:
+    """Yield the request that a node makes."""
+    if request := node.step.effects.called:
+        yield request
+
+
+def replaced(program: Program) -> frozenset[str]:
+    """Return the names of all data that get other values while a mission runs."""
+    return program.saved.union(one.name for node in program.nodes for one in assignments(node))
+
+
+def written(program: Program) -> frozenset[str]:
+    """Return the names of all data that change while a mission runs, also those that only lose items."""
+    shortened = (node.step.effects.shortened for node in program.nodes)
+    return replaced(program).union(name for name in shortened if name)
+
+
+def sent_by(programs: Iterable[Program]) -> tuple[set[str], set[str]]:
+    """Return the topics on which missions publish, and the services that they call, as they write them."""
+    nodes = [node for program in programs for node in program.nodes]
+    topics = {message.target.text for node in nodes for message in published(node)}
+    return topics, {message.target.text for node in nodes for message in called(node)}
+
+
+def _deeds(node: Node) -> Iterator[Deeds]:
+    for modifier in node.modifiers.values():
+        if modifier.moments:
+            yield from modifier.moments.deeds.values()

@@ -1,0 +1,53 @@
+"""How the nodes of a mission may end, as far as the text tells: what machines must have transitions for."""
+
+from __future__ import annotations
+
+from itertools import takewhile
+
+from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, FAILS, SUCCEEDS, Outcomes
+from rbxcompose.missions.program.program import END, Node, Program, RobotNames
+
+
+class Ending:
+    """Finds how the nodes of a mission may end."""
+
+    def __init__(self, program: Program, robot: RobotNames, within: tuple[str, ...] = ()) -> None:
+        self.program = program
+        self.robot = robot
+        self.within = within  # missions that are being looked at
+        self._known: dict[int, Outcomes] = {}
+
+    def of(self, number: int, /) -> Outcomes:
+        """Return how a node may end, its modifiers included."""
+        if number not in self._known:
+            self._known[number] = self.inside_of(self.program.nodes[number])
+        return self._known[number]
+
+    def inside_of(self, node: Node, key: str = "") -> Outcomes:
+        """Return how that may end which is inside of a modifier of a node; without one, the node itself."""
+        found = node.step.may_end(node, self)
+        for name in takewhile(lambda one: one != key, reversed(tuple(node.modifiers))):
+            found = node.modifiers[name].changed(found)
+        return found
+
+    def mission(self) -> Outcomes:
+        """Return how the mission may end."""
+        found = self.of(self.program.main)
+        for interrupt in self.program.interrupts:
+            reaction = ALWAYS_SUCCEEDS if interrupt.root is None else self.of(interrupt.root)
+            found = found.both(Outcomes(interrupt.afterwards == END, reaction.counting_as(FAILS)))
+        for result in (node.step.ends_mission for node in self.program.nodes if node.step.ends_mission):
+            found = found.both(Outcomes(result == SUCCEEDS, result == FAILS))
+        return found
+
+    def of_mission(self, name: str, /) -> Outcomes:
+        """Return how another mission may end."""
+        program = self.robot.missions.get(name)
+        if program is None or name in self.within:
+            return ANY
+        return Ending(program, self.robot, (*self.within, name)).mission()
+
+    def of_branches(self, node: Node) -> dict[str, Outcomes]:
+        """Return how each branch of a node may end, by its name."""
+        names = node.step.branches.names if node.step.branches else ()
+        return {name: self.of(child) for name, child in zip(names, node.children, strict=False)}

@@ -1,0 +1,33 @@
+"""A mission on a robot as the checks look at it: its nodes with what each sees, and how each may end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from rbxcompose.missions.analysis.endings import Ending
+from rbxcompose.missions.analysis.scope_types import NodeScope, View, base_scope, views
+from rbxcompose.missions.program.program import Program, RobotNames
+
+
+@dataclass(frozen=True)
+class Examined:
+    """A mission, and what the robot gives to it."""
+
+    program: Program
+    robot: RobotNames
+
+    @cached_property
+    def views(self) -> tuple[View, ...]:
+        """Return each node with what it sees, in the order of the text."""
+        return tuple(views(self.program, self.robot))
+
+    @cached_property
+    def scope(self) -> NodeScope:
+        """Return what all of the mission sees."""
+        return base_scope(self.program, self.robot)
+
+    @cached_property
+    def ending(self) -> Ending:
+        """Return who knows how each node may end."""
+        return Ending(self.program, self.robot)

@@ -1,0 +1,125 @@
+"""What a mission will do, as far as its text alone tells: constants, steps that cannot fail, steps that never end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rbxcompose.config import Place
+from rbxcompose.expressions.tree import (
+    Arithmetic,
+    Expression,
+    ExpressionError,
+    Field,
+    Index,
+    Number,
+    Variable,
+    Word,
+    walk,
+)
+from rbxcompose.expressions.tree import Node as Tree
+from rbxcompose.expressions.values import Value
+from rbxcompose.findings import Span
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.analysis.effects import written
+from rbxcompose.missions.language.spans import expression_of
+from rbxcompose.missions.program.answers import Skipped
+from rbxcompose.missions.program.program import Node, Program
+
+Constants = Mapping[str, Value]  # what `$names` stand for throughout
+
+
+def constants_of(program: Program, inputs: Constants) -> dict[str, Value]:
+    """Return the inputs, and the data that nothing changes."""
+    changed = written(program)
+    return {**{name: datum.value for name, datum in program.data.items() if name not in changed}, **inputs}
+
+
+def number_of(expression: Expression | None, constants: Constants) -> float | None:
+    """Return the number that an option of a node always gives, if it is there and that simple."""
+    return number_in(expression.tree, constants) if expression else None
+
+
+def number_in(tree: Tree, constants: Constants) -> float | None:
+    """Return the number that a part of an expression always gives, if it is that simple."""
+    match tree:
+        case Number(value=value):
+            return value
+        case Variable(name=name):
+            found = constants.get(name)
+            return float(found) if isinstance(found, int | float) and not isinstance(found, bool) else None
+    return None
+
+
+def place_of(expression: Expression, constants: Constants, places: Mapping[str, Place]) -> Place | None:
+    """Return the place that an expression always gives, if it is that simple."""
+    match expression.tree:
+        case Word(name=name):
+            return places.get(name)
+        case Variable(name=name):
+            found = constants.get(name)
+            return found if isinstance(found, Place) else places.get(str(found))
+    return None
+
+
+def goal_place(node: Node, main: str, constants: Constants, places: Mapping[str, Place]) -> Place | None:
+    """Return the place that a skill's main argument always is, if it is that simple."""
+    for argument in node.step.arguments:
+        if argument.name in ("", main) and isinstance(argument.value, Scalar):
+            try:
+                return place_of(expression_of(argument.value), constants, places)
+            except ExpressionError:
+                return None
+    return None
+
+
+def items_of(node: Node, constants: Constants, places: Mapping[str, Place]) -> list[Place] | None:
+    """Return the places that a loop goes through, if that is all it does and they are written down."""
+    items = node.step.items
+    if items is None:
+        return []
+    if isinstance(items, tuple):
+        found = [place_of(item, constants, places) for item in items]
+    else:
+        listed = constants.get(items.tree.name) if isinstance(items.tree, Variable) else None
+        found = [places.get(str(text)) for text in listed] if isinstance(listed, list | tuple) else [None]
+    return [place for place in found if place] if all(found) else None
+
+
+def never_skipped(program: Program, node: Node) -> bool:
+    """Tell whether a node is always done, so that its result is success or failure."""
+    if node.may_be_left_out:
+        return False
+    if node.step.skipped is Skipped.WITH_ALL_INSIDE:
+        return any(never_skipped(program, program.nodes[child]) for child in node.children)
+    return node.step.skipped is Skipped.NEVER
+
+
+def is_simple(node: Node) -> bool:
+    """Tell whether the conditions of a node can always be asked."""
+    # An item that is not there, or a division by zero, would be a failure.
+    trees = (asked.expression.tree for asked in node.asked)
+    return not any(isinstance(part, Index | Field | Arithmetic) for tree in trees for part, _ in walk(tree))
+
+
+def is_sure(node: Node, program: Program) -> bool:
+    """Tell whether a node reads only what is there from the start, in ways that cannot go wrong."""
+    read = {name.name for asked in node.asked for name in asked.expression.names}
+    others = read - program.inputs.keys() - program.data.keys()
+    if others and not others <= {one.item for one in program.nodes}:
+        return False
+    parts = (part for asked in node.asked for part, _ in walk(asked.expression.tree))
+    return not any(isinstance(part, Index | Field) or _divides(part) for part in parts)
+
+
+def _divides(part: Tree) -> bool:
+    return isinstance(part, Arithmetic) and part.operator == "/"
+
+
+def takes_time(pause: Expression | None) -> bool:
+    """Tell whether a time is there and not written out as none."""
+    return pause is not None and not (isinstance(pause.tree, Number) and pause.tree.value == 0)
+
+
+def place_in_text(node: Node, expression: Expression | None) -> Span:
+    """Return where an expression of a node stands."""
+    return next((asked.scalar.span for asked in node.asked if asked.expression is expression), node.span)

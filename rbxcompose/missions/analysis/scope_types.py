@@ -1,0 +1,134 @@
+"""What a node sees before the mission runs: the types of all names in its scope."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+from rbxcompose.expressions.check import Problem, check_value
+from rbxcompose.expressions.tree import Expression, Word
+from rbxcompose.expressions.types import PLACE, POSE, TEXT, UNKNOWN, Type, TypeKind
+from rbxcompose.findings import Finding, Kind, Span, nearest, replacement
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions import codes
+from rbxcompose.missions.engine.condition_watches import POSE as POSE_NAME
+from rbxcompose.missions.language.spans import inner_span
+from rbxcompose.missions.program.program import Node, Program, RobotNames
+
+_MEASURED = (TypeKind.QUANTITY, TypeKind.COUNT, TypeKind.FLAG)  # what no place can be
+
+
+@dataclass(frozen=True, slots=True)
+class NodeScope:
+    """The names that expressions of a node may use, with their types (a scope for static checks)."""
+
+    names: Mapping[str, Type]
+    places: Iterable[str]
+    removed: Mapping[str, Span] = field(default_factory=dict)  # places that are gone, with what took them away
+
+    def variable(self, name: str) -> Type | None:
+        """Return the type of `$name`, if there is one."""
+        return self.names.get(name)
+
+    def word(self, name: str) -> Type | None:
+        """Return that a bare word is a place, if it is one."""
+        return PLACE if name in self.places else None
+
+    def variables(self) -> Iterable[str]:
+        """Return all names."""
+        return self.names
+
+    def words(self) -> Iterable[str]:
+        """Return the names of all places."""
+        return self.places
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A node as its checks see it."""
+
+    program: Program
+    robot: RobotNames
+    node: Node
+    scope: NodeScope
+
+    @property
+    def waits(self) -> bool:
+        """Tell whether the node, or any below it, takes time by itself."""
+        return any(below.step.waits for below in self.program.below(self.node.number))
+
+    def typed(self, expression: Expression, wanted: Type, scalar: Scalar, kind: Kind) -> Iterator[Finding]:
+        """Yield what is wrong with an expression that must have the type `wanted`."""
+        return findings_of(expression, wanted, scalar, self.scope, kind)
+
+
+def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
+    """Return the names that all of a mission sees."""
+    return {
+        **robot.values,
+        POSE_NAME: POSE,
+        **{name: one.type for name, one in program.inputs.items()},
+        **{name: datum.type for name, datum in program.data.items()},
+        **{name: UNKNOWN for name in program.saved if name not in program.data},
+    }
+
+
+def base_scope(program: Program, robot: RobotNames) -> NodeScope:
+    """Return what all of a mission sees."""
+    return NodeScope(base_names(program, robot), robot.places, robot.removed)
+
+
+def views(program: Program, robot: RobotNames) -> Iterator[View]:
+    """Yield each node with what it sees, in the order of the text."""
+    base = base_scope(program, robot)
+    below: dict[int, NodeScope] = {}  # what the children of a node see
+    for node in program.nodes:
+        scope = base if node.parent is None else below[node.parent]
+        view = View(program, robot, node, scope)
+        shown = node.step.shows(node, scope)
+        below[node.number] = replace(scope, names={**scope.names, **shown}) if shown else scope
+        yield view
+
+
+def findings_of(
+    expression: Expression, wanted: Type, scalar: Scalar, scope: NodeScope, kind: Kind
+) -> Iterator[Finding]:
+    """Yield what is wrong with an expression; what is neither a name nor a place is of the given kind."""
+    for problem in check_value(expression, scope, wanted):
+        span = inner_span(scalar, problem.start, problem.end)
+        written = expression.text[problem.start : problem.end]
+        fix = replacement(span, written, problem.meant) if problem.meant else None
+        unknown_word = _at(problem, ((word.name, word.start) for word in expression.words))
+        if unknown_word and scope.word(unknown_word) is None and problem.meant.startswith("$"):
+            yield codes.UNKNOWN_NAME.at(span, problem.message, help=problem.help, fix=fix)
+        elif unknown_word and wanted.kind in _MEASURED and isinstance(expression.tree, Word):
+            message = f"this must be {wanted.phrase}; nothing is named '{unknown_word}'"
+            help_text = "write a number such as 2" if wanted.kind is TypeKind.COUNT else problem.help
+            yield kind.at(span, message, help=help_text, fix=fix)
+        elif unknown_word and wanted == TEXT and unknown_word not in scope.removed:
+            yield _no_text(unknown_word, span, scope, kind)
+        elif unknown_word in scope.removed:
+            yield codes.removed_place(span, unknown_word, scope.removed[unknown_word])
+        elif unknown_word and scope.word(unknown_word) is None:
+            unquoted = f"there is no place '{unknown_word}'"
+            yield codes.UNKNOWN_PLACE.at(span, unquoted, help=problem.help, fix=fix)
+        elif (name := _at(problem, ((name.name, name.start) for name in expression.names))) and not scope.variable(
+            name
+        ):
+            yield codes.UNKNOWN_NAME.at(span, problem.message, help=problem.help, fix=fix)
+        else:
+            yield kind.at(span, problem.message, help=problem.help, fix=fix)
+
+
+def _no_text(word: str, span: Span, scope: NodeScope, kind: Kind) -> Finding:
+    """Return the finding about a bare word that stands for a text: a misspelt place, or one that needs quotes."""
+    message = f"there is no place '{word}'"
+    if near := nearest(word, scope.words()):
+        return codes.UNKNOWN_PLACE.at(span, message, help=f"did you mean '{near[0]}', or the text '\"{word}\"'?")
+    fix = replacement(span, word, f'"{word}"', is_safe=False)
+    return kind.at(span, message, help=f"a text needs quotes: write '\"{word}\"'", fix=fix)
+
+
+def _at(problem: Problem, names: Iterable[tuple[str, int]]) -> str:
+    """Return the name that stands exactly where a problem begins."""
+    return next((name for name, start in names if start == problem.start), "")

@@ -1,0 +1,32 @@
+"""Where the states of machines lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from rbxcompose.missions.program.machines import States
+from rbxcompose.missions.program.program import Node, Program
+
+Leads = Mapping[str, frozenset[str]]  # the states and ends that each state leads to, by its name
+
+
+def transitions(program: Program) -> Iterator[tuple[States, list[Node], Leads]]:
+    """Yield each machine, its states in the order of the text, and where each leads to."""
+    for node in program.nodes:
+        if node.step.states:
+            states = [program.nodes[child] for child in node.children]
+            yield node.step.states, states, {state.name: _targets(state) for state in states}
+
+
+def reached(start: str, leads: Leads) -> frozenset[str]:
+    """Return all states and ends to which a way leads from a state, itself included."""
+    found, open_ones = {start}, [start]
+    while open_ones:
+        new = leads.get(open_ones.pop(), frozenset()) - found
+        found.update(new)
+        open_ones.extend(new)
+    return frozenset(found)
+
+
+def _targets(state: Node) -> frozenset[str]:
+    return frozenset(state.step.leads_to.to.values() if state.step.leads_to else ())

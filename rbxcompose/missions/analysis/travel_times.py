@@ -1,0 +1,133 @@
+"""How long the steps of a mission take at the very least: the ways between places, and the waits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from rbxcompose.config import Place
+from rbxcompose.missions.analysis.facts import Constants, goal_place, items_of, number_of
+from rbxcompose.missions.program.answers import Flow
+from rbxcompose.missions.program.program import ROOT, Node, Program
+
+MOST_STEPS = 2_000  # of a mission that are gone through; loops in loops would take for ever
+
+Here = Place | None  # where the robot is; None: nobody knows
+
+
+@dataclass(frozen=True, slots=True)
+class Driving:
+    """The skill that drives, its main argument, the speed [m/s] and how far off it may end [m]."""
+
+    skill: str
+    main: str
+    speed: float
+    tolerance: float
+
+
+@dataclass(frozen=True, slots=True)
+class TooShort:
+    """A node that needs at least `needs` [s] and is given `given` [s]; between two places, if it is one drive."""
+
+    node: Node
+    given: float
+    needs: float
+    leg: tuple[Place, Place] | None = None
+
+
+@dataclass(slots=True)
+class Ways:
+    """Goes through a mission in its intended course: each step succeeds, and what may be left out takes no time."""
+
+    program: Program
+    driving: Driving
+    places: Mapping[str, Place]
+    short: dict[int, TooShort] = field(default_factory=dict)  # the worst of each node
+    visited: dict[str, Place] = field(default_factory=dict)
+    starts_at: dict[int, Place] = field(default_factory=dict)  # where the robot is when other skills begin
+    leg: tuple[Place, Place] | None = None  # the last drive between two known places
+    steps: int = 0
+
+    def go(self, number: int, here: Here, constants: Constants) -> tuple[Here, float]:
+        """Return where a node leaves the robot and the least time that it takes [s]."""
+        self.steps += 1
+        if self.steps > MOST_STEPS:
+            return None, 0.0
+        node = self.program.nodes[number]
+        there, takes = self._inside(node, here, constants)
+        given = number_of(node.limit, constants)
+        if given and takes > given:
+            worst = self.short.get(number)
+            if worst is None or worst.needs < takes:
+                self.short[number] = TooShort(node, given, takes, self.leg if node.skill else None)
+        takes = takes if given is None else min(takes, given)
+        if node.may_be_left_out:
+            return (there if there is here else None), 0.0
+        return there, 0.0 if node.is_forgiven else takes
+
+    def _inside(self, node: Node, here: Here, constants: Constants) -> tuple[Here, float]:
+        if node.skill:
+            return self._skill(node, here, constants)
+        if not node.children:
+            return here, number_of(node.step.lasts, constants) or 0.0
+        match node.step.flow:
+            case Flow.IN_TURN:
+                return self._in_turn(node, here, constants)
+            case Flow.PER_ITEM:
+                return self._loop(node, here, constants)
+            case Flow.ONE_OF:
+                for child in node.children:
+                    self.go(child, None, constants)
+        return None, 0.0
+
+    def _skill(self, node: Node, here: Here, constants: Constants) -> tuple[Here, float]:
+        if node.skill != self.driving.skill:
+            if here is not None:
+                self.starts_at[node.number] = here
+            return here, 0.0
+        there = goal_place(node, self.driving.main, constants, self.places)
+        if there is None:
+            return None, 0.0
+        self.visited[there.name] = there
+        if here is None:
+            return there, 0.0
+        self.leg = (here, there)
+        return there, self.between(here, there)
+
+    def between(self, here: Place, there: Place) -> float:
+        """Return the time that the straight way takes at full speed, from edge to edge of the tolerances [s]."""
+        return max(0.0, distance(here, there) - 2 * self.driving.tolerance) / self.driving.speed
+
+    def _in_turn(self, node: Node, here: Here, constants: Constants) -> tuple[Here, float]:
+        takes = 0.0
+        for child in node.children:
+            here, took = self.go(child, here, constants)
+            takes += took
+        return here, takes
+
+    def _loop(self, node: Node, here: Here, constants: Constants) -> tuple[Here, float]:
+        items = items_of(node, constants, self.places)
+        if items is None or not node.children:
+            for child in node.children:
+                self.go(child, None, {name: value for name, value in constants.items() if name != node.item})
+            return None, 0.0
+        takes = 0.0
+        for item in items if self.steps < MOST_STEPS else ():
+            here, took = self.go(node.children[0], here, {**constants, node.item: item})
+            takes += took
+        return here, takes
+
+
+def too_short(ways: Ways, constants: Constants) -> Iterator[TooShort]:
+    """Go through the mission and its reactions, and yield the timeouts that are too short."""
+    ways.go(ROOT, None, constants)
+    for interrupt in ways.program.interrupts:
+        if interrupt.root is not None:
+            ways.go(interrupt.root, None, constants)
+    yield from ways.short.values()
+
+
+def distance(here: Place, there: Place) -> float:
+    """Return the straight way between two places [m]."""
+    return math.hypot(here.x - there.x, here.y - there.y)

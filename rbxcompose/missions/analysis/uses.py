@@ -1,0 +1,106 @@
+"""Which missions use which, and what is wrong with that as a whole: circles, and too many nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+
+from rbxcompose.findings import Finding, Related, Span, kind
+from rbxcompose.missions.program.linker import DEEPEST, MOST_NODES
+from rbxcompose.missions.program.program import Program
+
+CIRCLE = kind(
+    "RBX4146",
+    """Missions use each other in a circle
+
+A mission with all that it uses is run as one. One that uses itself, at once or by way of others, would never end.
+To do something again, write `repeat` or a machine.
+
+Bad: `patrol` has `use: rest`, and `rest` has `use: patrol`.
+
+Good: a third mission that does both in turn.
+
+```yaml
+do:
+  repeat: forever
+  do:
+    - use: patrol
+    - use: rest
+```
+""",
+)
+TOO_MUCH = kind(
+    "RBX4147",
+    """A mission is too large with all that it uses
+
+Each `use` has nodes of its own. Twenty thousand nodes, and missions within sixteen others, are enough for every robot;
+more is mostly a mistake, as of missions that use two others each, which use two others each.
+
+Use a mission in a loop instead of many times.
+""",
+)
+
+
+def used_by(program: Program) -> dict[str, Span]:
+    """Return the names of the missions that a mission uses, each with its first place."""
+    found: dict[str, Span] = {}
+    for node in program.nodes:
+        if node.step.uses and node.step.uses.text:
+            found.setdefault(node.step.uses.text, node.step.uses.span)
+    return found
+
+
+class Using:
+    """Tells of missions by name which can be linked, and what keeps the others from it."""
+
+    def __init__(self, missions: Mapping[str, Program]) -> None:
+        self._missions = missions
+        self._uses = {name: used_by(program) for name, program in missions.items()}
+        self._sizes: dict[str, tuple[int, int]] = {}  # nodes with all that is used, and how deep that is
+        self.findings: list[Finding] = []
+        self.broken: set[str] = set()  # those that cannot be linked
+        for name in missions:
+            self._walk(name, [])
+        for name, (nodes, depth) in self._sizes.items():
+            if nodes > MOST_NODES or depth > DEEPEST:
+                self.broken.add(name)
+        self.findings += self._too_large()
+
+    def _walk(self, name: str, above: list[str]) -> tuple[int, int]:
+        """Return the size of a mission and its depth; a circle counts once."""
+        if name in above:
+            self._circle([*above[above.index(name) :], name])
+            return 0, 0
+        if name not in self._missions or name in self._sizes:
+            return self._sizes.get(name, (0, 0))
+        sizes = {one: self._walk(one, [*above, name]) for one in self._uses[name]}
+        nodes = len(self._missions[name].nodes)
+        for node in self._missions[name].nodes:
+            if node.step.uses:
+                nodes += sizes.get(node.step.uses.text, (0, 0))[0]
+        self._sizes[name] = nodes, 1 + max((depth for _, depth in sizes.values()), default=0)
+        return self._sizes[name]
+
+    def _circle(self, names: list[str]) -> None:
+        """Tell a circle once, at its first mission, with the place of each step."""
+        if names[0] in self.broken:
+            return
+        self.broken.update(names)
+        steps = [(one, other, self._uses[one][other]) for one, other in pairwise(names)]
+        message = f"missions use each other in a circle: {' -> '.join(names)}"
+        related = [Related(span, f"'{one}' uses '{other}'") for one, other, span in steps[1:]]
+        help_text = "take one of the steps out; to do it again, write 'repeat' around it"
+        self.findings.append(CIRCLE.at(steps[0][2], message, help=help_text, related=related))
+
+    def _too_large(self) -> Iterator[Finding]:
+        """Yield the smallest missions that are too large: those that use them follow from it."""
+        for name in self._missions:
+            nodes, depth = self._sizes[name]
+            if nodes <= MOST_NODES and depth <= DEEPEST:
+                continue
+            if any(one in self.broken for one in self._uses[name]):
+                continue
+            span = next(iter(self._uses[name].values()), self._missions[name].nodes[0].span)
+            size = f"{nodes:,} nodes" if nodes > MOST_NODES else f"missions {depth} deep within each other"
+            most = f"{MOST_NODES:,}" if nodes > MOST_NODES else str(DEEPEST)
+            yield TOO_MUCH.at(span, f"mission '{name}' has {size} with all that it uses; {most} are allowed")

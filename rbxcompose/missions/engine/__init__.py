@@ -1,0 +1,1 @@
+"""The engine that runs a mission: pure, told the time."""

@@ -1,0 +1,98 @@
+"""A course is one line of work with a clock of its own: the mission itself, or the reaction to an interrupt."""
+
+from __future__ import annotations
+
+from rbxcompose.expressions.evaluate import holds
+from rbxcompose.missions.engine.condition_watches import Watched
+from rbxcompose.missions.engine.scopes import MissionScope, SinceScope, new_names
+from rbxcompose.missions.engine.task import Task
+from rbxcompose.missions.program.program import Interrupt, Target
+from rbxcompose.missions.program.statuses import RUNNING, SUCCESS
+
+
+class Course:
+    """Work under one root. Its time stands still while it is suspended, so that its timers go on with the rest.
+
+    `order` tells who may cut whom: a smaller one cuts a larger one.
+    """
+
+    def __init__(self, order: int) -> None:
+        self.order = order
+        self.root: Task | None = None
+        self.current: Task | None = None  # the root while it runs
+        self.lost = 0.0  # [s] for which the time stood still
+        self.left: float | None = None  # when it was suspended [s]
+
+    def time(self, now: float) -> float:
+        """Return the time of this course [s]."""
+        return now - self.lost
+
+    def tick(self) -> int:
+        """Start the root or go on with it; a reaction without a root is done at once."""
+        root = self.root
+        if root is None:
+            return SUCCESS
+        status = root.start() if self.current is None else root.tick()
+        self.current = root if status == RUNNING else None
+        return status
+
+    def suspend(self, now: float, anew: bool) -> None:
+        """Stop what runs, keep the place and stop the clock."""
+        self.left = now
+        self.cut(anew)
+
+    def cut(self, anew: bool) -> None:
+        """Stop what runs and keep the place; who calls this stops the clock, if it is to be stopped."""
+        if self.current is not None and self.current.suspend(anew):
+            self.current = None
+
+    def resume(self, now: float) -> None:
+        """Let the clock go on."""
+        if self.left is not None:
+            self.lost += now - self.left
+            self.left = None
+
+    def begin_anew(self, target: Target) -> bool:
+        """Let what is named begin again, if it runs here; tell whether it does."""
+        current = self.current
+        if current is None:
+            return False
+        if current.number == target.number and not target.is_round:
+            self.halt()
+            return True
+        return current.restart(target)
+
+    def restart(self) -> None:
+        """Forget an earlier run."""
+        self.current = None
+        self.lost, self.left = 0.0, None
+
+    def halt(self) -> None:
+        """Stop what runs, for good."""
+        if self.current is not None:
+            current, self.current = self.current, None
+            current.halt()
+
+
+class Reaction(Course):
+    """An interrupt: its condition, its course, and what comes afterwards."""
+
+    def __init__(self, order: int, definition: Interrupt, scope: MissionScope) -> None:
+        super().__init__(order)
+        self.name = definition.name
+        self.afterwards = definition.afterwards
+        self.targets = definition.targets
+        self.restarts = definition.restarts.text if definition.restarts else ""  # what the targets are named
+        self.watched = Watched.of(definition.when.expression)
+        self.scope = SinceScope(scope, new_names(definition.when.expression))
+        self.is_armed = True  # it may act: its condition was false since it last did
+        self.trouble = ""  # why the condition had no value when it was last asked
+
+    @property
+    def path(self) -> str:
+        """Return where in the mission it is."""
+        return f"interrupts.{self.name}"
+
+    def holds(self) -> bool:
+        """Ask the condition; raises what an expression may raise."""
+        return holds(self.watched.condition, self.scope)

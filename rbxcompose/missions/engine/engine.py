@@ -1,0 +1,176 @@
+"""The engine runs one mission: single-threaded, pure, told the time, silent while nothing is to be done."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rbxcompose.expressions.values import Value
+from rbxcompose.missions.engine.build import Builder
+from rbxcompose.missions.engine.course import Reaction
+from rbxcompose.missions.engine.engine_base import ROUNDING, EngineBase
+from rbxcompose.missions.engine.events import MissionEnded, Reported
+from rbxcompose.missions.engine.task import Task
+from rbxcompose.missions.engine.world import PLAIN, Settings, World
+from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.program import Program, RobotNames
+from rbxcompose.missions.program.results import Result
+from rbxcompose.missions.program.statuses import FAILURE, IDLE, NAMES, RUNNING, SUCCESS
+
+TICKS_AT_ONCE = 100  # at one instant; then the mission is slowed down to its rate
+
+
+class Engine(EngineBase):
+    """Ticks the tasks of a program.
+
+    `program` is linked: the missions that it uses are part of it, each as often as it is used. At a tick, results that
+    arrived come first, then the interrupts are looked at, then what is on top is ticked; that is done again at the
+    same instant as long as something asks for it.
+    """
+
+    def __init__(
+        self, program: Program, robot: RobotNames, inputs: Mapping[str, Value], world: World, settings: Settings = PLAIN
+    ) -> None:
+        super().__init__(link(program, robot.missions), robot, world, settings)
+        self.status = IDLE  # of the mission
+        self.is_paused = False
+        builder = Builder(self, robot)
+        self.main = builder.run(self.program)
+        self.tasks, self.runs, self._leaves = builder.tasks, builder.runs, builder.leaves
+        self._indexes = {task: index for index, task in enumerate(self.tasks)}
+        self._inputs = dict(inputs)
+        self.instant = -1.0
+        self.ticks = 0  # at this instant
+        self.held_until: float | None = None  # slowed down until then [s]
+        self.named: set[str] = set()  # loops that were reported for not waiting
+
+    # What the shell calls.
+
+    @property
+    def data(self) -> Mapping[str, Value]:
+        """Return the data of the mission, by name."""
+        return self.main.data
+
+    def ended(self, leaf: int, result: Result) -> None:
+        """Take the result of a skill or a call; it counts from the next tick on."""
+        self.arrived.append((leaf, result))
+
+    def tick(self, now: float) -> int:
+        """Do all that is to be done at `now` [s], and return the mission's status."""
+        self.now = now
+        if self.status not in (IDLE, RUNNING) or self.is_paused or self._is_held(now):
+            return self.status
+        if self.status == IDLE:
+            self.status = RUNNING
+            self.main.begin(self._inputs)
+        if now > self.instant:
+            self.instant, self.ticks = now, 0
+        while self.status == RUNNING:
+            self.ticks += 1
+            self._tick_once()
+            if not (self.wants_again or self.arrived):
+                break
+            if self.ticks >= TICKS_AT_ONCE:
+                self._slow_down()
+                break
+        return self.status
+
+    def next_wake(self) -> float | None:
+        """Return when to tick next [s], unless something happens before; None: not by itself."""
+        if self.status != RUNNING or self.is_paused:
+            return None
+        return self.wake if self.held_until is None else self.held_until
+
+    def reads(self) -> frozenset[str]:
+        """Return the names whose new values are worth a tick."""
+        return frozenset(self.reading) if self.status == RUNNING and not self.is_paused else frozenset()
+
+    def pause(self, now: float) -> None:
+        """Halt what runs, and let all timers stand still until `resume`."""
+        if self.status == RUNNING and not self.is_paused:
+            self.now = now
+            self._take_results()
+            self.is_paused = True
+            self.lost -= now
+            self.main.stack[-1].suspend(now, anew=False)
+
+    def resume(self, now: float) -> None:
+        """Go on; the skills that were halted are asked again at the next tick."""
+        if self.is_paused:
+            self.is_paused = False
+            self.lost += now
+            self.main.stack[-1].resume(now)
+
+    def abort(self, now: float) -> None:
+        """Halt what runs, for good."""
+        if self.status == RUNNING:
+            self.now = now
+            self._take_results()
+            self.is_aborting = True
+            self.main.halt()
+            self.status = FAILURE
+            self.world.say(MissionEnded("halted"))
+
+    def index_of(self, task: Task) -> int:
+        """Return the index of a task in `tasks`."""
+        return self._indexes[task]
+
+    # One tick.
+
+    def _tick_once(self) -> None:
+        self.wants_again = self.wake = None
+        self.reading.clear()
+        self._take_results()
+        self.outcome = ""
+        self.time = self.now
+        status = self.main.tick(self.now)
+        if status != RUNNING:
+            self._finish(FAILURE if status == FAILURE else SUCCESS)
+
+    def _take_results(self) -> None:
+        arrived, self.arrived = self.arrived, []
+        for leaf, result in arrived:
+            task = self._leaves[leaf]
+            if task.is_asked:
+                task.ended(result)
+
+    def _finish(self, status: int) -> None:
+        self.status = status
+        message = self._why() if status == FAILURE else self.main.message
+        self.say(MissionEnded(NAMES[status], message, self.outcome or NAMES[status]))
+
+    def _why(self) -> str:
+        """Return the path of the node that made the mission fail, and its reason; an outcome may say it all."""
+        if self.main.ending is not None:
+            return self.main.message
+        course = self.main.failed
+        number = course.root.number if course and course.root else self.program.main
+        while number not in self.reasons:
+            failed = [child for child in self._deciding(number) if self.statuses[child] == FAILURE]
+            if not failed:
+                break
+            number = failed[-1]
+        path, reason = self.program.nodes[number].path, self.reasons.get(number)
+        told = f"{path}: {reason}" if reason else f"{path} failed"
+        if isinstance(course, Reaction):
+            return f"the reaction of '{course.name}' failed: {told}"
+        says_it_all = self.outcome and not reason and number == self.program.main
+        return "" if says_it_all else told
+
+    def _deciding(self, number: int) -> tuple[int, ...]:
+        """Return the children whose failure may be that of a node."""
+        node = self.program.nodes[number]
+        return node.step.branches.deciding(node.children) if node.step.branches else node.children
+
+    def _is_held(self, now: float) -> bool:
+        if self.held_until is not None and self.held_until - now > ROUNDING:
+            return True
+        self.held_until = None
+        return False
+
+    def _slow_down(self) -> None:
+        self.held_until = self.now + 1 / self.program.rate
+        source = self.wants_again
+        path = source.path if source else self.program.nodes[self.program.main].path
+        if path not in self.named:
+            self.named.add(path)
+            self.say(Reported(path, f"does not wait: {TICKS_AT_ONCE} ticks at one instant, slowed down from now on"))

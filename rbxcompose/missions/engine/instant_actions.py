@@ -1,0 +1,96 @@
+"""Small things that a task does at once: sends messages, sets data, logs. Only failing changes a result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from rbxcompose.expressions.evaluate import evaluate
+from rbxcompose.expressions.values import Value
+from rbxcompose.missions.engine.events import Logged, Published
+from rbxcompose.missions.engine.task import Task
+from rbxcompose.missions.language.asked import Assignment
+from rbxcompose.missions.program.messages import Message, Shape
+from rbxcompose.missions.program.moments import Deeds, Moments
+from rbxcompose.missions.program.results import NodeFailed
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.definitions import parse_type
+from rbxcompose.msgs.types import Message as RosMessage
+
+TEXT = "string"
+
+
+def fields_of(sent: Message, message: type[RosMessage], task: Task) -> dict[str, Value]:
+    """Return the fields by name, nested ones as maps; a single value stands for the only field.
+
+    Raises:
+        NodeFailed: if there is no such field.
+    """
+    body = sent.body
+    if body is None:
+        return {}
+    if not isinstance(body, Mapping):
+        if len(message.FIELDS) != 1:
+            raise NodeFailed(f"{message.TYPE} has several fields: name them")
+        body = {next(iter(message.FIELDS)): body}
+    return _fields(body, message, task)
+
+
+def _fields(body: Mapping[str, Shape], message: type[RosMessage], task: Task) -> dict[str, Value]:
+    found: dict[str, Value] = {}
+    for name, shape in body.items():
+        if name not in message.FIELDS:
+            raise NodeFailed(f"{message.TYPE} has no field '{name}'")
+        found[name] = _value(shape, message.FIELDS[name], task)
+    return found
+
+
+def _value(shape: Shape, ros_type: str, task: Task) -> Value:
+    base = parse_type(ros_type).base
+    if isinstance(shape, Mapping):
+        return _fields(shape, registry.message(base), task)
+    if isinstance(shape, tuple):
+        return [_value(one, base, task) for one in shape]
+    if base == TEXT:
+        return task.run.written(shape.template, task.scope)
+    if shape.expression is None:
+        raise NodeFailed(f"'{shape.scalar.text}' is no value of the type {ros_type}")
+    return evaluate(shape.expression, task.scope)
+
+
+def publish(message: Message, task: Task) -> None:
+    """Publish a message; raises what its expressions raise, and ValueError if a field does not fit."""
+    topic = message.target.text
+    fields = fields_of(message, registry.message(task.engine.robot.topics[topic]), task)
+    task.engine.world.publish(topic, fields)
+    task.engine.say(Published(task.number, topic, fields))
+
+
+def assign(assignments: Iterable[Assignment], task: Task) -> None:
+    """Compute all right sides, then set them, and let everyone look once more at what may depend on it."""
+    task.run.data.update({one.name: evaluate(one.asked.expression, task.scope) for one in assignments})
+    task.engine.again(task)
+
+
+def act(moments: Moments, moment: str, task: Task) -> None:
+    """Do what belongs to a moment; raises what its expressions raise, which fails the node."""
+    if moment in moments.deeds:
+        outcome = task.engine.outcome
+        _do(moments.deeds[moment], task)
+        task.engine.outcome = outcome
+
+
+def act_safely(moments: Moments, moment: str, task: Task) -> None:
+    """Do what belongs to a moment at which nothing can fail any more; what goes wrong is reported."""
+    try:
+        act(moments, moment, task)
+    except Exception as error:  # the node is halted anyway
+        task.report(error)
+
+
+def _do(deeds: Deeds, task: Task) -> None:
+    if deeds.assignments:
+        assign(deeds.assignments, task)
+    if deeds.text:
+        task.engine.say(Logged(deeds.level, task.run.filled(deeds.text, task.scope)))
+    if deeds.message:
+        publish(deeds.message, task)

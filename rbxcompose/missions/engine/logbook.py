@@ -1,0 +1,216 @@
+"""The log of a mission: what came in and what it did, as plain records from which it can be run again.
+
+Each record is a map for JSON with `time` [s] of robot time, `mission`, `run` (how often the mission has been run), and
+`event`. What came in are `begin`, `tick` (with what was read and which results arrived), `pause`, `resume`, `abort`;
+all else is what the engine said of it. `replay` gives the same engine the same again.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
+from typing import Any, TypeVar
+
+from rbxcompose.expressions.values import NotArrived, Value
+from rbxcompose.missions.engine.engine import Engine
+from rbxcompose.missions.engine.events import MissionEvent
+from rbxcompose.missions.engine.snapshot import from_plain, to_plain
+from rbxcompose.missions.engine.world import Settings, World
+from rbxcompose.missions.program.program import Program, RobotNames
+from rbxcompose.missions.program.results import Result
+
+BEGIN, TICK, PAUSE, RESUME, ABORT = "begin", "tick", "pause", "resume", "abort"
+INPUTS = frozenset({BEGIN, TICK, PAUSE, RESUME, ABORT})
+
+V = TypeVar("V")
+Record = dict[str, Any]
+Write = Callable[[Record], None]
+_CAPITAL = re.compile(r"(?<!^)(?=[A-Z])")
+
+
+def record_of(event: MissionEvent) -> Record:
+    """Return what an engine said as a record: `SkillStarted` is `skill_started`."""
+    name = _CAPITAL.sub("_", type(event).__name__).lower()
+    return {"event": name, **{one.name: to_plain(getattr(event, one.name)) for one in fields(event)}}
+
+
+class Logged:
+    """A world of which all that is read is written down, around the real one; records of ticks hold what is new."""
+
+    def __init__(self, world: World, write: Write) -> None:
+        self._world, self._write = world, write
+        self._known: dict[str, Any] = {}  # what was read last
+        self._read: dict[str, Any] = {}  # since the last record, and new
+        self._results: list[Any] = []
+
+    def begin(self, inputs: Mapping[str, Value], settings: Settings) -> None:
+        """Write down how the mission begins."""
+        start_at = {str(number): state for number, state in settings.start_at.items()}
+        given = {name: to_plain(value) for name, value in inputs.items()}
+        self._write({"event": BEGIN, "inputs": given, "seed": settings.seed, "start_at": start_at})
+
+    def arrived(self, leaf: int, result: Result) -> None:
+        """Note a result, which counts from the next tick on."""
+        self._results.append([leaf, to_plain(result)])
+
+    def did(self, what: str) -> None:
+        """Write down that something was done with the engine, and what it has read for it."""
+        record: Record = {"event": what}
+        if self._read:
+            record["read"], self._read = self._read, {}
+        if self._results:
+            record["results"], self._results = self._results, []
+        self._write(record)
+
+    def value(self, name: str, /) -> Value | NotArrived:
+        """Return the newest value."""
+        return self._noted(f"value {name}", self._world.value(name))
+
+    def age(self, name: str, /) -> float | NotArrived:
+        """Return the time since the last message [s]."""
+        return self._noted(f"age {name}", self._world.age(name))
+
+    def count(self, name: str, /) -> int:
+        """Return how many messages have come."""
+        return self._noted(f"count {name}", self._world.count(name))
+
+    def _noted(self, key: str, value: V) -> V:
+        read: Any = value
+        plain = to_plain(read)
+        if key not in self._known or self._known[key] != plain:
+            self._known[key] = self._read[key] = plain
+        return value
+
+    def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
+        """Pass it on; what it raises is a result of the leaf as well."""
+        self._tried(leaf, lambda: self._world.start(leaf, skill, arguments))
+
+    def call(self, leaf: int, service: str, request: Mapping[str, Value], /) -> None:
+        """Pass it on, as `start`."""
+        self._tried(leaf, lambda: self._world.call(leaf, service, request))
+
+    def publish(self, topic: str, message: Mapping[str, Value], /) -> None:
+        """Pass it on, as `start`."""
+        self._tried(0, lambda: self._world.publish(topic, message))
+
+    def _tried(self, leaf: int, call: Callable[[], None]) -> None:
+        try:
+            call()
+        except Exception as error:
+            self._read.setdefault("raised", []).append([leaf, type(error).__name__, str(error)])
+            raise
+
+    def halt(self, leaf: int, /) -> None:
+        """Pass it on."""
+        self._world.halt(leaf)
+
+    def pause(self, leaf: int, /) -> None:
+        """Pass it on."""
+        self._world.pause(leaf)
+
+    def resume(self, leaf: int, /) -> None:
+        """Pass it on."""
+        self._world.resume(leaf)
+
+    def say(self, event: MissionEvent, /) -> None:
+        """Write it down, and pass it on."""
+        self._write(record_of(event))
+        self._world.say(event)
+
+
+class ReplayError(ValueError):
+    """Raised when records are no log of a mission from its beginning."""
+
+
+class Played:
+    """The world of a replay: it answers as it did, and writes down what is said."""
+
+    def __init__(self) -> None:
+        self.said: list[Record] = []
+        self.time = 0.0
+        self._known: dict[str, Any] = {}
+        self._raised: list[Any] = []
+
+    def now_reads(self, read: Mapping[str, Any]) -> None:
+        """Answer like this from now on."""
+        self._raised = list(read.get("raised", ()))
+        self._known.update(read)
+
+    def value(self, name: str, /) -> Any:
+        """Return what was read."""
+        return from_plain(self._known[f"value {name}"])
+
+    def age(self, name: str, /) -> Any:
+        """Return what was read."""
+        return from_plain(self._known[f"age {name}"])
+
+    def count(self, name: str, /) -> int:
+        """Return what was read."""
+        return int(self._known[f"count {name}"])
+
+    def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
+        """Raise again what was raised."""
+        self._raise(leaf)
+
+    def call(self, leaf: int, service: str, request: Mapping[str, Value], /) -> None:
+        """Raise again what was raised."""
+        self._raise(leaf)
+
+    def publish(self, topic: str, message: Mapping[str, Value], /) -> None:
+        """Raise again what was raised."""
+        self._raise(0)
+
+    def _raise(self, leaf: int) -> None:
+        if self._raised and self._raised[0][0] == leaf:
+            _, name, text = self._raised.pop(0)
+            raise type(name, (Exception,), {})(text)
+
+    def halt(self, leaf: int, /) -> None:
+        """Nothing is on its way."""
+
+    def pause(self, leaf: int, /) -> None:
+        """Nothing is on its way."""
+
+    def resume(self, leaf: int, /) -> None:
+        """Nothing is on its way."""
+
+    def say(self, event: MissionEvent, /) -> None:
+        """Write it down."""
+        self.said.append({"time": self.time, **record_of(event)})
+
+
+def replay(records: Iterable[Record], program: Program, robot: RobotNames) -> list[Record]:
+    """Run a mission again from its log, and return what it says; that is what it said then, if nothing was changed.
+
+    Raises:
+        ReplayError: if the records do not begin with the beginning of a run.
+    """
+    world, engine = Played(), None
+    for record in records:
+        what = record["event"]
+        world.time = float(record["time"])
+        world.now_reads(record.get("read", {}))
+        if what == BEGIN:
+            inputs = {name: from_plain(value) for name, value in record["inputs"].items()}
+            start_at = {int(number): state for number, state in record["start_at"].items()}
+            engine = Engine(program, robot, inputs, world, Settings(record["seed"], start_at))
+        elif engine is None:
+            raise ReplayError("the log does not begin with the beginning of the mission")
+        elif what in INPUTS:
+            for leaf, result in record.get("results", ()):
+                engine.ended(leaf, from_plain(result))
+            _again(engine, what, world.time)
+    return world.said
+
+
+def _again(engine: Engine, what: str, now: float) -> None:
+    match what:
+        case "tick":
+            engine.tick(now)
+        case "pause":
+            engine.pause(now)
+        case "resume":
+            engine.resume(now)
+        case "abort":
+            engine.abort(now)

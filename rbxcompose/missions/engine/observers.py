@@ -1,0 +1,132 @@
+"""Tasks around a node that change nothing: they count messages from its start, tell its name, let others look."""
+
+from __future__ import annotations
+
+from rbxcompose.missions.engine.events import BranchEnded, NodeEnded, NodeStarted
+from rbxcompose.missions.engine.scopes import SinceScope
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.engine.world import Observer
+from rbxcompose.missions.modifiers.registry import Decorator
+from rbxcompose.missions.program.look import Form
+from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING
+
+
+class Since(Decorator):
+    """Counts messages from the start of its node, around one that asks `new($x)`."""
+
+    __slots__ = ("view",)
+    saved = ("seen",)
+
+    def __init__(self, site: Site, options: SinceScope, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.view = options
+
+    @property
+    def seen(self) -> dict[str, int]:
+        """Return how many messages of each name had come when it started."""
+        return self.view.seen
+
+    @seen.setter
+    def seen(self, seen: dict[str, int]) -> None:
+        self.view.seen = seen
+
+    def begin(self) -> int:
+        """Count from now on."""
+        self.view.mark()
+        return self.advance(self.inner)
+
+
+class Around(Decorator):
+    """Hears when its node starts, ends or is halted; a node that begins anew after an interrupt is halted."""
+
+    __slots__ = ()
+
+    def begin(self) -> int:
+        """Tell that it starts."""
+        self.started()
+        return self.proceed()
+
+    def proceed(self) -> int:
+        """Go on, and tell if it ends."""
+        status = self.advance(self.inner)
+        if status != RUNNING:
+            self.ended(status)
+        return status
+
+    def halt(self) -> None:
+        """Tell that it is halted."""
+        super().halt()
+        self.ended(IDLE)
+
+    def suspend(self, anew: bool) -> bool:
+        """Tell that it is halted, if it begins anew."""
+        is_anew = super().suspend(anew)
+        if is_anew:
+            self.ended(IDLE)
+        return is_anew
+
+    def started(self) -> None:
+        """Hear that the node starts."""
+        raise NotImplementedError
+
+    def ended(self, status: int) -> None:
+        """Hear that the node ended, or was halted (IDLE)."""
+        raise NotImplementedError
+
+    def how(self, status: int) -> str:
+        """Return the word for a status with which the node ends: an outcome of its own, if it has one."""
+        return "halted" if status == IDLE else self.engine.outcome or NAMES[status]
+
+
+class Named(Around):
+    """Says when a node with a name, or a state, starts and ends."""
+
+    __slots__ = ("is_state", "name")
+
+    def __init__(self, site: Site, options: str, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.name = options
+        self.is_state = site.node.step.look.form is Form.STATE
+
+    def started(self) -> None:
+        """Say it."""
+        self.engine.say(NodeStarted(self.number, self.name, self.is_state))
+
+    def ended(self, status: int) -> None:
+        """Say it."""
+        self.engine.say(NodeEnded(self.number, self.name, self.how(status), self.is_state))
+
+
+class Branch(Around):
+    """Says when a branch of a parallel ends; that all of them start is told by what they do first."""
+
+    __slots__ = ("name",)
+
+    def __init__(self, site: Site, options: str, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.name = options
+
+    def started(self) -> None:
+        """Say nothing."""
+
+    def ended(self, status: int) -> None:
+        """Say it."""
+        self.engine.say(BranchEnded(self.number, self.name, self.how(status)))
+
+
+class Observed(Around):
+    """Tells an observer."""
+
+    __slots__ = ("observer",)
+
+    def __init__(self, site: Site, options: Observer, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.observer = options
+
+    def started(self) -> None:
+        """Tell it."""
+        self.observer.started(self.number)
+
+    def ended(self, status: int) -> None:
+        """Tell it."""
+        self.observer.ended(self.number, status, self.engine.outcome)

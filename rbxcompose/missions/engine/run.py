@@ -1,0 +1,172 @@
+"""One run of one mission: its data, what runs and what was cut short, its interrupts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rbxcompose.expressions.values import NOT_ARRIVED, Value
+from rbxcompose.missions.engine.course import Course, Reaction
+from rbxcompose.missions.engine.engine_base import EngineBase
+from rbxcompose.missions.engine.events import InterruptEnded, InterruptStarted, Reported
+from rbxcompose.missions.engine.resume_points import DEEP
+from rbxcompose.missions.engine.run_base import RunBase
+from rbxcompose.missions.program.history import WithHistory
+from rbxcompose.missions.program.program import CONTINUE, END, Program, RobotNames, Target
+from rbxcompose.missions.program.results import words
+from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
+
+STILL_HOLDS = "its condition still holds after its reaction; it can act again once that has been false"
+
+
+class Run(RunBase):
+    """Runs a mission as a whole, or one that another uses: then the times that it is told are those of its caller.
+
+    At a tick the interrupts are looked at, then the course on top is ticked.
+    """
+
+    def __init__(self, engine: EngineBase, program: Program, robot: RobotNames) -> None:
+        super().__init__(engine, program, robot)
+        self.failed: Course | None = None  # what made it fail
+        self.mission = Course(len(program.interrupts))
+        self.reactions = [Reaction(order, one, self.scope) for order, one in enumerate(program.interrupts)]
+        self.stack: list[Course] = [self.mission]  # what was cut short, and on top what runs
+        self.returns: list[tuple[int, ...]] = []  # the leaves that each reaction of the stack halted
+        self.keepers: list[WithHistory] = []  # the tasks of the main node that can keep a place
+
+    def begin(self, inputs: Mapping[str, Value]) -> None:
+        """Start afresh: initial data, nothing runs, every interrupt is armed."""
+        self.inputs.clear()
+        self.inputs.update(inputs)
+        self.data.clear()
+        self.data.update(dict.fromkeys(self.program.saved, NOT_ARRIVED))
+        self.data.update((name, datum.value) for name, datum in self.program.data.items())
+        self.begun += 1
+        self.ending, self.message, self.failed = None, "", None
+        self.begin_again()
+
+    def begin_again(self) -> None:
+        """Start where the nodes are that keep their place, with the data as they are."""
+        self.stack[:], self.returns[:] = [self.mission], []
+        for course in (self.mission, *self.reactions):
+            course.restart()
+        for reaction in self.reactions:
+            reaction.is_armed = True
+            reaction.scope.mark()
+
+    def tick(self, now: float) -> int:
+        """Look at the interrupts, then go on with the course on top; return the status of the mission."""
+        self._look(now)
+        course, outer = self.stack[-1], self.engine.time
+        self.engine.time = course.time(now)
+        status = course.tick()
+        self.engine.time = outer
+        if self.ending is not None or course is not self.mission:
+            self.engine.outcome = ""  # only the mission proper may end with an outcome of its own
+        if self.ending is not None:
+            return self._finish(course, self.ending)
+        if status == RUNNING:
+            return RUNNING
+        if isinstance(course, Reaction) and status != FAILURE:
+            return self._go_on(course, now)
+        return self._finish(course, status)
+
+    def halt(self) -> None:
+        """Stop what runs, for good."""
+        for course in reversed(self.stack):
+            course.halt()
+        self.stack[:], self.returns[:] = [self.mission], []
+
+    def suspend(self, anew: bool) -> None:
+        """Stop the leaves that run, and keep the place."""
+        self.stack[-1].cut(anew)
+
+    def main_tasks(self) -> list[WithHistory]:
+        """Return the tasks of the main node that can keep a place."""
+        return self.keepers
+
+    def _look(self, now: float) -> None:
+        """Look at the interrupts: the first that holds, and may, cuts what runs."""
+        highest = self.stack[-1].order
+        chosen: Reaction | None = None
+        for reaction in self.reactions:
+            self.engine.watch(reaction.watched)
+            if not self._holds(reaction):
+                reaction.is_armed = True
+            elif reaction.is_armed and chosen is None and reaction.order < highest:
+                chosen = reaction
+        if chosen:
+            self._cut(chosen, now)
+
+    def _holds(self, reaction: Reaction) -> bool:
+        try:
+            holding, trouble = reaction.holds(), ""
+        except Exception as error:  # a condition without a value does not hold
+            holding, trouble = False, words(error)
+        if trouble and trouble != reaction.trouble:
+            self.engine.say(Reported(reaction.path, trouble))
+        reaction.trouble = trouble
+        return holding
+
+    def _cut(self, reaction: Reaction, now: float) -> None:
+        reaction.is_armed = False
+        condition, world = reaction.watched.condition, self.engine.world
+        robot_values = {one.name: world.value(one.name) for one in condition.names if self._is_robots(one.name)}
+        shown = {name: self.show(name, value) for name, value in robot_values.items()}
+        self.engine.say(InterruptStarted(reaction.name, condition.text, shown))
+        reaction.scope.mark()
+        reaction.restart()
+        self.engine.cut_short = []
+        self.engine.restarting = reaction.targets
+        self.stack[-1].suspend(now, anew=True)
+        self.engine.restarting = ()
+        self.stack.append(reaction)
+        self.returns.append(tuple(self.engine.cut_short))
+
+    def _is_robots(self, name: str) -> bool:
+        return name not in self.data and name not in self.inputs
+
+    def _go_on(self, reaction: Reaction, now: float) -> int:
+        """Do what comes after a reaction; what was cut short goes on after another look at the interrupts."""
+        if reaction.afterwards == END:
+            return self._finish(self.mission, SUCCESS)
+        self.stack.pop()
+        back, afterwards, anew = self.returns.pop(), reaction.afterwards, ""
+        if afterwards == CONTINUE or reaction.targets:
+            self.stack[-1].resume(now)
+            if self._begin_anew(reaction.targets):
+                anew = reaction.restarts
+            else:
+                afterwards = CONTINUE
+        else:
+            self.halt()
+            for root in (self.program.main, *(one.root for one in self.program.interrupts if one.root is not None)):
+                self.engine.places.forget(root, self.engine.program.nodes[root].end)
+            self.begin(dict(self.inputs))
+            reaction.is_armed = False
+        self.engine.say(InterruptEnded(reaction.name, afterwards, back, anew))
+        if not reaction.is_armed and self._holds(reaction):
+            self.engine.say(Reported(reaction.path, STILL_HOLDS))
+        self.engine.again(reaction)
+        return RUNNING
+
+    def _begin_anew(self, targets: tuple[Target, ...]) -> bool:
+        """Let what is named begin again wherever it runs; tell whether it runs anywhere."""
+        has_begun = False
+        for target in targets:
+            for course in self.stack:
+                if course.begin_anew(target):
+                    has_begun = True
+                    if not target.is_round:
+                        self._forget_place_of(target.number)
+        return has_begun
+
+    def _forget_place_of(self, number: int) -> None:
+        """Forget where a node was that is to begin anew; those inside it keep the places of histories of their own."""
+        node = self.engine.program.nodes[number]
+        is_deep = node.step.history == DEEP
+        self.engine.places.forget(number, node.end if is_deep else number + 1)
+
+    def _finish(self, course: Course, status: int) -> int:
+        self.halt()
+        self.failed = course if status == FAILURE else None
+        return FAILURE if status == FAILURE else SUCCESS

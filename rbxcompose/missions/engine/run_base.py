@@ -1,0 +1,74 @@
+"""One run of one mission as its tasks see it: its data, how texts are filled, how it is ended."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
+
+from rbxcompose.expressions.text import Template, fill
+from rbxcompose.expressions.types import Type
+from rbxcompose.expressions.values import Value
+from rbxcompose.missions.engine import value_text
+from rbxcompose.missions.engine.engine_base import EngineBase
+from rbxcompose.missions.engine.resume_points import Placed
+from rbxcompose.missions.engine.scopes import MissionScope, RunScope
+from rbxcompose.missions.program.program import Program, RobotNames
+
+
+class RunBase(ABC):
+    """What tasks know of the run of their mission, and a `use` of that of another one.
+
+    `begun` counts how often it began.
+    """
+
+    def __init__(self, engine: EngineBase, program: Program, robot: RobotNames) -> None:
+        self.engine = engine
+        self.program = program
+        self.data: dict[str, Value] = {}
+        self.inputs: dict[str, Value] = {}
+        self.scope = RunScope(self.data, self.inputs, robot.places, engine.world)
+        self.begun = 0
+        self.ending: int | None = None  # the status with which an `end` node ends it
+        self.message = ""  # of that node
+        self._types: dict[str, Type] = {
+            **robot.values,
+            **{name: one.type for name, one in program.inputs.items()},
+            **{name: datum.type for name, datum in program.data.items()},
+        }
+
+    def show(self, name: str, value: Value) -> str:
+        """Write the value of a name for people."""
+        return value_text.show_briefly(self._types.get(name), value)
+
+    def filled(self, template: Template, scope: MissionScope) -> str:
+        """Return a text for people with its values: names of places have no underscores there."""
+        places = self.engine.robot.places
+        return fill(template, scope, lambda name, value: self.show(name, value_text.spoken(value, places)))
+
+    def written(self, template: Template, scope: MissionScope) -> str:
+        """Return a text for programs with its values: what was written down as a text stays as it is."""
+        return fill(template, scope, self.show)
+
+    @abstractmethod
+    def begin(self, inputs: Mapping[str, Value]) -> None:
+        """Start afresh: initial data, nothing runs, every interrupt is armed."""
+
+    @abstractmethod
+    def begin_again(self) -> None:
+        """Start where the nodes are that keep their place, with the data as they are."""
+
+    @abstractmethod
+    def tick(self, now: float) -> int:
+        """Look at the interrupts, then go on with the course on top; return the status of the mission."""
+
+    @abstractmethod
+    def halt(self) -> None:
+        """Stop what runs, for good."""
+
+    @abstractmethod
+    def suspend(self, anew: bool) -> None:
+        """Stop the leaves that run, and keep the place."""
+
+    @abstractmethod
+    def main_tasks(self) -> Iterable[Placed]:
+        """Return the tasks of the main node that can keep a place."""

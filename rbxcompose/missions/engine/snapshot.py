@@ -1,0 +1,166 @@
+"""The state of an engine as plain data, and back: what was saved at a tick goes on from there in the same way.
+
+An engine is restored into one that was made from the same program, robot and settings. What runs outside (skills that
+were asked) is the business of its world.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from rbxcompose.config import Place
+from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
+from rbxcompose.geometry import Pose2
+from rbxcompose.missions.analysis.held_nodes import HeldNode
+from rbxcompose.missions.engine.course import Course
+from rbxcompose.missions.engine.engine import Engine
+from rbxcompose.missions.engine.run import Run
+from rbxcompose.missions.engine.task import Task
+from rbxcompose.missions.program.results import Result
+
+VERSION = 2
+_CLASSES: Mapping[str, type[Any]] = {cls.__name__: cls for cls in (Place, Pose2, HeldNode, Result)}
+_ENGINE = (
+    "status",
+    "outcome",
+    "now",
+    "time",
+    "lost",
+    "is_paused",
+    "draws",
+    "held_until",
+    "instant",
+    "ticks",
+    "wake",
+)
+_RUN = ("begun", "ending", "message")
+_COURSE = ("lost", "left")
+
+
+class NoSnapshot(ValueError):  # noqa: N818 - told to who gives the data
+    """Raised when data are no snapshot of this mission."""
+
+
+def save(engine: Engine) -> dict[str, Any]:
+    """Return the state of an engine between two ticks, as data that JSON can hold."""
+    return {
+        "version": VERSION,
+        "nodes": len(engine.statuses),
+        "mission": engine.program.name,
+        "statuses": list(engine.statuses),
+        "engine": {name: to_plain(getattr(engine, name)) for name in _ENGINE},
+        "named": sorted(engine.named),
+        "reads": sorted(engine.reading),
+        "reasons": [[number, reason] for number, reason in sorted(engine.reasons.items())],
+        "arrived": [[leaf, to_plain(result)] for leaf, result in engine.arrived],
+        "kept": sorted(index for index, task in enumerate(engine.tasks) if task in engine.places.kept),
+        "tasks": [_task(task, engine) for task in engine.tasks],
+        "runs": [_run(run) for run in engine.runs],
+    }
+
+
+def restore(engine: Engine, saved: Mapping[str, Any]) -> None:
+    """Bring an engine into a state that was saved.
+
+    Raises:
+        NoSnapshot: if the data are of another version or mission.
+    """
+    if saved.get("version") != VERSION:
+        raise NoSnapshot(f"a snapshot of version {saved.get('version')!r}; this is version {VERSION}")
+    if saved["mission"] != engine.program.name or saved["nodes"] != len(engine.statuses):
+        raise NoSnapshot(f"a snapshot of another mission than '{engine.program.name}', or of another version of it")
+    engine.statuses[:] = saved["statuses"]
+    for name in _ENGINE:
+        setattr(engine, name, from_plain(saved["engine"][name]))
+    engine.named, engine.reading = set(saved["named"]), set(saved["reads"])
+    engine.reasons = dict(saved["reasons"])
+    engine.arrived = [(leaf, from_plain(result)) for leaf, result in saved["arrived"]]
+    engine.places.kept = {engine.tasks[index] for index in saved["kept"]}
+    for run, state in zip(engine.runs, saved["runs"], strict=True):
+        _restore_run(run, state)
+    for task, state in zip(engine.tasks, saved["tasks"], strict=True):
+        task.current = None if state[0] is None else engine.tasks[state[0]]
+        for name, value in zip(task.saved, state[1:], strict=True):
+            setattr(task, name, from_plain(value))
+        task.restored()
+
+
+def _task(task: Task, engine: Engine) -> list[Any]:
+    current = None if task.current is None else engine.index_of(task.current)
+    return [current, *(to_plain(getattr(task, name)) for name in task.saved)]
+
+
+def _run(run: Run) -> dict[str, Any]:
+    courses: list[Course] = [run.mission, *run.reactions]
+    return {
+        **{name: getattr(run, name) for name in _RUN},
+        "data": to_plain(run.data),
+        "inputs": to_plain(run.inputs),
+        "stack": [courses.index(course) for course in run.stack],
+        "returns": [list(leaves) for leaves in run.returns],
+        "courses": [[course.current is not None, *(getattr(course, name) for name in _COURSE)] for course in courses],
+        "reactions": [[one.is_armed, one.trouble, dict(one.scope.seen)] for one in run.reactions],
+    }
+
+
+def _restore_run(run: Run, state: Mapping[str, Any]) -> None:
+    courses: list[Course] = [run.mission, *run.reactions]
+    for name in _RUN:
+        setattr(run, name, state[name])
+    for held, name in ((run.data, "data"), (run.inputs, "inputs")):
+        held.clear()
+        held.update(_mapping(from_plain(state[name])))
+    run.stack[:] = [courses[index] for index in state["stack"]]
+    run.returns[:] = [tuple(leaves) for leaves in state["returns"]]
+    for course, (runs, lost, left) in zip(courses, state["courses"], strict=True):
+        course.current, course.lost, course.left = course.root if runs else None, lost, left
+    for reaction, (is_armed, trouble, seen) in zip(run.reactions, state["reactions"], strict=True):
+        reaction.is_armed, reaction.trouble, reaction.scope.seen = is_armed, trouble, dict(seen)
+
+
+def _mapping(value: Value) -> Mapping[str, Value]:
+    return value if isinstance(value, Mapping) else {}
+
+
+def to_plain(value: Value | NotArrived) -> Any:
+    """Return a value as JSON: what JSON does not know is a map of one entry, the name of its class."""
+    match value:
+        case None | bool() | str() | int():
+            return value
+        case float():
+            return value if math.isfinite(value) else {"number": str(value)}
+        case list():
+            return [to_plain(item) for item in value]
+        case tuple():
+            return {"tuple": [to_plain(item) for item in value]}
+        case Mapping():
+            return {"map": {str(key): to_plain(entry) for key, entry in value.items()}}
+    if value is NOT_ARRIVED:
+        return {"missing": True}
+    name = type(value).__name__
+    if name not in _CLASSES:
+        raise TypeError(f"a mission cannot save a value of the type {name}")
+    made: Any = value
+    return {name: {field.name: to_plain(getattr(made, field.name)) for field in fields(made)}}
+
+
+def from_plain(plain: Any) -> Any:
+    """Return the value that `to_plain` wrote."""
+    match plain:
+        case {"number": str(text)}:
+            return float(text)
+        case {"tuple": list(items)}:
+            return tuple(from_plain(item) for item in items)
+        case {"map": dict(entries)}:
+            return {key: from_plain(entry) for key, entry in entries.items()}
+        case {"missing": True}:
+            return NOT_ARRIVED
+        case dict() if plain:
+            name, entries = next(iter(plain.items()))
+            return _CLASSES[name](**{key: from_plain(entry) for key, entry in entries.items()})
+        case list():
+            return [from_plain(item) for item in plain]
+    return plain

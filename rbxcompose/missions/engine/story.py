@@ -1,0 +1,107 @@
+"""The story of a mission: one line of text per event, and how often each skill ran with which result."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import assert_never
+
+from rbxcompose.expressions.values import Place, Value
+from rbxcompose.levels import Level
+from rbxcompose.missions.engine.events import (
+    BranchEnded,
+    InterruptEnded,
+    InterruptStarted,
+    Logged,
+    MissionEnded,
+    MissionEvent,
+    NodeEnded,
+    NodeStarted,
+    Published,
+    Reported,
+    SkillEnded,
+    SkillStarted,
+    Transition,
+)
+from rbxcompose.missions.engine.value_text import show
+from rbxcompose.missions.program.program import RESTART, Skill
+from rbxcompose.units import format_number
+
+LEVELS = {"info": Level.OK, "warn": Level.WARN, "error": Level.ERROR}
+RESULTS = {"success": Level.OK, "halted": Level.OK, "failure": Level.WARN}
+
+
+class Story:
+    """Tells the story of one mission."""
+
+    def __init__(self, mission: str, skills: Mapping[str, Skill]) -> None:
+        self._mission = mission
+        self._skills = skills
+        self._labels: dict[int, str] = {}  # what each leaf did last: `go_to corner_1`
+        self._results: dict[str, Counter[str]] = {}
+
+    def tell(self, event: MissionEvent) -> tuple[Level, str]:
+        """Return the line for an event, empty for one that others tell as well, and how bad it is."""
+        match event:
+            case SkillStarted(leaf=leaf, skill=skill, arguments=arguments):
+                self._labels[leaf] = " ".join([skill, *self._written(skill, arguments)])
+                return Level.OK, self._labels[leaf]
+            case SkillEnded(leaf=leaf, skill=skill, result=result, duration=duration, message=message):
+                self._results.setdefault(skill, Counter())[result] += 1
+                text = f"{self._labels[leaf]}: {result} ({format_number(round(duration, 1))} s)"
+                return RESULTS.get(result, Level.OK), _with(text, message)
+            case InterruptStarted(name=name, condition=condition, shown=shown):
+                values = ", ".join(f"{name} {value}" for name, value in shown.items())
+                return Level.OK, f"interrupt {name}: {condition}" + (f" ({values})" if values else "")
+            case InterruptEnded(name=name, afterwards=afterwards, back_to=leaves, anew=anew):
+                back = " and ".join(self._labels[leaf] for leaf in leaves if leaf in self._labels)
+                return Level.OK, f"interrupt {name} done" + _afterwards(afterwards, back, anew)
+            case NodeStarted(name=name, is_state=is_state):
+                return Level.OK, f"state {name}" if is_state else f"{name} begins"
+            case NodeEnded(name=name, result=result, is_state=is_state):
+                return Level.OK, "" if is_state else f"{name}: {result}"
+            case BranchEnded(name=name, result=result):
+                return Level.OK, f"branch {name}: {result}"
+            case Transition(state=state, outcome=outcome, to=to):
+                return Level.OK, f"{state}: {outcome}, on to {to}"
+            case Published(topic=topic, fields=fields):
+                return Level.OK, f"published on {topic}: {show(None, fields)}"
+            case Logged(level=level, text=text):
+                return LEVELS[level], text
+            case Reported(path=path, message=message):
+                return Level.WARN, f"{path}: {message}"
+            case MissionEnded(result=result):
+                text = f"mission {self._mission}: {result}"
+                return Level.ERROR if result == "failure" else Level.OK, _with(text, event.words)
+        assert_never(event)
+
+    def skills(self) -> str:
+        """Return how often each skill ended how: `go_to 12 (11 success, 1 failure), recharge 1 (1 success)`."""
+        counted = []
+        for skill, results in self._results.items():
+            each = ", ".join(f"{results[result]} {result}" for result in sorted(results, key=_usual_first))
+            counted.append(f"{skill} {results.total()} ({each})")
+        return ", ".join(counted)
+
+    def _written(self, name: str, arguments: Mapping[str, Value]) -> list[str]:
+        skill = self._skills[name]
+        texts = []
+        for argument, value in arguments.items():
+            text = value.name if isinstance(value, Place) else show(skill.arguments.get(argument), value)
+            texts.append(text if argument == skill.main else f"{argument} {text}")
+        return texts
+
+
+def _usual_first(result: str) -> tuple[int, str]:
+    usual = list(RESULTS)
+    return (usual.index(result) if result in usual else len(usual), result)
+
+
+def _afterwards(afterwards: str, back: str, anew: str) -> str:
+    if afterwards == RESTART:
+        return f", {anew or 'the mission'} begins anew"
+    return f", back to {back}" if back else ""
+
+
+def _with(text: str, message: str) -> str:
+    return f"{text}: {message}" if message else text

@@ -1,0 +1,187 @@
+"""A task is the running side of a mission node: started, ticked while it runs, halted or suspended from above."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rbxcompose.expressions.evaluate import evaluate
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.values import Value
+from rbxcompose.missions.engine.engine_base import EngineBase
+from rbxcompose.missions.engine.events import Reported
+from rbxcompose.missions.engine.run_base import RunBase
+from rbxcompose.missions.engine.scopes import ItemScope, MissionScope
+from rbxcompose.missions.program.program import Node, Target
+from rbxcompose.missions.program.results import NodeFailed, words
+from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """What a task is made from: the engine, the run of its mission, its node, what its expressions see, those below.
+
+    `item` is what the tasks below see of a loop, for a node that has one; `inner` is the run of the mission that a
+    `use` runs.
+    """
+
+    engine: EngineBase
+    run: RunBase
+    node: Node
+    scope: MissionScope
+    children: tuple[Task, ...] = ()
+    item: ItemScope | None = None
+    inner: RunBase | None = None
+
+
+class Task(ABC):
+    """The running side of a node; kinds fill in `begin` and, if they take time, `proceed`.
+
+    `current` is the task below that runs now. A task without one goes on by starting the child that it was at, so
+    that a child which was suspended to begin anew needs no further bookkeeping. `saved` are the names of what else
+    makes up its state.
+    """
+
+    __slots__ = ("current", "end", "engine", "number", "run", "scope", "statuses")
+    saved: ClassVar[tuple[str, ...]] = ()
+    times: ClassVar[tuple[str, ...]] = ()  # those of them that are times [s]
+    fresh: ClassVar[tuple[str, ...]] = ()  # those that mean nothing before the next start, which computes them
+    told: ClassVar[tuple[str, ...]] = ()  # those that change nothing but what is told
+
+    def __init__(self, site: Site) -> None:
+        self.engine = site.engine
+        self.run = site.run
+        self.number = site.node.number
+        self.end = site.node.end
+        self.scope = site.scope
+        self.statuses = site.engine.statuses
+        self.current: Task | None = None
+
+    def start(self) -> int:
+        """Begin, and return the status after the first tick."""
+        if self.engine.reasons:
+            self.engine.reasons.pop(self.number, None)  # of an earlier run
+        try:
+            status = self.begin()
+        except Exception as error:  # whatever a leaf does wrong ends its node, not the engine
+            status = self._broken(error)
+        self.statuses[self.number] = status
+        return status
+
+    def tick(self) -> int:
+        """Go on, and return the status; only for a task that runs."""
+        try:
+            status = self.proceed()
+        except Exception as error:
+            status = self._broken(error)
+        self.statuses[self.number] = status
+        return status
+
+    def halt(self) -> None:
+        """Stop what runs here and below; only for a task that runs."""
+        self.statuses[self.number] = IDLE
+        self.engine.places.leave(self)
+        self.halt_below()
+
+    def halt_below(self) -> None:
+        """Stop what runs below."""
+        child = self.current
+        if child is not None:
+            self.current = None
+            child.halt()
+
+    def suspend(self, anew: bool) -> bool:
+        """Stop the leaves that run, keep the place, and tell whether this task is to be started again for that.
+
+        With `anew`, a leaf and its modifiers begin again from the start, as after an interrupt; without it, as after
+        a pause, a leaf repeats only what it asked of the robot.
+        """
+        child = self.current
+        if child is not None and child.suspend(anew):
+            self.current = None
+        return False
+
+    def restart(self, target: Target) -> bool:
+        """Let what is named begin again, if it runs below; tell whether it does."""
+        child = self.current
+        if child is None:
+            return False
+        if child.number == target.number and not target.is_round and self.number != target.number:
+            self.current = None
+            child.halt()
+            return True
+        return child.restart(target)
+
+    def restored(self) -> None:  # noqa: B027 - most kinds have nothing to do
+        """Bring in order what follows from the state, after it was restored."""
+
+    def result(self) -> Value:
+        """Return what `save` keeps of this node."""
+        return None
+
+    @abstractmethod
+    def begin(self) -> int:
+        """Do the first tick."""
+
+    def proceed(self) -> int:
+        """Do one more tick."""
+        raise NotImplementedError(f"{type(self).__name__} ends with its first tick")
+
+    def advance(self, child: Task) -> int:
+        """Start the child or go on with it, and return its status."""
+        status = child.start() if self.current is None else child.tick()
+        self.current = child if status == RUNNING else None
+        return status
+
+    def forget(self) -> None:
+        """Set the statuses of the nodes below to idle, before they run once more."""
+        first = self.number + 1
+        self.statuses[first : self.end] = [IDLE] * (self.end - first)
+
+    def number_of(self, expression: Expression, what: str) -> float:
+        """Return the value of an expression that must be a number from 0 on.
+
+        Raises:
+            NodeFailed: if it is none.
+        """
+        value = evaluate(expression, self.scope)
+        if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
+            raise NodeFailed(f"{what} must be a number from 0 on, not {self.run.show('', value)}")
+        return value
+
+    def count_of(self, expression: Expression, what: str) -> int:
+        """Return the value of an expression that must be a whole number from 0 on.
+
+        Raises:
+            NodeFailed: if it is none.
+        """
+        value = self.number_of(expression, what)
+        if value != int(value):
+            raise NodeFailed(f"{what} must be a whole number, not {self.run.show('', value)}")
+        return int(value)
+
+    @property
+    def path(self) -> str:
+        """Return where in the mission it is."""
+        return self.engine.program.nodes[self.number].path
+
+    def cut(self, because: str) -> None:
+        """Stop what runs below, since this task fails, and keep the reason."""
+        engine = self.engine
+        engine.reasons[self.number] = engine.because = because
+        self.halt_below()
+        engine.because = engine.outcome = ""
+
+    def report(self, error: Exception) -> None:
+        """Tell why this task cannot go on."""
+        message = words(error)
+        self.engine.reasons[self.number] = message
+        self.engine.say(Reported(self.path, message))
+
+    def _broken(self, error: Exception) -> int:
+        self.halt_below()
+        self.engine.places.forget(self.number, self.end)
+        self.engine.outcome = ""
+        self.report(error)
+        return FAILURE

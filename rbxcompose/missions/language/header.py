@@ -1,0 +1,122 @@
+"""What stands beside the nodes of a mission: its inputs, its data, its rate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rbxcompose.expressions.types import TYPES, Type, choice_of
+from rbxcompose.findings import Report
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.missions import codes
+from rbxcompose.missions.engine.value_text import show
+from rbxcompose.missions.language.literals import WrongValue, literal, typed
+from rbxcompose.missions.language.names import NAME, no_name
+from rbxcompose.missions.program.program import RATE, Datum, Input
+from rbxcompose.missions.program.registry import kinds
+
+INPUT_KEYS = ("type", "default", "min", "max", "choices", "about")
+CHOICE = "choice"
+FASTEST = 1000.0  # [Hz]
+
+
+def read_data(node: Node | None, report: Report) -> dict[str, Datum]:
+    """Return the initial values under `data:`."""
+    entries = _named(node, "data", report)
+    return {name: replace(literal(entry.value), span=entry.key.span) for name, entry in entries.items()}
+
+
+def read_inputs(node: Node | None, report: Report) -> dict[str, Input]:
+    """Return the inputs under `inputs:`; one whose type cannot be read is left out."""
+    read = (_input(name, entry, report) for name, entry in _named(node, "inputs", report).items())
+    return {one.name: one for one in read if one}
+
+
+def read_rate(node: Node | None, report: Report) -> float:
+    """Return how often conditions are asked that nothing announces [Hz]."""
+    rate = _value(node, TYPES["frequency"], "'rate'", report) if node else None
+    if not rate or not isinstance(rate.value, float):
+        return RATE
+    if not 0 < rate.value <= FASTEST:
+        report.add(codes.WRONG_TYPE.at(rate.span, f"'rate' must be above 0 and at most {FASTEST:.0f} Hz"))
+        return RATE
+    return rate.value
+
+
+def _named(node: Node | None, section: str, report: Report) -> dict[str, Entry]:
+    """Return the entries of a section whose names may stand in expressions."""
+    if node is None or (isinstance(node, Scalar) and node.plain and not node.text):
+        return {}
+    if not isinstance(node, Mapping):
+        report.add(codes.WRONG_SHAPE.at(node.span, f"'{section}' needs names with their values below it"))
+        return {}
+    for name, entry in node.entries.items():
+        if not NAME.fullmatch(name):
+            report.add(no_name(entry.key))
+        elif name in kinds():
+            report.add(codes.NAME_CLASH.at(entry.key.span, f"'{name}' is a word of the language"))
+    return node.entries
+
+
+def _input(name: str, entry: Entry, report: Report) -> Input | None:
+    value, place = entry.value, entry.key.span
+    if not isinstance(value, Mapping):
+        message = f"the input '{name}' needs its 'type' below it"
+        report.add(codes.WRONG_SHAPE.at(value.span, message, help="give 'type' and perhaps 'default'"))
+        return None
+    for key, unknown in value.entries.items():
+        if key not in INPUT_KEYS:
+            message, taken = f"unknown key '{key}' in the input '{name}'", value.entries
+            report.add(
+                codes.UNKNOWN_KEY.misspelt(unknown.key.span, message, key, INPUT_KEYS, "keys of an input", taken=taken)
+            )
+    if (wanted := _type(name, value, entry, report)) is None:
+        return None
+    default, least, most = (_value(value.get(key), wanted, f"'{key}'", report) for key in ("default", "min", "max"))
+    read = Input(name, wanted, place, default, _number(least), _number(most))
+    if default and (trouble := range_trouble(read, default)):
+        report.add(codes.WRONG_TYPE.at(default.span, f"the default of '{name}' {trouble}"))
+    return read
+
+
+def _type(name: str, value: Mapping, entry: Entry, report: Report) -> Type | None:
+    word = value.get("type")
+    if not isinstance(word, Scalar):
+        report.add(codes.MISSING.at(word.span if word else entry.key.span, f"the input '{name}' needs a 'type'"))
+        return None
+    if word.text == CHOICE:
+        choices = value.get("choices")
+        if isinstance(choices, Sequence) and choices.items:
+            return choice_of(*(item.text for item in choices.items if isinstance(item, Scalar)))
+        report.add(codes.MISSING.at(entry.key.span, f"the input '{name}' needs 'choices': a list of words"))
+        return None
+    if word.text not in TYPES:
+        message = f"unknown type '{word.text}'"
+        report.add(codes.NOT_A_CHOICE.misspelt(word.span, message, word.text, (*TYPES, CHOICE), "types"))
+        return None
+    return TYPES[word.text]
+
+
+def _value(node: Node | None, wanted: Type, what: str, report: Report) -> Datum | None:
+    if node is None:
+        return None
+    try:
+        return typed(node, wanted)
+    except WrongValue as error:
+        report.add(codes.WRONG_TYPE.at(node.span, f"{what} {error.message}", label=error.label, help=error.help))
+        return None
+
+
+def _number(datum: Datum | None) -> float | None:
+    return datum.value if datum and isinstance(datum.value, float) else None
+
+
+def range_trouble(declared: Input, given: Datum) -> str:
+    """Return why a value is out of the range of its input, in words after its name; else nothing."""
+    value = given.value
+    if not isinstance(value, float):
+        return ""
+    if declared.least is not None and value < declared.least:
+        return f"is below its 'min' of {show(declared.type, declared.least)}: {show(declared.type, value)}"
+    if declared.most is not None and value > declared.most:
+        return f"is above its 'max' of {show(declared.type, declared.most)}: {show(declared.type, value)}"
+    return ""

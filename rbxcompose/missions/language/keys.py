@@ -1,0 +1,33 @@
+"""Which key of a step says what it is: the word of a kind, or the name of a skill."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from rbxcompose.manifest.tree import Mapping
+from rbxcompose.missions import codes
+from rbxcompose.missions.language.grammar import is_told
+from rbxcompose.missions.language.value_reader import Nodes
+from rbxcompose.missions.modifiers.registry import modifier_keys
+from rbxcompose.missions.program.registry import Kind, kinds
+
+
+@cache
+def anywhere() -> tuple[str, ...]:
+    """Return the keys that any node may have."""
+    return ("name", *modifier_keys())
+
+
+def find_key(step: Mapping, nodes: Nodes) -> tuple[str, Kind | None]:
+    """Return the key of a step and its kind; None for a skill, an empty key and a finding if there is neither."""
+    if is_told(step):
+        return "", None
+    own = [key for key in step.entries if key not in anywhere()]
+    key = next((key for key in own if key in kinds()), own[0] if own else "")
+    if not own:
+        help_text = "a step is a word such as 'sequence' or 'wait', or the name of a skill"
+        nodes.add(codes.WRONG_SHAPE.at(step.span, "there is no step here", help=help_text))
+    elif not key.strip():
+        nodes.add(codes.MISSING.at(step.entries[key].key.span, "a step is missing here"))
+        return "", None
+    return key, kinds().get(key)

@@ -1,0 +1,115 @@
+"""Values that are written down in a manifest: free ones (data) and ones of a declared type (inputs)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rbxcompose.expressions.types import (
+    COUNT,
+    FLAG,
+    TEXT,
+    UNKNOWN,
+    Type,
+    TypeKind,
+    list_of,
+    map_of,
+    quantity_of,
+)
+from rbxcompose.expressions.values import Value
+from rbxcompose.findings import suggest
+from rbxcompose.manifest.scalars import describe, plain_value
+from rbxcompose.manifest.tree import Mapping, Node, Scalar, Sequence
+from rbxcompose.missions.program.program import Datum
+from rbxcompose.units import NUMBER, Quantity, UnitError, parse_quantity, to_si
+
+
+class WrongValue(ValueError):  # noqa: N818 - a user's mistake, told apart from errors of ours
+    """Raised when a value is not of its type; `label` says what it is instead, `help` what to do."""
+
+    def __init__(self, message: str, *, label: str = "", help: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.label = label
+        self.help = help
+
+
+def literal(node: Node) -> Datum:
+    """Return what a node writes down: a number in SI, a flag, a text, a list or a map of these."""
+    match node:
+        case Mapping(entries=entries):
+            values = {name: literal(entry.value) for name, entry in entries.items()}
+            return Datum({name: one.value for name, one in values.items()}, map_of(_common(values.values())), node.span)
+        case Sequence(items=items):
+            read = [literal(item) for item in items]
+            return Datum([one.value for one in read], list_of(_common(read)), node.span)
+        case Scalar():
+            value = node.filled if node.filled is not None else _measured(node)
+            return Datum(*_typed(value), node.span)
+
+
+def typed(node: Node, wanted: Type) -> Datum:
+    """Return what a node writes down, as a value of the type `wanted`; places stay texts.
+
+    Raises:
+        WrongValue: if it is none.
+    """
+    if wanted.kind in (TypeKind.LIST, TypeKind.MAP):
+        found = literal(node)
+        if found.type.kind is not wanted.kind:
+            raise WrongValue(f"must be {wanted.phrase}", label=f"this is {found.type.phrase}")
+        return found
+    if not isinstance(node, Scalar):
+        raise WrongValue(f"must be {wanted.phrase}", label=describe([] if isinstance(node, Sequence) else {}))
+    return Datum(_scalar(node, wanted), wanted, node.span)
+
+
+def _scalar(scalar: Scalar, wanted: Type) -> Value:
+    value = plain_value(scalar) if scalar.filled is None else scalar.filled
+    label = "" if isinstance(value, Quantity) else describe(value)
+    if wanted.dimension:
+        try:
+            return to_si(value, wanted.dimension)
+        except UnitError as error:
+            raise WrongValue(error.message, label=error.detail or label, help=error.help) from None
+    if wanted.kind is TypeKind.COUNT:
+        count = value.value if isinstance(value, Quantity) else value
+        if isinstance(count, bool) or not isinstance(count, int | float) or count < 0 or count != int(count):
+            raise WrongValue("must be a whole number from 0 on", label=label)
+        return float(count)
+    if wanted.kind is TypeKind.FLAG:
+        if not isinstance(value, bool):
+            raise WrongValue("must be true or false", label=label)
+        return value
+    text = scalar.text if scalar.filled is None else str(scalar.filled)
+    if wanted.kind is TypeKind.CHOICE and text not in wanted.choices:
+        raise WrongValue(f"is none of the choices: '{text}'", help=suggest(text, wanted.choices, "choices"))
+    return text
+
+
+def _measured(scalar: Scalar) -> object:
+    value = plain_value(scalar)
+    if isinstance(value, str) and scalar.plain:
+        try:
+            return parse_quantity(value)
+        except UnitError:
+            return value
+    return "" if value is None else value
+
+
+def _typed(value: object) -> tuple[Value, Type]:
+    match value:
+        case Quantity(value=number, dimension=dimension):
+            return number, quantity_of(dimension)
+        case bool():
+            return value, FLAG
+        case int():
+            return float(value), COUNT
+        case float():
+            return value, quantity_of(NUMBER)
+        case _:
+            return str(value), TEXT
+
+
+def _common(read: Iterable[Datum]) -> Type:
+    types = {one.type for one in read}
+    return types.pop() if len(types) == 1 else UNKNOWN

@@ -1,0 +1,217 @@
+"""Reads the values and options of one mission node; each kind asks for what belongs to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+from rbxcompose.expressions.text import Template, parse_template
+from rbxcompose.expressions.tree import Expression, ExpressionError
+from rbxcompose.expressions.types import UNKNOWN
+from rbxcompose.findings import Span
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.missions import codes
+from rbxcompose.missions.language.asked import Argument, Asked, Assignment
+from rbxcompose.missions.language.grammar import Takes, is_told
+from rbxcompose.missions.language.spans import expression_of
+from rbxcompose.missions.language.value_reader import Nodes, ValueReader, read_expression
+from rbxcompose.missions.program.messages import Message, Shape, Written
+from rbxcompose.missions.program.moments import DEEDS, LEVELS, OPTIONS, Deeds, Moments
+
+
+class NodeReader(ValueReader):
+    """One mapping of a mission, being read, with the nodes below it."""
+
+    def __init__(self, mapping: Mapping, key: str, number: int, nodes: Nodes) -> None:
+        super().__init__(mapping, key, nodes)
+        self.number = number
+        self.children: list[int] = []
+        self.item = ""
+
+    def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Mapping | None:
+        """Return an option that must be a map with entries; None, and a finding, if it is not."""
+        value = self.take(key, takes)
+        if isinstance(value, Mapping) and value.entries:
+            return value
+        if not is_told(value):
+            self.add(codes.WRONG_SHAPE.at(self.key_span(key), f"'{key}' needs {what}"))
+        return None
+
+    def inside(self, mapping: Mapping, keys: Iterable[str], what: str) -> NodeReader:
+        """Return a reader of a map below this node; keys that do not belong to it are findings."""
+        for key, entry in mapping.entries.items():
+            if key not in keys:
+                message, of = f"unknown key '{key}' in {what}", f"keys of {what}"
+                taken = mapping.entries
+                self.add(codes.UNKNOWN_KEY.misspelt(entry.key.span, message, key, keys, of, taken=taken))
+        return NodeReader(mapping, self.key, self.number, self.nodes)
+
+    def child_node(self, node: Node, step: str) -> None:
+        """Read a node that belongs to this one."""
+        self.children.append(self.nodes.child(node, step, self.number))
+
+    def state(self, name: str, entry: Entry) -> None:
+        """Read a state of a machine."""
+        self.children.append(self.nodes.state(name, entry, self.number))
+
+    def held(self, expression: Expression) -> None:
+        """Read the nodes in the data that an expression may give."""
+        self.children.extend(self.nodes.held(expression, self.number))
+
+    def branches(self) -> tuple[str, ...]:
+        """Read the branches of a parallel: a list, or a map, of which the names are returned."""
+        value = self.take(self.key, Takes.BRANCHES)
+        if not isinstance(value, Mapping):
+            self._list(value)
+            return ()
+        if not value.entries:
+            self.add(codes.MISSING.at(value.span, f"'{self.key}' needs at least one branch"))
+        for name, entry in value.entries.items():
+            self.check_name(entry.key)
+            self.child_node(entry.value, name)
+        return tuple(value.entries)
+
+    def cases(self, key: str) -> tuple[Asked, ...]:
+        """Read a map from values to nodes, and return the values in the order of the children."""
+        value = self.map_of(key, "values below it, each with what is done then", Takes.CASES)
+        if value is None:
+            return ()
+        read = []
+        for name, entry in value.entries.items():
+            expression = read_expression(entry.key, self.nodes)
+            if expression is not None:
+                read.append(Asked(expression, UNKNOWN, entry.key))
+                self.child_node(entry.value, name)
+        self.asked.extend(asked for asked in read if asked.expression.names)  # a bare word need be no place
+        return tuple(read)
+
+    def asked_later(self, mapping: Mapping, key: str) -> Asked | None:
+        """Read a condition whose names only its kind knows, so that the kind has to check it."""
+        reader = NodeReader(mapping, key, self.number, self.nodes)
+        reader.condition(key)
+        return reader.asked[0] if reader.asked else None
+
+    def message(self, target: str, body: str) -> Message:
+        """Read where a message goes, and what is in it."""
+        scalar = self.scalar(target, "the name of a topic or a service")
+        value = self.mapping.get(body)
+        shape = None if value is None else self._shape(value)
+        keys = {} if value is None else dict(_keys_of(value))
+        return Message(scalar or Scalar("", self.key_span(target)), shape, keys)
+
+    def moments(self, keys: Iterable[str]) -> Moments:
+        """Read hooks: what is set, logged or published at some moments."""
+        return Moments({key: self._deeds(key) for key in keys if self.has(key)})
+
+    def _deeds(self, key: str) -> Deeds:
+        what = "something small to do: 'set', 'log' or 'publish' below it, without a dash"
+        value = self.map_of(key, what, Takes.HOOK)
+        if value is None:
+            return Deeds()
+        inner = self.inside(value, (*DEEDS, *OPTIONS), f"'{key}'")
+        for option, deed in OPTIONS.items():
+            if inner.has(option) and not inner.has(deed):
+                self.add(codes.UNKNOWN_KEY.at(inner.key_span(option), f"'{option}' belongs to '{deed}'"))
+        deeds = Deeds(
+            inner.assignments("set") if inner.has("set") else (),
+            inner.template("log") if inner.has("log") else None,
+            inner.choice("level", LEVELS),
+            inner.message("publish", "message") if inner.has("publish") else None,
+        )
+        self.asked.extend(inner.asked)
+        return deeds
+
+    def _shape(self, node: Node) -> Shape:
+        match node:
+            case Mapping(entries=entries):
+                return {name: self._shape(entry.value) for name, entry in entries.items()}
+            case Sequence(items=items):
+                return tuple(self._shape(item) for item in items)
+            case Scalar():
+                try:
+                    expression = expression_of(node)
+                except ExpressionError:
+                    expression = None
+                return Written(node, self._quiet_template(node), expression)
+
+    def _quiet_template(self, scalar: Scalar) -> Template:
+        try:
+            return parse_template(scalar.text)
+        except ExpressionError:
+            return Template(scalar.text, (scalar.text,))
+
+    def child(self, key: str) -> None:
+        """Read the node under a key, which must be there."""
+        value = self.take(key, Takes.STEP)
+        if value is None or (isinstance(value, Scalar) and value.plain and not value.text):
+            span = self.key_span(key) if value else self.span
+            self.nodes.add(codes.MISSING.at(span, f"'{self.key}' needs '{key}': what is to be done"))
+            return
+        self.children.append(self.nodes.child(value, key, self.number))
+
+    def steps(self) -> None:
+        """Read the list that is the kind's value."""
+        self._list(self.take(self.key, Takes.STEPS))
+
+    def _list(self, value: Node | None) -> None:
+        items = value.items if isinstance(value, Sequence) else ()
+        for index, item in enumerate(items):
+            self.child_node(item, str(index))
+        if value and not items and not is_told(value):
+            self.add(codes.MISSING.at(value.span, f"'{self.key}' needs at least one step"))
+
+    def item_name(self) -> None:
+        """Read the name that the nodes below give to a loop's item."""
+        scalar = self.scalar(self.key, "a name for the item", Takes.ITEM_NAME)
+        if scalar and self.check_name(scalar):
+            self.item = scalar.text
+
+    def items(self, key: str) -> Expression | tuple[Expression, ...]:
+        """Read a list that is written out, or an expression that gives one (of a map: its keys)."""
+        value = self.take(key, Takes.ITEMS)
+        if not isinstance(value, Sequence):
+            expression = self.expression(key, UNKNOWN, "a list")
+            self.nodes.loop(self.item, expression)
+            return expression
+        items = []
+        for item in value.items:
+            if isinstance(item, Scalar):
+                items.append(self._asked(item, UNKNOWN))
+            else:
+                self.nodes.add(codes.WRONG_SHAPE.at(item.span, "an item must be a word, a number or '$name'"))
+        return tuple(items)
+
+    def assignments(self, key: str) -> tuple[Assignment, ...]:
+        """Read a map from names of data to expressions."""
+        value = self.take(key, Takes.ASSIGNMENTS)
+        if is_told(value):
+            return ()
+        if not isinstance(value, Mapping) or not value.entries:
+            message = f"'{key}' needs names and their values"
+            help_text = f"write 'name: value' on the line below '{key}:', further right and without a dash"
+            self.nodes.add(codes.WRONG_SHAPE.at(self.key_span(key), message, help=help_text))
+            return ()
+        inner = NodeReader(value, key, self.number, self.nodes)
+        read: list[Assignment] = []
+        for name, entry in value.entries.items():
+            inner.expression(name, UNKNOWN, "a value")
+            read.extend(Assignment(name, entry.key.span, asked) for asked in inner.asked[len(read) :])
+        self.asked.extend(replace(asked, is_assigned=True) for asked in inner.asked)
+        return tuple(read)
+
+    def arguments(self) -> tuple[Argument, ...]:
+        """Read the arguments of a skill: one value, or a map of several."""
+        match self.mapping.get(self.key):
+            case Mapping(entries=entries):
+                return tuple(Argument(name, entry.value, entry.key.span) for name, entry in entries.items())
+            case Scalar(text="", plain=True) | None:
+                return ()
+            case value:
+                return (Argument("", value, value.span),)
+
+
+def _keys_of(node: Node, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Span]]:
+    """Yield the places of all keys of maps in maps, by their paths."""
+    for name, entry in node.entries.items() if isinstance(node, Mapping) else ():
+        yield (*path, name), entry.key.span
+        yield from _keys_of(entry.value, (*path, name))

@@ -1,0 +1,286 @@
+"""From the located tree of a mission file to its program; every mistake becomes a finding with its place."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.types import UNKNOWN
+from rbxcompose.findings import Finding, Related, Report, Span
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.missions import codes
+from rbxcompose.missions.analysis.held_nodes import ITEM, Pattern, matching, pattern_of, with_held
+from rbxcompose.missions.language.asked import Asked
+from rbxcompose.missions.language.grammar import LEVELS, Takes, long_form
+from rbxcompose.missions.language.header import read_data, read_inputs, read_rate
+from rbxcompose.missions.language.keys import find_key
+from rbxcompose.missions.language.machine_reader import STATE_KEYS, as_state
+from rbxcompose.missions.language.names import NAME, NAME_HELP, no_name
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.repair import Repairs
+from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
+from rbxcompose.missions.program import program
+from rbxcompose.missions.program.machines import STATE
+from rbxcompose.missions.program.program import AFTERWARDS, RESTART, Interrupt, Program, Target
+from rbxcompose.missions.program.registry import SKILL, Kind, all_kinds, kinds
+
+BODIES = ("do", "machine")
+KEYS = ("rbx", "kind", "name", "about", "inputs", "data", "outputs", "interrupts", "rate", *BODIES)
+INTERRUPT_KEYS = ("when", "do", "afterwards")
+
+
+def read_program(root: Mapping, report: Report, skills: Collection[str] = ()) -> Program | None:
+    """Return the program of a mission file, None if it has nothing to do; `skills` are the robot's, if known.
+
+    What could not be read is left out of the program, so that the rest can be checked; it may run only if the report
+    has no errors.
+    """
+    repairs = Repairs.of(report, skills)
+    whole, root = root, repairs.mission(root)
+    for name, entry in root.entries.items():
+        if name not in KEYS:
+            message = f"unknown key '{name}' in a mission"
+            report.add(
+                codes.UNKNOWN_KEY.misspelt(entry.key.span, message, name, KEYS, "keys of a mission", taken=root.entries)
+            )
+    reader = _Reader(report, root, repairs)
+    inputs, data = read_inputs(root.get("inputs"), report), read_data(root.get("data"), report)
+    body = _body(root, report)
+    if body is None:
+        reader.interrupts(root.get("interrupts"))
+        return None
+    reader.child(body, "do" if "do" in root else "", None)
+    interrupts = reader.interrupts(root.get("interrupts"))
+    data = {name: replace(one, value=with_held(one.value, reader.found, (name,))) for name, one in data.items()}
+    return Program(
+        _text(root, "name"),
+        _text(root, "about"),
+        root.span.file,
+        tuple(node for node in reader.nodes if node),
+        inputs,
+        data,
+        interrupts,
+        read_rate(root.get("rate"), report),
+        reader.outputs(root.get("outputs")),
+        root=whole,
+    )
+
+
+def _body(root: Mapping, report: Report) -> Node | None:
+    """Return what a mission does: the node under `do`, or a machine."""
+    bodies = [key for key in BODIES if root.get(key) is not None]
+    if not bodies:
+        report.add(codes.MISSING.at(root.span, "a mission needs 'do' (or 'machine'): what is to be done"))
+        return None
+    if len(bodies) == len(BODIES):
+        span = root.entries["machine"].key.span
+        report.add(codes.WRONG_SHAPE.at(span, "a mission has 'do' or 'machine', not both"))
+    if bodies[0] == "do":
+        return root.get("do")
+    entry = root.entries["machine"]
+    return Mapping({"machine": entry}, entry.key.span)
+
+
+def _text(root: Mapping, key: str) -> str:
+    value = root.get(key)
+    return value.text if isinstance(value, Scalar) else ""
+
+
+class _Reader:
+    """Numbers the nodes in the order of the text, and keeps where it is."""
+
+    def __init__(self, report: Report, root: Mapping, repairs: Repairs) -> None:
+        self.report = report
+        self.repairs = repairs
+        data = root.get("data")
+        self.data = {name: entry.value for name, entry in data.entries.items()} if isinstance(data, Mapping) else {}
+        self.patterns: dict[str, Pattern] = {}  # where in the data the items of loops stand
+        self.found: dict[tuple[str, ...], Node] = {}  # the nodes in the data
+        self.nodes: list[program.Node | None] = []
+        self.names: dict[str, Span] = {}
+        self.paths: list[str] = []  # of the nodes that are being read, from the outside in
+
+    def add(self, finding: Finding) -> None:
+        """Keep a finding."""
+        self.report.add(finding)
+
+    def child(self, node: Node, step: str, parent: int | None) -> int:
+        """Read a node and all below it, and return its number."""
+        number = len(self.nodes)
+        self.nodes.append(None)
+        mapping = long_form(node)
+        if len(self.paths) == LEVELS:
+            self.add(codes.TOO_DEEP.at(node.span, f"more than {LEVELS} levels of steps"))
+            mapping = Mapping(span=node.span)
+            key, kind = "", None
+        else:
+            key, kind = find_key(mapping, self)
+        name = self.name_of(mapping)
+        self.paths.append(self.path_of(step, name or (kind.name if kind else key), bool(name)))
+        self.nodes[number] = self.read(NodeReader(mapping, key, number, self), kind, parent, name)
+        self.paths.pop()
+        return number
+
+    def state(self, name: str, entry: Entry, parent: int) -> int:
+        """Read a state of a machine, and return its number."""
+        number = len(self.nodes)
+        self.nodes.append(None)
+        mapping = as_state(entry)
+        if mapping is not entry.value:
+            self.add(codes.WRONG_SHAPE.at(entry.key.span, f"the state '{name}' needs 'do' and 'next'"))
+        self.paths.append(f"{self.paths[-1]}.{name}")
+        state = all_kinds()[STATE]
+        self.nodes[number] = self.read(NodeReader(mapping, name, number, self), state, parent, name, entry.key.span)
+        for key, one in mapping.entries.items():
+            if key not in (*STATE_KEYS, *modifier_keys()):
+                message, what = f"unknown key '{key}' in the state '{name}'", "keys of a state"
+                valid, taken = (*STATE_KEYS, *modifier_keys()), mapping.entries
+                self.add(codes.UNKNOWN_KEY.misspelt(one.key.span, message, key, valid, what, taken=taken))
+        self.paths.pop()
+        return number
+
+    def loop(self, item: str, expression: Expression) -> None:
+        """Note where in the data the item of a loop stands."""
+        pattern = pattern_of(expression, self.patterns)
+        if pattern:
+            self.patterns[item] = (*pattern, ITEM)
+
+    def held(self, expression: Expression, parent: int) -> list[int]:
+        """Read the nodes in the data that an expression may give."""
+        pattern = pattern_of(expression, self.patterns)
+        found = list(matching(self.data, pattern)) if pattern else []
+        numbers = []
+        for key, node in found:
+            self.found[key] = node
+            number = self.child(self.repairs.step(node, len(self.paths)), ".".join(key), parent)
+            read = self.nodes[number]
+            if read:
+                self.nodes[number] = replace(read, held=key)
+            numbers.append(number)
+        return numbers
+
+    def outputs(self, node: Node | None) -> dict[str, Asked]:
+        """Read the outputs: a map from names to expressions."""
+        if node is None:
+            return {}
+        if not isinstance(node, Mapping):
+            self.add(codes.WRONG_SHAPE.at(node.span, "'outputs' needs names with their values below it"))
+            return {}
+        reader = NodeReader(node, "outputs", len(self.nodes), self)
+        read: dict[str, Asked] = {}
+        for name, entry in node.entries.items():
+            reader.check_name(entry.key)
+            before = len(reader.asked)
+            reader.expression(name, UNKNOWN, "a value")
+            read.update((name, asked) for asked in reader.asked[before:])
+        return read
+
+    def path_of(self, step: str, word: str, is_name: bool) -> str:
+        """Return the path of a node from the one around it; names stand alone, and `do` only at the beginning."""
+        if not self.paths:
+            return f"{step}.{word}" if step else word
+        if step.isdigit():
+            return f"{self.paths[-1]}.{word}" if is_name else f"{self.paths[-1]}.{word}.{step}"
+        return f"{self.paths[-1]}.{word}" if step in ("do", word) else f"{self.paths[-1]}.{step}.{word}"
+
+    def read(
+        self, reader: NodeReader, kind: Kind | None, parent: int | None, name: str, span: Span | None = None
+    ) -> program.Node:
+        """Read the value, the options and the modifiers of a node."""
+        step = (kind or all_kinds()[SKILL]).read(reader)
+        own, read = len(reader.asked), {}
+        is_state = kind is not None and kind.is_inner
+        for key, cls in modifiers().items():
+            if any(reader.has(one) for one in (key, *cls.keys)) and (is_state or not cls.only_states):
+                read[key] = cls.read(reader, key)
+        return program.Node(
+            number=reader.number,
+            step=step,
+            name=name,
+            path=self.paths[-1],
+            span=span or reader.span,
+            parent=parent,
+            children=tuple(reader.children),
+            end=len(self.nodes),
+            modifiers=read,
+            asked=tuple(reader.asked),
+            own=own,
+            item=reader.item,
+        )
+
+    def name_of(self, mapping: Mapping) -> str:
+        """Return the name of a node, if it has one; a name belongs to one node only."""
+        value = mapping.get("name")
+        if value is None:
+            return ""
+        if not isinstance(value, Scalar):
+            self.add(codes.WRONG_SHAPE.at(value.span, "this is no name", help=NAME_HELP))
+            return ""
+        if not NAME.fullmatch(value.text):
+            self.add(no_name(value))
+            return ""
+        if value.text in kinds():
+            self.add(
+                codes.NAME_CLASH.at(
+                    value.span, f"a step cannot be named '{value.text}': that is a word of the language"
+                )
+            )
+        elif value.text in self.names:
+            related = [Related(self.names[value.text], "the first one")]
+            self.add(codes.NAME_CLASH.at(value.span, f"two steps are named '{value.text}'", related=related))
+        self.names.setdefault(value.text, value.span)
+        return value.text
+
+    def interrupts(self, node: Node | None) -> tuple[Interrupt, ...]:
+        """Read the interrupts in their order."""
+        if node is None:
+            return ()
+        if not isinstance(node, Mapping):
+            self.add(codes.WRONG_SHAPE.at(node.span, "'interrupts' needs names below it, each with 'when' and 'do'"))
+            return ()
+        read = [self.interrupt(name, entry) for name, entry in node.entries.items()]
+        # A restart may name what stands in the reaction of a later interrupt, which it may cut: all are read by now.
+        return tuple(replace(one, targets=self.targets(one.restarts)) for one in read if one)
+
+    def interrupt(self, name: str, entry: Entry) -> Interrupt | None:
+        """Read `when`, `do` and `afterwards`."""
+        value = entry.value
+        if not NAME.fullmatch(name):
+            self.add(no_name(entry.key))
+        if not isinstance(value, Mapping):
+            self.add(codes.WRONG_SHAPE.at(value.span, f"the interrupt '{name}' needs 'when' and 'do'"))
+            return None
+        for key, unknown in value.entries.items():
+            if key not in INTERRUPT_KEYS:
+                message, what = f"unknown key '{key}' in the interrupt '{name}'", "keys of an interrupt"
+                taken = value.entries
+                self.add(codes.UNKNOWN_KEY.misspelt(unknown.key.span, message, key, INTERRUPT_KEYS, what, taken=taken))
+        reader = NodeReader(value, "when", len(self.nodes), self)
+        if "when" not in value:
+            self.add(codes.MISSING.at(entry.key.span, f"the interrupt '{name}' needs 'when': a condition"))
+        else:
+            reader.condition("when")
+        afterwards, restarts = self.afterwards(reader)
+        reaction = value.get("do")
+        root = None if reaction is None else self.child(reaction, f"interrupts.{name}", None)
+        if not reader.asked:
+            return None
+        return Interrupt(name, reader.asked[0], root, afterwards, entry.key.span, restarts)
+
+    def afterwards(self, reader: NodeReader) -> tuple[str, Scalar | None]:
+        """Read what comes after a reaction: a word, or `restart` with the name of what begins anew."""
+        value = reader.take("afterwards", Takes.AFTERWARDS)
+        if not isinstance(value, Mapping):
+            return reader.choice("afterwards", AFTERWARDS), None
+        inner = reader.inside(value, (RESTART,), "'afterwards'")
+        return RESTART, inner.scalar(RESTART, "the name of a step, a state or a loop's item")
+
+    def targets(self, named: Scalar | None) -> tuple[Target, ...]:
+        """Return all nodes, states and loops over an item with a name; nothing if none is named."""
+        if named is None:
+            return ()
+        nodes = [node for node in self.nodes if node]
+        return tuple(
+            Target(node.number, node.item == named.text) for node in nodes if named.text in (node.name, node.item)
+        )

@@ -1,0 +1,198 @@
+"""Reads single values of a mission node: expressions, counts, flags, choices, texts, names."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from rbxcompose.expressions.text import Slot, Template, parse_template
+from rbxcompose.expressions.tree import Expression, ExpressionError, Number
+from rbxcompose.expressions.types import COUNT, FLAG, UNKNOWN, Type, quantity_of
+from rbxcompose.findings import Finding, Span
+from rbxcompose.manifest.scalars import plain_value
+from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.missions import codes
+from rbxcompose.missions.language.asked import Asked
+from rbxcompose.missions.language.grammar import Takes, is_told
+from rbxcompose.missions.language.names import NAME, no_name
+from rbxcompose.missions.language.spans import expression_of, inner_span
+from rbxcompose.units import NUMBER, TIME
+
+FOREVER = "forever"
+WORDS = "it can be"
+
+# Stands for an expression that could not be read, so that the rest is read all the same.
+UNREADABLE = Expression("", Number(0, 0, 0.0, NUMBER))
+
+
+class Nodes(Protocol):
+    """Who reads the nodes below, and keeps the findings."""
+
+    def child(self, node: Node, step: str, parent: int) -> int:
+        """Read a node below `parent` and return its number; `step` is the next part of its path."""
+        ...
+
+    def state(self, name: str, entry: Entry, parent: int) -> int:
+        """Read a state of the machine `parent` and return its number."""
+        ...
+
+    def loop(self, item: str, expression: Expression) -> None:
+        """Note what the item of a loop is that goes through the value of an expression."""
+        ...
+
+    def held(self, expression: Expression, parent: int) -> list[int]:
+        """Read the nodes in the data that an expression may give, below `parent`, and return their numbers."""
+        ...
+
+    def add(self, finding: Finding) -> None:
+        """Keep a finding."""
+        ...
+
+
+def read_expression(scalar: Scalar, nodes: Nodes) -> Expression | None:
+    """Return the expression in a scalar; None, and a finding, if there is none."""
+    try:
+        return expression_of(scalar)
+    except ExpressionError as error:
+        span = inner_span(scalar, error.start, error.end) if scalar.text else scalar.span
+        nodes.add(codes.NO_EXPRESSION.at(span, error.message, help=error.help))
+        return None
+
+
+class ValueReader:
+    """The values of one mapping of a mission: `key` is the word of its kind, or the name of its skill."""
+
+    def __init__(self, mapping: Mapping, key: str, nodes: Nodes) -> None:
+        self.mapping = mapping
+        self.key = key
+        self.nodes = nodes
+        self.asked: list[Asked] = []
+
+    @property
+    def span(self) -> Span:
+        """Return the place of the kind's key."""
+        return self.key_span(self.key)
+
+    def has(self, key: str) -> bool:
+        """Tell whether an option was written."""
+        return key in self.mapping
+
+    def key_span(self, key: str) -> Span:
+        """Return the place of an option's key."""
+        entry = self.mapping.entries.get(key)
+        return entry.key.span if entry else self.mapping.span
+
+    def take(self, key: str, takes: Takes = Takes.OTHER, choices: tuple[str, ...] = ()) -> Node | None:
+        """Return the value of a key, at which the grammar takes this, or one of some words."""
+        return self.mapping.get(key)
+
+    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Scalar | None:
+        """Return an option that must be one word, number or text; None, and a finding, if it is not."""
+        value = self.take(key, takes)
+        if is_told(value):
+            return None
+        if isinstance(value, Scalar) and (value.text or not value.plain):
+            return value
+        if value is None or isinstance(value, Scalar):
+            self.nodes.add(codes.MISSING.at(self.key_span(key), f"'{key}' needs {what}"))
+            return None
+        found = "a list" if isinstance(value, Sequence) else "names with values"
+        help_text = _FLOW_HELP if isinstance(value, Mapping) and what == "a condition" else ""
+        self.nodes.add(codes.WRONG_SHAPE.at(value.span, f"'{key}' needs {what}, not {found}", help=help_text))
+        return None
+
+    def expression(self, key: str, wanted: Type, what: str) -> Expression:
+        """Read an expression whose value must be of the type `wanted`."""
+        scalar = self.scalar(key, what)
+        return self._asked(scalar, wanted) if scalar else UNREADABLE
+
+    def condition(self, key: str) -> Expression:
+        """Read a condition."""
+        return self.expression(key, FLAG, "a condition")
+
+    def duration(self, key: str) -> Expression:
+        """Read a duration."""
+        return self.expression(key, quantity_of(TIME), "a duration, such as '5 s'")
+
+    def count_or_forever(self, key: str) -> Expression | None:
+        """Read a whole number; None stands for `forever`."""
+        read = self.count_or(key, (FOREVER,))
+        return None if isinstance(read, str) else read
+
+    def count_or(self, key: str, words: tuple[str, ...]) -> Expression | str:
+        """Read a whole number, or one of some words."""
+        value = self.take(key, Takes.COUNT, words)
+        if isinstance(value, Scalar) and value.text in words:
+            return value.text
+        return self.expression(key, COUNT, f"a number or {' or '.join(repr(word) for word in words)}")
+
+    def flag(self, key: str) -> bool:
+        """Read `true` or `false`."""
+        scalar = self.scalar(key, "'true' or 'false'", Takes.FLAG)
+        value = scalar and (plain_value(scalar) if scalar.filled is None else scalar.filled)
+        if scalar and not isinstance(value, bool):
+            self.add(codes.NOT_A_CHOICE.at(scalar.span, f"'{key}' must be true or false"))
+        return value is True
+
+    def choice(self, key: str, choices: tuple[str, ...]) -> str:
+        """Read one of some words; the first one is the default."""
+        if not self.has(key):
+            return choices[0]
+        scalar = self.scalar(key, " or ".join(f"'{choice}'" for choice in choices))
+        if scalar and scalar.text not in choices:
+            message = f"'{key}' cannot be '{scalar.text}'"
+            self.nodes.add(codes.NOT_A_CHOICE.misspelt(scalar.span, message, scalar.text, choices, WORDS))
+        return scalar.text if scalar else choices[0]
+
+    def template(self, key: str) -> Template:
+        """Read a text in which `$name` is filled in."""
+        scalar = self.scalar(key, "a text")
+        return self.template_of(scalar) if scalar else Template("", ())
+
+    def template_of(self, scalar: Scalar) -> Template:
+        """Return the text of a scalar with its slots."""
+        try:
+            template = parse_template(scalar.text)
+        except ExpressionError as error:
+            self.nodes.add(codes.NO_EXPRESSION.at(inner_span(scalar, error.start, error.end), error.message))
+            return Template("", ())
+        slots = (part for part in template.parts if isinstance(part, Slot))
+        self.asked.extend(Asked(slot.value, UNKNOWN, _part_of(scalar, slot)) for slot in slots)
+        return template
+
+    def add(self, finding: Finding) -> None:
+        """Keep a finding."""
+        self.nodes.add(finding)
+
+    def name(self, key: str, what: str) -> Scalar:
+        """Read a name; one without text, and a finding, if there is none."""
+        scalar = self.scalar(key, what)
+        return scalar if scalar and self.check_name(scalar) else Scalar("", self.key_span(key))
+
+    def check_name(self, scalar: Scalar) -> bool:
+        """Tell whether a word may be a name; a finding says it if not."""
+        if not NAME.fullmatch(scalar.text):
+            self.add(no_name(scalar))
+            return False
+        return True
+
+    def _asked(self, scalar: Scalar, wanted: Type) -> Expression:
+        expression = read_expression(scalar, self.nodes)
+        if expression is None:
+            return UNREADABLE
+        self.asked.append(Asked(expression, wanted, scalar))
+        return expression
+
+    def branch(self, key: str, branches: tuple[str, ...]) -> str:
+        """Read the name of one of the branches."""
+        scalar = self.scalar(key, "the name of a branch")
+        if scalar and scalar.text not in branches:
+            message = f"there is no branch '{scalar.text}'"
+            self.add(codes.NOT_A_CHOICE.misspelt(scalar.span, message, scalar.text, branches, "its branches"))
+        return scalar.text if scalar else ""
+
+
+_FLOW_HELP = "inside '{}', commas and colons divide: put quotes round the condition, or write it in block style"
+
+
+def _part_of(scalar: Scalar, slot: Slot) -> Scalar:
+    return Scalar(f"${slot.path}", inner_span(scalar, slot.start, slot.end))

@@ -1,0 +1,73 @@
+"""`save`: keep the result of a node in the mission's data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.modifiers.families import Plain
+from rbxcompose.missions.modifiers.registry import Decorator, modifier
+from rbxcompose.missions.program.statuses import RUNNING
+
+
+class SaveTask(Decorator):
+    """Keeps the result at the end."""
+
+    __slots__ = ("name",)
+
+    def __init__(self, site: Site, options: Save, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.name = options.kept_as.text
+
+    def begin(self) -> int:
+        """Start the task inside."""
+        return self.proceed()
+
+    def proceed(self) -> int:
+        """Go on, and keep the result at the end."""
+        status = self.advance(self.inner)
+        if status != RUNNING and self.name:
+            self.run.data[self.name] = self.inner.result()
+        return status
+
+
+@modifier("save", SaveTask)
+@dataclass(frozen=True, slots=True)
+class Save(Plain):
+    """Keep what a skill or a `call` answered, the outputs of a `use`, or `{done, failed}` of a `for`.
+
+    It is kept also after a failure.
+
+    Example:
+        do:
+          - for: corner
+            in: [corner_1, corner_2]
+            if_one_fails: next
+            do:
+              go_to: $corner
+            optional: true
+            save: tour
+          - log: $tour.failed could not be reached
+    """
+
+    kept_as: Scalar
+
+    value = None
+
+    @classmethod
+    def read(cls, reader: NodeReader, key: str) -> Self:
+        """Read the name."""
+        return cls(reader.name(key, "a name for the result"))
+
+    @property
+    def saved(self) -> Scalar | None:
+        """Return the name."""
+        return self.kept_as if self.kept_as.text else None
+
+    @property
+    def said(self) -> str:
+        """Return the name."""
+        return self.kept_as.text

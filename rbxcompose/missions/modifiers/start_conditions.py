@@ -1,0 +1,194 @@
+"""Modifiers that decide whether a node starts at all; one that does not is skipped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar, Self
+
+from rbxcompose.expressions.evaluate import holds
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.modifiers.families import Skipping
+from rbxcompose.missions.modifiers.registry import Decorator, modifier
+from rbxcompose.missions.program.answers import Serves
+from rbxcompose.missions.program.statuses import RUNNING, SKIPPED
+
+
+class ConditionalTask(Decorator):
+    """Asks a condition once, before the node starts."""
+
+    __slots__ = ("condition",)
+    skips_if: ClassVar[bool]
+
+    def __init__(self, site: Site, options: Conditional, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.condition = options.value
+
+    def begin(self) -> int:
+        """Ask the condition once."""
+        return SKIPPED if holds(self.condition, self.scope) == self.skips_if else self.advance(self.inner)
+
+
+class OnlyIfTask(ConditionalTask):
+    """Goes on if it holds."""
+
+    __slots__ = ()
+    skips_if = False
+
+
+class SkipIfTask(ConditionalTask):
+    """Goes on if it does not hold."""
+
+    __slots__ = ()
+    skips_if = True
+
+
+@dataclass(frozen=True, slots=True)
+class Conditional(Skipping):
+    """Has a condition."""
+
+    value: Expression = field()
+
+    serves = Serves.ALL
+
+    @classmethod
+    def read(cls, reader: NodeReader, key: str) -> Self:
+        """Read a condition."""
+        return cls(reader.condition(key))
+
+
+@modifier("only_if", OnlyIfTask)
+class OnlyIf(Conditional):
+    """Start only if the condition holds, else be skipped.
+
+    Example:
+        do:
+          - go_to: dock
+            only_if: $battery < 90 %
+    """
+
+    __slots__ = ()
+
+
+@modifier("skip_if", SkipIfTask)
+class SkipIf(Conditional):
+    """Be skipped if the condition holds.
+
+    Example:
+        do:
+          - go_to: dock
+            skip_if: distance($pose, dock) < 20 cm
+    """
+
+    __slots__ = ()
+
+
+class CountingTask(Decorator):
+    """Knows when its node ended within this run of the mission; a halt is no end."""
+
+    __slots__ = ("ended_at", "ended_in")
+    saved = ("ended_at", "ended_in")
+    times = ("ended_at",)
+
+    def __init__(self, site: Site, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.ended_at = 0.0  # [s] of robot time without pauses
+        self.ended_in = 0  # the run of the mission, counted from 1
+
+    @property
+    def has_ended(self) -> bool:
+        """Tell whether the node has ended in this run of the mission."""
+        return self.ended_in == self.run.begun
+
+    def proceed(self) -> int:
+        """Go on, and note when it ends."""
+        status = self.advance(self.inner)
+        if status not in (RUNNING, SKIPPED):
+            self.ended_at, self.ended_in = self.engine.unpaused, self.run.begun
+        return status
+
+
+class OnceTask(CountingTask):
+    """Skips its node once that has ended."""
+
+    __slots__ = ("is_on",)
+
+    def __init__(self, site: Site, options: Once, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.is_on = options.is_on
+
+    def begin(self) -> int:
+        """Start if it has not ended yet."""
+        return SKIPPED if self.is_on and self.has_ended else self.proceed()
+
+
+@modifier("once", OnceTask)
+@dataclass(frozen=True, slots=True)
+class Once(Skipping):
+    """Be done once within a run of the mission, whether it succeeds or fails; then be skipped.
+
+    Example:
+        do:
+          repeat: 3
+          do:
+            - log: The patrol begins
+              once: true
+            - go_to: corner_1
+    """
+
+    is_on: bool
+
+    value = None
+
+    @classmethod
+    def read(cls, reader: NodeReader, key: str) -> Self:
+        """Read `true` or `false`."""
+        return cls(reader.flag(key))
+
+    @property
+    def serves(self) -> Serves:
+        """Return those that come again."""
+        return Serves.REPEATED if self.is_on else Serves.ALL
+
+
+class CooldownTask(CountingTask):
+    """Skips its node for a time after that has ended."""
+
+    __slots__ = ("duration",)
+
+    def __init__(self, site: Site, options: Cooldown, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.duration = options.value
+
+    def begin(self) -> int:
+        """Start if that time has gone by, or if it has not ended yet."""
+        is_cooling = self.has_ended and not self.engine.has_gone_by(self._seconds(), self.ended_at)
+        return SKIPPED if is_cooling else self.proceed()
+
+    def _seconds(self) -> float:
+        return self.number_of(self.duration, "'cooldown'")
+
+
+@modifier("cooldown", CooldownTask)
+@dataclass(frozen=True, slots=True)
+class Cooldown(Skipping):
+    """Be skipped for a time after it has ended; the time of interrupts counts, that of pauses does not.
+
+    Example:
+        do:
+          repeat: 3
+          do:
+            - recharge:
+              cooldown: 10 min
+            - go_to: corner_1
+    """
+
+    value: Expression = field()
+
+    serves = Serves.REPEATED
+
+    @classmethod
+    def read(cls, reader: NodeReader, key: str) -> Self:
+        """Read a duration."""
+        return cls(reader.duration(key))

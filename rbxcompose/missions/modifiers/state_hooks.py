@@ -1,0 +1,86 @@
+"""`on_enter` and `on_exit` of states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Self
+
+from rbxcompose.missions.engine.instant_actions import act, act_safely
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.modifiers.families import Plain
+from rbxcompose.missions.modifiers.registry import Decorator, modifier
+from rbxcompose.missions.program.moments import Moments
+from rbxcompose.missions.program.statuses import RUNNING
+
+ON_ENTER, ON_EXIT = "on_enter", "on_exit"
+
+
+class EnteringTask(Decorator):
+    """Hears when a state is entered and left."""
+
+    __slots__ = ("moments",)
+
+    def __init__(self, site: Site, options: Entering, inner: Task) -> None:
+        super().__init__(site, inner)
+        self.moments = options.moments
+
+    def begin(self) -> int:
+        """Do what belongs to entering."""
+        act(self.moments, ON_ENTER, self)
+        return self.proceed()
+
+    def proceed(self) -> int:
+        """Go on, and do what belongs to leaving."""
+        status = self.advance(self.inner)
+        if status != RUNNING:
+            act(self.moments, ON_EXIT, self)
+        return status
+
+    def suspend(self, anew: bool) -> bool:
+        """An interrupt halts leaves, not states: the state stays entered, what is in it begins anew."""
+        if self.current is not None and self.inner.suspend(anew):
+            self.current = None
+        return False
+
+    def halt(self) -> None:
+        """Stop what runs, and leave, unless the mission as a whole is ended from outside."""
+        super().halt()
+        if not self.engine.is_aborting:
+            act_safely(self.moments, ON_EXIT, self)
+
+
+@modifier(
+    ON_ENTER, EnteringTask, {ON_EXIT: "What is set, logged or published when the state is left."}, only_states=True
+)
+@dataclass(frozen=True, slots=True)
+class Entering(Plain):
+    """Do something small when a state is entered and when it is left: `set`, `log`, `publish`.
+
+    Leaving also counts when something inside the mission halts the state, entering also when its history brings the
+    machine back to it.
+
+    Example:
+        machine:
+          start: away
+          states:
+            away:
+              do:
+                go_to: corner_1
+              on_enter:
+                log: Off we go
+              on_exit:
+                log: That was it
+              next:
+                success: finished
+                failure: failed
+    """
+
+    moments: Moments = field()
+
+    value = None
+
+    @classmethod
+    def read(cls, reader: NodeReader, key: str) -> Self:
+        """Read what is there of the two."""
+        return cls(reader.moments((key, *cls.keys)))

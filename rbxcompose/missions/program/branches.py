@@ -1,0 +1,113 @@
+"""Branches: what decides between nodes at the same time, the outcomes by conditions over them, cases of a value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.values import NotArrived, Value
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions import codes
+from rbxcompose.missions.engine.scopes import Inner, MissionScope
+from rbxcompose.missions.language.asked import Asked
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.statuses import FAILURE, NAMES, SKIPPED, SUCCESS
+
+ALL, ANY = "all", "any"
+OTHERWISE, HALTED = "otherwise", "halted"
+RESULTS = (NAMES[SUCCESS], NAMES[FAILURE], NAMES[SKIPPED], HALTED)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """An outcome and the condition for it over the branches; None for `otherwise`."""
+
+    name: str
+    condition: Expression | None
+    asked: Asked | None
+
+
+@dataclass(frozen=True, slots=True)
+class Branches:
+    """What decides how nodes end that are done at the same time: `all`, `any`, or a number of them; or one branch.
+
+    `names` are those of the branches, in the order of the children, if they have any.
+    """
+
+    names: tuple[str, ...] = ()
+    succeed_when: Expression | str = ALL
+    fail_when: Expression | str = ANY
+    ends_with: str = ""
+    outcomes: tuple[Outcome, ...] = ()
+
+    def deciding(self, children: tuple[int, ...]) -> tuple[int, ...]:
+        """Return the children whose results count."""
+        return (children[self.names.index(self.ends_with)],) if self.ends_with in self.names else children
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What is asked, and the value of each case, in the order of the children."""
+
+    asked: Expression
+    cases: tuple[Asked, ...] = ()
+
+
+class Ended(str):
+    """The result of a branch as a text: one with an outcome of its own also equals what that counts as."""
+
+    __slots__ = ("counts_as",)
+    counts_as: str
+
+    @classmethod
+    def of(cls, status: int, outcome: str) -> Ended:
+        """Return the result of a branch; one that has not ended was halted."""
+        plain = NAMES[status] if NAMES[status] in RESULTS else HALTED
+        ended = cls(outcome or plain)
+        ended.counts_as = plain
+        return ended
+
+    def __eq__(self, other: object) -> bool:
+        return str.__eq__(self, other) or (isinstance(other, str) and str.__eq__(self.counts_as, other))
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    __hash__ = str.__hash__
+
+
+class BranchScope(Inner):
+    """What the conditions of a parallel's outcomes see: also the result of each branch."""
+
+    def __init__(self, outer: MissionScope, ended: Mapping[str, Ended]) -> None:
+        super().__init__(outer)
+        self._ended = ended
+
+    def variable(self, name: str, /) -> Value | NotArrived:
+        """Return the result of a branch, or what the scope around knows."""
+        return self._ended[name] if name in self._ended else self.outer.variable(name)
+
+
+def read_outcomes(reader: NodeReader, branches: tuple[str, ...]) -> tuple[Outcome, ...]:
+    """Read the outcomes of a parallel with these branches; `otherwise` comes last and must be there."""
+    if not reader.has("outcomes"):
+        return ()
+    value = reader.map_of("outcomes", "a map from outcomes to conditions")
+    if value is None:
+        return ()
+    if not branches:
+        message = "'outcomes' needs branches with names"
+        reader.add(codes.WRONG_SHAPE.at(reader.key_span("outcomes"), message, help="write the branches as a map"))
+    read = []
+    for index, (name, entry) in enumerate(value.entries.items()):
+        is_last = index + 1 == len(value.entries)
+        is_otherwise = isinstance(entry.value, Scalar) and entry.value.text == OTHERWISE
+        if is_otherwise != is_last:
+            message = "'otherwise' comes last" if is_otherwise else f"the last outcome must be '{OTHERWISE}'"
+            help_text = f"add a line such as 'lost: {OTHERWISE}'"
+            reader.add(codes.WRONG_SHAPE.at(entry.value.span, message, help=help_text))
+        reader.check_name(entry.key)
+        asked = None if is_otherwise else reader.asked_later(value, name)
+        read.append(Outcome(name, asked.expression if asked else None, asked))
+    return tuple(read)

@@ -1,0 +1,179 @@
+"""Actions, services and topics as skills: arguments, the goal that they make, what a result tells."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+from rbxcompose.config import Place
+from rbxcompose.expressions.types import COUNT, FLAG, POSE, TEXT, Type, quantity_of
+from rbxcompose.expressions.values import Value
+from rbxcompose.geometry import Pose2
+from rbxcompose.missions.program.program import Skill
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.definitions import INTEGERS, attribute, parse_type
+from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
+from rbxcompose.msgs.plain import from_plain, to_plain
+from rbxcompose.msgs.stamps import to_duration, to_seconds
+from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.types import Action, Message, Service
+from rbxcompose.units import NUMBER, TIME
+
+M = TypeVar("M", bound=Message)
+
+FRAME = "map"  # that places and poses of missions are in
+SUCCESS = "success"  # the field of an answer that tells it
+STAMPED, POSED = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Pose"
+LASTING = "builtin_interfaces/msg/Duration"
+
+_TYPES: Mapping[str, Type] = {
+    STAMPED: POSE,
+    POSED: POSE,
+    LASTING: quantity_of(TIME),
+    "string": TEXT,
+    "bool": FLAG,
+    **dict.fromkeys(("float32", "float64"), quantity_of(NUMBER)),
+    **{f"{sign}int{bits}": COUNT for sign in ("", "u") for bits in (8, 16, 32, 64)},
+}
+
+
+def skill_of(
+    action: type[Action[Any, Any, Any]],
+    name: str,
+    claims: str = "",
+    restartable: bool = True,
+    *,
+    pausable: bool = False,
+    outcomes: Mapping[str, str] = MappingProxyType({}),
+) -> Skill:
+    """Return the skill that an action is: the fields of its goal are the arguments, the first one is the main one.
+
+    A field of another type than a pose, time, text, flag or number is no argument and keeps its zero value. A pose or
+    a time that is the main argument has to be given.
+    """
+    results = typed_fields(action.Result)
+    return Skill(name, *_asked(action.Goal), claims, restartable, pausable, dict(outcomes), results)
+
+
+def topic_skill(
+    order: type[Message],
+    name: str,
+    end: type[Message] | None = None,
+    claims: str = "",
+    restartable: bool = True,
+    *,
+    outcomes: Mapping[str, str] = MappingProxyType({}),
+) -> Skill:
+    """Return the skill that orders on a topic are, whose ends are messages `end`: its arguments are as for an action.
+
+    Where no ends are told, it has no results.
+    """
+    results = typed_fields(end) if end is not None else {}
+    return Skill(name, *_asked(order), claims, restartable, outcomes=dict(outcomes), results=results)
+
+
+def service_skill(service: type[Service[Any, Any]], name: str) -> Skill | None:
+    """Return the skill that a service is, whose answer tells whether it succeeded; None for any other service."""
+    if service.Response.FIELDS.get(SUCCESS) != "bool":
+        return None
+    arguments, results = typed_fields(service.Request), typed_fields(service.Response)
+    return Skill(name, arguments, next(iter(arguments), ""), results=results)
+
+
+def _asked(message: type[Message]) -> tuple[dict[str, Type], str, frozenset[str]]:
+    """Return the arguments that a message has room for, the main one, and those that have to be given."""
+    arguments = typed_fields(message)
+    main = next(iter(arguments), "")
+    needed = frozenset({main} if main and message.FIELDS[main] in (STAMPED, POSED, LASTING) else ())
+    return arguments, main, needed
+
+
+def typed_fields(message: type[Message]) -> dict[str, Type]:
+    """Return the types of the fields that missions understand, in order."""
+    return {field: _TYPES[ros] for field, ros in message.FIELDS.items() if ros in _TYPES}
+
+
+def goal_of(action: type[Action[Any, Any, Any]], arguments: Mapping[str, Value]) -> Message:
+    """Return the goal with these arguments; places and poses are in `map`.
+
+    Raises:
+        KeyError: if the goal has no such field.
+        ValueError: if a value does not fit into its field.
+    """
+    return filled(action.Goal, arguments)
+
+
+def filled(message: type[Message], arguments: Mapping[str, Value]) -> Message:
+    """Return a message whose fields have these values; raises as `goal_of` does."""
+    fields = message.FIELDS
+    return message(**{attribute(name): _MAKERS[fields[name]](value) for name, value in arguments.items()})
+
+
+def message_of(message: type[M], fields: Mapping[str, Value]) -> M:
+    """Return a message with fields of any shape, nested ones as maps.
+
+    Raises:
+        ValueError: if a field does not exist or a value does not fit into it, in words.
+    """
+    made, findings = from_plain(
+        message, {name: _fitted(message.FIELDS.get(name, ""), one) for name, one in fields.items()}
+    )
+    if made is None:
+        raise ValueError(findings[0].message)
+    return made
+
+
+def _fitted(ros_type: str, value: Any) -> Any:
+    """Return a value of a mission as data for a field: places become poses, whole numbers whole ones."""
+    if not ros_type:
+        return value
+    base = parse_type(ros_type).base
+    if isinstance(value, Mapping):
+        known = registry.message(base).FIELDS if "/" in base else {}
+        return {name: _fitted(known.get(name, ""), one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_fitted(base, one) for one in value]
+    if base in _POSES and isinstance(value, Place | Pose2):
+        return to_plain(_POSES[base](value))
+    if base == LASTING and isinstance(value, int | float):
+        return to_plain(to_duration(value))
+    if base in INTEGERS and isinstance(value, float) and value.is_integer():
+        return int(value)
+    return value
+
+
+def values_of(message: Message | None) -> dict[str, Value]:
+    """Return what a result tells, field by field: lengths of time in [s], other nested messages as maps."""
+    if message is None:
+        return {}
+    lasting = [attribute(name) for name, ros in message.FIELDS.items() if ros == LASTING]
+    return {**to_plain(message), **{name: to_seconds(getattr(message, name)) for name in lasting}}
+
+
+def _pose(value: Any) -> Pose:
+    half = value.heading / 2
+    return Pose(position=Point(x=value.x, y=value.y), orientation=Quaternion(z=math.sin(half), w=math.cos(half)))
+
+
+def _stamped(value: Any) -> PoseStamped:
+    return PoseStamped(header=Header(frame_id=FRAME), pose=_pose(value))
+
+
+def _whole(value: Any) -> int:
+    if value != int(value):
+        raise ValueError(f"{value} is no whole number")
+    return int(value)
+
+
+_MAKERS: Mapping[str, Callable[[Any], object]] = {
+    STAMPED: _stamped,
+    POSED: _pose,
+    LASTING: to_duration,
+    "string": str,
+    "bool": bool,
+    **dict.fromkeys(("float32", "float64"), float),
+    **{ros: _whole for ros, wanted in _TYPES.items() if wanted == COUNT},
+}
+_POSES: Mapping[str, Callable[[Any], Message]] = {STAMPED: _stamped, POSED: _pose}

@@ -1,0 +1,178 @@
+"""What `sequence` and `fallback` share: nodes one after the other, until one of them decides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, Self
+
+from rbxcompose.missions.engine.condition_watches import Watched
+from rbxcompose.missions.engine.task import Site
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.answers import Skipped
+from rbxcompose.missions.program.families import Straight
+from rbxcompose.missions.program.history import HISTORY, WithHistory, read_history
+from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, FAILS, NEVER, Outcomes
+from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED
+
+WRITTEN, RANDOM = "written", "random"
+OPTIONS: Mapping[str, str] = {
+    "reactive": "Whether earlier conditions (`check`, `wait_for`, lists of only those) are asked again at each tick.",
+    "history": HISTORY,
+    "order": "In which order the nodes are done: as `written`, or `random`, drawn anew at each start.",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class InTurn(Straight):
+    """A list of nodes: the first that ends as `decides` ends the list alike."""
+
+    reactive: bool
+    history: str = field()
+    order: str = field()
+
+    only_asks = True
+    skipped = Skipped.WITH_ALL_INSIDE
+    decides: ClassVar[str]
+
+    @classmethod
+    def read(cls, reader: NodeReader) -> Self:
+        """Read the list and its options."""
+        reader.steps()
+        reactive = reader.flag("reactive") if reader.has("reactive") else False
+        return cls(reactive, read_history(reader), reader.choice("order", (WRITTEN, RANDOM)))
+
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return what decides of any child, and all of the last one that is reached."""
+        found, goes_on_never = NEVER, ALWAYS_FAILS if self.decides == FAILS else ALWAYS_SUCCEEDS
+        for child in map(endings.of, node.children[:-1]):
+            found = found.both(child.of(self.decides))
+            if child.plain in (NEVER, goes_on_never):
+                return found
+        return found.both(endings.of(node.children[-1])) if node.children else found
+
+    @property
+    def comes_again(self) -> bool:
+        """Tell that an earlier condition may let it go back."""
+        return self.reactive
+
+
+class InTurnTask(WithHistory):
+    """Does the nodes of a list in order; the first that ends as `decides` ends the list alike.
+
+    If none does, it ends as those that were not skipped did.
+    """
+
+    __slots__ = ("all", "children", "conditions", "did", "index", "is_random", "order")
+    saved = ("did", "index", "order")
+    decides: ClassVar[int]
+
+    def __init__(self, site: Site, step: InTurn) -> None:
+        super().__init__(site)
+        self.is_random = step.order == RANDOM
+        self.history = step.history
+        self.all = self.children = site.children
+        self.order: list[int] = []  # in which the children are done, if it was drawn
+        self.conditions = _conditions(site) if step.reactive else {}
+        self.index = 0
+        self.did = SKIPPED
+
+    def begin(self) -> int:
+        """Start with the first child, or with the one at which it was halted."""
+        if self.engine.places.kept and self.engine.places.take_up(self):
+            self.arrange()
+            return self.proceed()
+        self.index = 0
+        self.did = SKIPPED
+        if self.is_random:
+            self.order = list(range(len(self.all)))
+            self.engine.chance().shuffle(self.order)
+            self.arrange()
+        return self.proceed()
+
+    def restored(self) -> None:
+        """Bring the children into the order that was drawn."""
+        self.arrange()
+
+    def arrange(self) -> None:
+        """Put the children in the order that was drawn."""
+        if self.order:
+            self.children = tuple(self.all[index] for index in self.order)
+
+    def proceed(self) -> int:
+        """Go on with the child that runs, and with those behind it as far as they end at once."""
+        if self.conditions and self.index:
+            self.ask_again()
+        children, index, child, decides = self.children, self.index, self.current, self.decides
+        while True:
+            if child is None:
+                child = children[index]
+                status = child.start()
+            else:
+                status = child.tick()
+            if status == RUNNING:
+                self.index, self.current = index, child
+                if self.conditions:
+                    self.watch_conditions()
+                return RUNNING
+            child = None
+            if status == decides:
+                self.index, self.current = index, None
+                return self.end_with(status)
+            if status != SKIPPED:
+                self.did = status
+            index += 1
+            if index == len(children):
+                self.current = None
+                return self.end_with(self.did)
+            self.engine.outcome = ""
+
+    def ask_again(self) -> None:
+        """Ask the conditions before the child that runs; go back to the first whose answer is another one.
+
+        The answer of one that was forgotten meanwhile was such that the list went on.
+        """
+        for index, child in enumerate(self.children[: self.index]):
+            if child.number not in self.conditions:
+                continue
+            before = self.statuses[child.number]
+            status = child.start()
+            is_other = status in (RUNNING, self.decides) if before == IDLE else status != before
+            if is_other:
+                if status == RUNNING:
+                    child.halt()
+                if self.current is not None:
+                    running, self.current = self.current, None
+                    running.halt()
+                self.index = index
+                return
+
+    def watch_conditions(self) -> None:
+        """Wake when a condition before the child that runs may have changed."""
+        for child in self.children[: self.index]:
+            for watched in self.conditions.get(child.number, ()):
+                self.engine.watch(watched)
+
+    def end_with(self, status: int) -> int:
+        """End, and forget the place; a sequence that failed keeps it."""
+        if self.history != "none":
+            self.forget_places()
+            if status == FAILURE and self.is_kept_after_failure:
+                self.engine.places.kept.add(self)
+        return status
+
+
+def _conditions(site: Site) -> dict[int, tuple[Watched, ...]]:
+    """Return the children that only ask, by number, with what they ask."""
+    nodes = site.engine.program.nodes
+    asking = (nodes[number] for number in site.node.children if _only_asks(nodes, nodes[number]))
+    return {node.number: tuple(_asked(nodes[node.number : node.end])) for node in asking}
+
+
+def _only_asks(nodes: tuple[Node, ...], node: Node) -> bool:
+    return node.step.only_asks and all(_only_asks(nodes, nodes[child]) for child in node.children)
+
+
+def _asked(nodes: tuple[Node, ...]) -> list[Watched]:
+    return [Watched.of(asked.expression) for node in nodes for asked in node.asked]

@@ -1,0 +1,64 @@
+"""From a mission and those that it uses to one program with one row of nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from rbxcompose.missions.program.program import Interrupt, Node, Program, Target
+
+MOST_NODES = 20_000  # of a mission with all that it uses
+DEEPEST = 16  # missions within missions
+
+
+def link(program: Program, missions: Mapping[str, Program]) -> Program:
+    """Return the program in which each `use` has the nodes of its mission below it.
+
+    Raises:
+        KeyError: if a mission is used that does not exist; checks find that before, and also circles.
+    """
+    if not any(node.step.uses for node in program.nodes):
+        return program
+    linker = _Linker(missions)
+    linked = linker.mission(program, None, "")
+    return replace(linked, nodes=tuple(node for node in linker.nodes if node))
+
+
+class _Linker:
+    """Copies nodes one after the other, with new numbers and with paths that begin at the outermost mission."""
+
+    def __init__(self, missions: Mapping[str, Program]) -> None:
+        self.missions = missions
+        self.nodes: list[Node | None] = []
+
+    def mission(self, program: Program, parent: int | None, path: str) -> Program:
+        """Copy the nodes of a mission, and return it with their new numbers."""
+        numbers: dict[int, int] = {}
+        for root in [program.main, *(one.root for one in program.interrupts if one.root is not None)]:
+            self.copy(program, root, parent, path, numbers)
+        interrupts = tuple(_renumbered(one, numbers) for one in program.interrupts)
+        return replace(program, main=numbers[program.main], interrupts=interrupts)
+
+    def copy(self, program: Program, old: int, parent: int | None, path: str, numbers: dict[int, int]) -> int:
+        """Copy a node and all below it, and return its new number."""
+        node, number = program.nodes[old], len(self.nodes)
+        numbers[old] = number
+        self.nodes.append(None)
+        own = f"{path}{node.path}"
+        children = tuple(self.copy(program, child, number, path, numbers) for child in node.children)
+        inner = None
+        if node.step.uses:
+            used = self.missions[node.step.uses.text]
+            inner = self.mission(used, number, f"{own}.")
+            roots = (one.root for one in inner.interrupts if one.root is not None)
+            children = (inner.main, *roots)
+        self.nodes[number] = replace(
+            node, number=number, parent=parent, path=own, children=children, end=len(self.nodes), inner=inner
+        )
+        return number
+
+
+def _renumbered(interrupt: Interrupt, numbers: Mapping[int, int]) -> Interrupt:
+    root = None if interrupt.root is None else numbers[interrupt.root]
+    targets = tuple(Target(numbers[one.number], one.is_round) for one in interrupt.targets)
+    return replace(interrupt, root=root, targets=targets)

@@ -1,0 +1,52 @@
+"""What nodes and their hooks do: set data, log, publish."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from rbxcompose.expressions.text import Template
+from rbxcompose.missions.language.asked import Assignment
+from rbxcompose.missions.program.messages import Message
+
+LEVELS = ("info", "warn", "error")  # of a log
+DEEDS = ("set", "log", "publish")
+OPTIONS = {"level": "log", "message": "publish"}  # each with the deed that it belongs to
+
+
+@dataclass(frozen=True, slots=True)
+class Deeds:
+    """What is done at one moment; all right sides are computed before anything is set."""
+
+    assignments: tuple[Assignment, ...] = ()
+    text: Template | None = None
+    level: str = "info"
+    message: Message | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Moments:
+    """Deeds by the key of their moment."""
+
+    deeds: Mapping[str, Deeds] = field(default_factory=dict)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Return all `$names` that their messages read."""
+        return frozenset[str]().union(*(one.message.names for one in self.deeds.values() if one.message))
+
+
+@dataclass(frozen=True, slots=True)
+class Effects:
+    """What a node does to the mission and the robot by itself: what it sets, sends and asks.
+
+    `shortened` is the name of the data that it takes items out of, empty if it should and names none; None: nothing.
+    """
+
+    assignments: tuple[Assignment, ...] = ()
+    published: Message | None = None
+    called: Message | None = None
+    shortened: str | None = None
+
+
+NO_EFFECTS = Effects()

@@ -1,0 +1,60 @@
+"""How something may end: in success, in failure, with outcomes of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from rbxcompose.missions.program.statuses import FAILURE, NAMES, SUCCESS
+
+SUCCEEDS, FAILS = NAMES[SUCCESS], NAMES[FAILURE]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcomes:
+    """Whether a node may end in success or in failure, and its outcomes of its own with what each counts as.
+
+    A node that can do neither never ends by itself. Where not all is known, everything is possible.
+    """
+
+    succeeds: bool = True
+    fails: bool = True
+    named: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def words(self) -> Mapping[str, str]:
+        """Return all outcomes with what each counts as."""
+        plain = {word: word for word, can in ((SUCCEEDS, self.succeeds), (FAILS, self.fails)) if can}
+        return {**plain, **self.named}
+
+    def both(self, other: Outcomes) -> Outcomes:
+        """Return what either may do."""
+        return Outcomes(self.succeeds or other.succeeds, self.fails or other.fails, {**self.named, **other.named})
+
+    def of(self, word: str) -> Outcomes:
+        """Return only those that count as success, or as failure."""
+        named = {name: counts for name, counts in self.named.items() if counts == word}
+        return Outcomes(self.succeeds and word == SUCCEEDS, self.fails and word == FAILS, named)
+
+    def counting_as(self, word: str) -> bool:
+        """Tell whether any of them counts as success, or as failure."""
+        return word in self.words.values()
+
+    @property
+    def plain(self) -> Outcomes:
+        """Return them without their names."""
+        return Outcomes(self.counting_as(SUCCEEDS), self.counting_as(FAILS))
+
+
+NEVER = Outcomes(succeeds=False, fails=False)
+ALWAYS_SUCCEEDS = Outcomes(fails=False)
+ALWAYS_FAILS = Outcomes(succeeds=False)
+ANY = Outcomes()
+
+
+def either(several: Iterable[Outcomes]) -> Outcomes:
+    """Return what any of several may do."""
+    found = NEVER
+    for one in several:
+        found = found.both(one)
+    return found

@@ -1,0 +1,394 @@
+"""A mission that was read: a flat, frozen tuple of nodes, and what stands beside them in its file."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, Protocol, Self
+
+from rbxcompose.config import Place
+from rbxcompose.expressions.check import StaticScope
+from rbxcompose.expressions.text import parse_template
+from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.types import Type
+from rbxcompose.expressions.values import Value
+from rbxcompose.findings import Span
+from rbxcompose.manifest.tree import Mapping as LocatedMapping
+from rbxcompose.manifest.tree import Scalar
+from rbxcompose.missions.engine.resume_points import NO_HISTORY
+from rbxcompose.missions.language.asked import Argument, Asked
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.program.answers import Advice, Counted, Flow, Skipped
+from rbxcompose.missions.program.branches import Branches, Choice
+from rbxcompose.missions.program.look import Look
+from rbxcompose.missions.program.machines import Next, States
+from rbxcompose.missions.program.modifier import Modifier
+from rbxcompose.missions.program.moments import Effects
+from rbxcompose.missions.program.outcomes import Outcomes
+from rbxcompose.missions.program.possible import Possibility
+
+ROOT = 0  # number of the node under `do`
+RATE = 20.0  # [Hz] of conditions that nothing announces
+NOTHING: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Skill:
+    """What a mission may ask of the robot: typed arguments in order, and the `main` one that a single value is.
+
+    `outcomes` are those beyond `success` and `failure`, each with which of the two it counts as. `claims` is what it
+    needs for itself (base, arm, head, voice), empty for nothing. `results` are the types of what it tells at its end.
+    """
+
+    name: str
+    arguments: Mapping[str, Type] = field(default_factory=dict)
+    main: str = ""
+    required: frozenset[str] = frozenset()
+    claims: str = ""
+    restartable: bool = True
+    pausable: bool = False
+    outcomes: Mapping[str, str] = field(default_factory=dict)
+    results: Mapping[str, Type] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class RobotNames:
+    """What the robot gives to every mission: types of its values, its places, its skills, its missions, all by name.
+
+    `topics` and `services` have the ROS names of their types; `unread` are missions whose files could not be read;
+    `removed` are places that a layer has taken away, each with where it did so.
+    It is not complete if a part of the robot has mistakes: then a skill that is missing may be that part's.
+    """
+
+    values: Mapping[str, Type] = field(default_factory=dict)
+    places: Mapping[str, Place] = field(default_factory=dict)
+    skills: Mapping[str, Skill] = field(default_factory=dict)
+    missions: Mapping[str, Program] = field(default_factory=dict)
+    topics: Mapping[str, str] = field(default_factory=dict)
+    services: Mapping[str, str] = field(default_factory=dict)
+    unread: frozenset[str] = frozenset()
+    removed: Mapping[str, Span] = field(default_factory=dict)
+    is_complete: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Datum:
+    """A value that was written down: in SI, with its type and place."""
+
+    value: Value
+    type: Type
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """A typed argument of a mission; without a default it must be given."""
+
+    name: str
+    type: Type
+    span: Span
+    default: Datum | None = None
+    least: float | None = None
+    most: float | None = None
+
+
+class Endings(Protocol):
+    """Who knows how the nodes of a mission may end."""
+
+    program: Program
+    robot: RobotNames
+
+    def of(self, number: int, /) -> Outcomes:
+        """Return how a node may end, its modifiers included."""
+        ...
+
+    def of_mission(self, name: str, /) -> Outcomes:
+        """Return how another mission may end."""
+        ...
+
+
+class Step(ABC):
+    """What a node does: a kind of the language with its options, which are the fields of the subclass.
+
+    What is abstract every kind answers, itself or by its family (`families.py`). What is not is a capability: a kind
+    without it has nothing to say.
+    """
+
+    __slots__ = ()
+    name: ClassVar[str]  # the word of the language
+    options: ClassVar[Mapping[str, str]]  # the keys that belong to it, each with what it is for
+    is_inner: ClassVar[bool]  # it stands only inside another one, as a state in a machine: it has no word
+
+    @classmethod
+    @abstractmethod
+    def read(cls, reader: NodeReader) -> Self:
+        """Read the kind's value and options."""
+
+    @abstractmethod
+    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+        """Return how it may end, its modifiers left aside."""
+
+    @abstractmethod
+    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+        """Yield what may come of it, as far as a test should see each of it."""
+
+    @abstractmethod
+    def shows(self, node: Node, scope: StaticScope) -> Mapping[str, Type]:
+        """Return the names that only the nodes inside see, with their types."""
+
+    @abstractmethod
+    def endless(self, ends: Outcomes) -> Advice | None:
+        """Return what to say if it goes on for ever without a pause; `ends` is how it may end."""
+
+    @property
+    @abstractmethod
+    def skipped(self) -> Skipped:
+        """Return when it does nothing."""
+
+    @property
+    @abstractmethod
+    def only_asks(self) -> bool:
+        """Tell whether all that it does by itself is to ask conditions, which may be done again at any time."""
+
+    @property
+    @abstractmethod
+    def waits(self) -> bool:
+        """Tell whether it takes time by itself."""
+
+    @property
+    @abstractmethod
+    def comes_again(self) -> bool:
+        """Tell whether what is inside may be done more than once."""
+
+    @property
+    @abstractmethod
+    def effects(self) -> Effects:
+        """Return what it does by itself."""
+
+    @property
+    @abstractmethod
+    def has_result(self) -> bool:
+        """Tell whether it has something that `save` keeps."""
+
+    @property
+    @abstractmethod
+    def flow(self) -> Flow:
+        """Return how it goes through those inside."""
+
+    @property
+    @abstractmethod
+    def look(self) -> Look:
+        """Return how it is drawn."""
+
+    # Capabilities: what only some kinds have.
+
+    @property
+    def word(self) -> str:
+        """Return what people call it: the word of the language, or the name of a skill."""
+        return self.name
+
+    def text(self, node: Node) -> str:
+        """Return what stands in it where it is drawn: its own expressions."""
+        return ", ".join(asked.scalar.text for asked in node.asked[: min(node.own, 2)])
+
+    @property
+    def skill(self) -> str:
+        """Return the skill that it asks; empty for none."""
+        return ""
+
+    @property
+    def ends_mission(self) -> str:
+        """Return the result with which it ends the mission that it is part of; empty if it does not."""
+        return ""
+
+    @property
+    def uses(self) -> Scalar | None:
+        """Return the name of the mission that it runs."""
+        return None
+
+    @property
+    def arguments(self) -> tuple[Argument, ...]:
+        """Return what it gives to its skill or mission."""
+        return ()
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Return the `$names` that it reads beside its expressions, messages and arguments."""
+        return NOTHING
+
+    @property
+    def lasts(self) -> Expression | None:
+        """Return the time that it takes."""
+        return None
+
+    @property
+    def numbers(self) -> tuple[Counted, ...]:
+        """Return what it counts."""
+        return ()
+
+    @property
+    def history(self) -> str:
+        """Return where it starts again after it was halted, as a word of `HISTORIES`."""
+        return NO_HISTORY
+
+    @property
+    def goes_on_after(self) -> str:
+        """Return the result of a child after which the next one comes, if they come in their order."""
+        return ""
+
+    @property
+    def items(self) -> Expression | tuple[Expression, ...] | None:
+        """Return what it goes through, item by item."""
+        return None
+
+    @property
+    def choice(self) -> Choice | None:
+        """Return by which value it chooses one of its children."""
+        return None
+
+    @property
+    def branches(self) -> Branches | None:
+        """Return what decides, if its children run at the same time."""
+        return None
+
+    @property
+    def states(self) -> States | None:
+        """Return the states that its children are."""
+        return None
+
+    @property
+    def leads_to(self) -> Next | None:
+        """Return where a state leads to."""
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One mission node. Those below it have the numbers from `number + 1` to `end` (exclusive).
+
+    `step` is what it does; `modifiers` are by key, from the outside in. `asked` are all expressions, for checking, and
+    first those of the step itself, which are `own` in number. `item` is the name that a loop gives to its item. `held`
+    tells where a node that a `run` does stands in the data. `inner` is the mission that a `use` runs, in a program
+    that was linked: its nodes are below this one.
+    """
+
+    number: int
+    step: Step
+    name: str
+    path: str
+    span: Span
+    parent: int | None
+    children: tuple[int, ...]
+    end: int
+    modifiers: Mapping[str, Modifier] = field(default_factory=dict)
+    asked: tuple[Asked, ...] = ()
+    own: int = 0
+    item: str = ""
+    held: tuple[str, ...] = ()
+    inner: Program | None = None
+
+    @property
+    def skill(self) -> str:
+        """Return the skill that it asks; empty for none."""
+        return self.step.skill
+
+    @property
+    def saved(self) -> Scalar | None:
+        """Return the name under which it keeps its result."""
+        return next((one.saved for one in self.modifiers.values() if one.saved), None)
+
+    @property
+    def limit(self) -> Expression | None:
+        """Return the time that it may take."""
+        return next((one.limit for one in self.modifiers.values() if one.limit), None)
+
+    @property
+    def may_be_left_out(self) -> bool:
+        """Tell whether a modifier may keep it from starting."""
+        return any(one.may_skip for one in self.modifiers.values())
+
+    @property
+    def is_forgiven(self) -> bool:
+        """Tell whether its failure may count as success."""
+        return any(one.forgives for one in self.modifiers.values())
+
+
+CONTINUE, RESTART, END = "continue", "restart", "end"
+AFTERWARDS = (CONTINUE, RESTART, END)  # the default first
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What an interrupt restarts: a node or state, or the current round of a loop."""
+
+    number: int
+    is_round: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Interrupt:
+    """A condition that cuts the mission short, and the node that is done then (None: nothing).
+
+    `afterwards` is a word of `AFTERWARDS`; `targets` are all nodes that a restart by name may mean, of which those
+    that run begin again.
+    """
+
+    name: str
+    when: Asked
+    root: int | None
+    afterwards: str
+    span: Span
+    restarts: Scalar | None = None
+    targets: tuple[Target, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """A mission: its main node has the number `main`, which is 0 unless it is part of a linked program.
+
+    Those of the interrupts follow. `outputs` are what it gives to who uses it. `root` is what it was read from; the
+    rest follows from it.
+    """
+
+    name: str
+    about: str
+    file: str
+    nodes: tuple[Node, ...]
+    inputs: Mapping[str, Input] = field(default_factory=dict)
+    data: Mapping[str, Datum] = field(default_factory=dict)
+    interrupts: tuple[Interrupt, ...] = ()
+    rate: float = RATE
+    outputs: Mapping[str, Asked] = field(default_factory=dict)
+    main: int = ROOT
+    root: LocatedMapping = field(default_factory=LocatedMapping, repr=False)
+
+    def asked(self) -> Iterator[tuple[Node | None, Asked]]:
+        """Yield all expressions, with the node that asks; None for an interrupt or an output."""
+        for node in self.nodes:
+            for asked in node.asked:
+                yield node, asked
+        for interrupt in self.interrupts:
+            yield None, interrupt.when
+        for asked in self.outputs.values():
+            yield None, asked
+
+    def below(self, number: int) -> tuple[Node, ...]:
+        """Return a node and all below it."""
+        return self.nodes[number : self.nodes[number].end]
+
+    @property
+    def saved(self) -> frozenset[str]:
+        """Return the names under which results are kept."""
+        return frozenset(node.saved.text for node in self.nodes if node.saved)
+
+    def reads(self) -> frozenset[str]:
+        """Return all `$names` that are read anywhere, arguments of skills and of missions included."""
+        read = {name.name for _, asked in self.asked() for name in asked.expression.names}
+        for node in self.nodes:
+            step, messages = node.step, (node.step.effects.published, node.step.effects.called)
+            read.update(step.reads, *(message.names for message in messages if message))
+            read.update(*(one.moments.names for one in node.modifiers.values() if one.moments))
+            texts = (one.value.text for one in step.arguments if isinstance(one.value, Scalar))
+            read.update(name.name for text in texts for name in parse_template(text).names)
+        return frozenset(read)

@@ -1,0 +1,83 @@
+"""Finding the kinds of mission nodes: each is one file in `missions/kinds`, entered by one decorator."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Callable, Mapping
+from functools import cache
+from types import MappingProxyType
+from typing import TypeAlias, TypeVar
+
+from rbxcompose.missions import kinds as package
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.program.program import Step
+
+Kind: TypeAlias = type[Step]
+S = TypeVar("S", bound=Step)
+SKILL = "skill"  # the kind of all nodes that are named after a skill of the robot
+KINDS: dict[str, Kind] = {}
+_TASKS: dict[Kind, Callable[[Site], Task]] = {}
+
+
+def kind(
+    name: str,
+    task: Callable[[Site, S], Task],
+    options: Mapping[str, str] = MappingProxyType({}),
+    *,
+    is_inner: bool = False,
+) -> Callable[[type[S]], type[S]]:
+    """Register a kind under its word, with the task that carries it out.
+
+    `options` tells in a sentence what each of its keys is for. One that is `inner` has no word of the language.
+
+    Raises:
+        TypeError: if the kind leaves something unanswered that every kind answers.
+    """
+
+    def register(cls: type[S]) -> type[S]:
+        if inspect.isabstract(cls):
+            raise TypeError(f"the kind '{name}' does not answer {', '.join(sorted(cls.__abstractmethods__))}")
+
+        def make(site: Site) -> Task:
+            if not isinstance(site.node.step, cls):
+                raise TypeError(f"'{site.node.path}' is no '{name}'")
+            return task(site, site.node.step)
+
+        cls.name, cls.options, cls.is_inner = name, options, is_inner
+        KINDS[name], _TASKS[cls] = cls, make
+        _look_again()
+        return cls
+
+    return register
+
+
+def forget(name: str) -> None:
+    """Take a kind out again, as tests do with theirs."""
+    del _TASKS[KINDS.pop(name)]
+    _look_again()
+
+
+def _look_again() -> None:
+    kinds.cache_clear()
+    all_kinds.cache_clear()
+
+
+def task_of(site: Site) -> Task:
+    """Return the task that carries out a node, with nothing around it."""
+    return _TASKS[type(site.node.step)](site)
+
+
+@cache
+def kinds() -> dict[str, Kind]:
+    """Return all kinds that a mission may write, by their word, sorted."""
+    return {name: found for name, found in all_kinds().items() if not found.is_inner}
+
+
+@cache
+def all_kinds() -> dict[str, Kind]:
+    """Return all kinds of nodes in a program by name, sorted."""
+    for module in pkgutil.iter_modules(package.__path__):
+        importlib.import_module(f"{package.__name__}.{module.name}")
+    return dict(sorted(KINDS.items()))

@@ -1,0 +1,1 @@
+"""What viewers see of a mission: its picture, and how it changes while it runs."""

@@ -1,0 +1,138 @@
+"""A mission as a picture: rows of nodes with what stands in each, for text, diagrams and pages alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.look import Form
+from rbxcompose.missions.program.program import Interrupt, Node, Program, RobotNames
+
+LONGEST = 60  # characters of what stands in a node
+
+
+@dataclass(frozen=True, slots=True)
+class Arrow:
+    """A transition of a machine: on this outcome (empty: on every one) to this state or end."""
+
+    outcome: str
+    to: str
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """One node: its number in the linked program, what it is, what stands in it, and what is around it.
+
+    `role` tells what it is to its parent (`then`, a branch); an interrupt is a node of its own, without a number.
+    `form` is a word of `Form`.
+    """
+
+    number: int | None
+    kind: str
+    text: str = ""
+    name: str = ""
+    role: str = ""
+    notes: tuple[str, ...] = ()
+    arrows: tuple[Arrow, ...] = ()
+    is_start: bool = False
+    children: tuple[Drawn, ...] = ()
+    sign: str = ""
+    form: str = Form.AFTER
+
+    @property
+    def title(self) -> str:
+        """Return the kind with what stands in it."""
+        return f"{self.kind} {self.text}".strip()
+
+    def all(self) -> Iterator[Drawn]:
+        """Yield it and all below it."""
+        yield self
+        for child in self.children:
+            yield from child.all()
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A mission: its main node and its interrupts."""
+
+    name: str
+    about: str
+    main: Drawn
+    interrupts: tuple[Drawn, ...] = ()
+    count: int = 0
+
+    @property
+    def roots(self) -> tuple[Drawn, ...]:
+        """Return what is drawn at the top."""
+        return (self.main, *self.interrupts)
+
+
+def picture_to_data(picture: Picture) -> dict[str, Any]:
+    """Return a picture as data for JSON."""
+    return asdict(picture)
+
+
+def picture_from_data(data: Mapping[str, Any]) -> Picture:
+    """Return the picture that `picture_to_data` made data of."""
+    interrupts = tuple(map(_drawn_from, data["interrupts"]))
+    return Picture(data["name"], data["about"], _drawn_from(data["main"]), interrupts, data["count"])
+
+
+def _drawn_from(data: Mapping[str, Any]) -> Drawn:
+    more = {
+        "notes": tuple(data["notes"]),
+        "arrows": tuple(Arrow(**one) for one in data["arrows"]),
+        "children": tuple(map(_drawn_from, data["children"])),
+    }
+    return Drawn(**{**data, **more})
+
+
+def picture_of(program: Program, robot: RobotNames) -> Picture:
+    """Return the picture of a mission with all that it uses."""
+    linked = link(program, robot.missions)
+    interrupts = tuple(_interrupt(linked, one) for one in linked.interrupts)
+    return Picture(linked.name, linked.about, _drawn(linked, linked.main), interrupts, len(linked.nodes))
+
+
+def _interrupt(linked: Program, one: Interrupt) -> Drawn:
+    children = (_drawn(linked, one.root),) if one.root is not None else ()
+    restarts = f" {one.restarts.text}" if one.restarts else ""
+    notes = (f"afterwards {one.afterwards}{restarts}",)
+    return Drawn(None, "interrupt", f"when {one.when.expression.text}", one.name, "", notes, children=children)
+
+
+def _drawn(linked: Program, number: int, role: str = "", is_start: bool = False) -> Drawn:
+    node = linked.nodes[number]
+    step, look = node.step, node.step.look
+    start = step.states.start if step.states else ""
+    children = tuple(
+        _drawn(linked, child, one, bool(start) and linked.nodes[child].name == start)
+        for child, one in zip(node.children, _roles(linked, node), strict=True)
+    )
+    if node.inner is not None:
+        reactions = [one for one in node.inner.interrupts if one.root is not None]
+        children = (children[0], *(_interrupt(linked, one) for one in reactions))
+    leads = step.leads_to.to.items() if step.leads_to else ()
+    arrows = tuple(Arrow(outcome, to) for outcome, to in leads)
+    name = "" if role == node.name else node.name
+    text, notes = _short(step.text(node)), tuple(_notes(node))
+    return Drawn(number, step.word, text, name, role, notes, arrows, is_start, children, look.sign, look.form)
+
+
+def _roles(linked: Program, node: Node) -> Sequence[str]:
+    """Return what each child is to its node: the key under which it was written, where that says something."""
+    written = [linked.nodes[child].path.removeprefix(node.path).strip(".").partition(".")[0] for child in node.children]
+    return [one if node.step.look.has_roles and not one.isdecimal() else "" for one in written]
+
+
+def _notes(node: Node) -> Iterator[str]:
+    """Yield the modifiers of a node, from the outside in, in words."""
+    for key, modifier in node.modifiers.items():
+        yield _short(f"{key} {modifier.said}".strip().replace("_", " "))
+
+
+def _short(text: str) -> str:
+    line = " ".join(text.split())
+    return line if len(line) <= LONGEST else f"{line[: LONGEST - 3]}..."

@@ -1,0 +1,45 @@
+"""What a viewer in another process knows of a mission: a whole that it asked for, and all news since, in their order.
+
+Messages are those of `bus/window.py`. News that come before the whole wait for it; when some are missing, or the
+mission's process was started again, the whole has to be asked for anew.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from typing import Any
+
+from rbxcompose.missions.view.mirror import joined
+
+MOST_WAITING = 100  # news that wait for a whole; if there are more, another whole is asked for
+
+
+class Replica:
+    """A copy that is kept up to date; `seen` is empty until the first whole has come."""
+
+    def __init__(self) -> None:
+        self.seen: Mapping[str, Any] = {}
+        self._source, self._sequence = "", 0
+        self._waiting: deque[Mapping[str, Any]] = deque(maxlen=MOST_WAITING)
+
+    def answered(self, message: Mapping[str, Any]) -> bool:
+        """Take a whole; return whether another one must be asked for."""
+        if message["source"] != self._source or message["sequence"] >= self._sequence:  # else more is known by now
+            self._source, self._sequence = message["source"], message["sequence"]
+            self.seen = joined({}, message["value"])
+        waiting = [one for one in self._waiting if one["source"] == self._source]
+        self._waiting.clear()
+        return [one for one in waiting if self.heard(one)] != []
+
+    def heard(self, message: Mapping[str, Any]) -> bool:
+        """Take news; return whether a whole must be asked for."""
+        is_known = message["source"] == self._source
+        if is_known and message["sequence"] <= self._sequence:
+            return False
+        if not is_known or message["sequence"] != self._sequence + 1:
+            self._waiting.append(message)
+            return True
+        self._sequence += 1
+        self.seen = joined(self.seen, message["value"])
+        return False

@@ -1,0 +1,90 @@
+"""What a robot's missions know of its driving and of its battery."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rbxcompose.expressions.tree import Comparison, Variable
+from rbxcompose.missions.analysis.facts import Constants, constants_of, number_in
+from rbxcompose.missions.analysis.travel_times import Driving, Ways
+from rbxcompose.missions.program.program import Interrupt, Node
+from rbxcompose.model.flow import Flow
+from rbxcompose.model.robot import Part, Robot, RobotMission
+from rbxcompose.sdk.capabilities import Charges, CommandsMotion, Drains, Navigates
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """An interrupt that charges the battery when its level is below `level` (a ratio)."""
+
+    interrupt: Interrupt
+    reaction: tuple[Node, ...]
+    battery: Part
+    drains: Drains
+    charges: Charges
+    level: float
+
+
+def constants(mission: RobotMission) -> Constants:
+    """Return what the `$names` of a mission stand for on this robot, where that never changes."""
+    return constants_of(mission.program, mission.inputs)
+
+
+def batteries(robot: Robot) -> dict[str, tuple[Part, Drains]]:
+    """Return the values that are the level of a battery, each with that battery."""
+    levels = {f"{part.name}.{one.level}": (part, one) for part, one in robot.declared(Drains)}
+    entries = robot.manifest.values.items()
+    return {name: levels[entry.port] for name, entry in entries if entry.port in levels}
+
+
+def calls(robot: Robot, mission: RobotMission) -> Iterator[Call]:
+    """Yield the interrupts that charge when the battery is low."""
+    known, constant = batteries(robot), constants(mission)
+    for interrupt in mission.program.interrupts:
+        match interrupt.when.expression.tree:
+            case Comparison(operator="<" | "<=", left=Variable(name=name), right=limit) if name in known:
+                level = number_in(limit, constant)
+                reaction = () if interrupt.root is None else mission.program.below(interrupt.root)
+                found = [charger for node in reaction if (charger := charger_of(robot, node.skill))]
+                if level is not None and found:
+                    yield Call(interrupt, reaction, *known[name], found[0][1], level)
+
+
+def charger_of(robot: Robot, skill: str) -> tuple[Part, Charges] | None:
+    """Return the part that a skill charges at, if it is such a skill."""
+    found = (one for one in robot.declared(Charges) if _is_served(robot, skill, one[0], one[1].goals))
+    return next(found, None)
+
+
+def navigator_of(robot: Robot, skill: str) -> tuple[Part, Navigates] | None:
+    """Return the part that drives to places as this skill, if it is such a skill."""
+    found = (one for one in robot.declared(Navigates) if _is_served(robot, skill, one[0], one[1].goals))
+    return next(found, None)
+
+
+def _is_served(robot: Robot, skill: str, part: Part, port: str) -> bool:
+    source, end = robot.skills.get(skill), part.end(port)
+    return source is not None and end is not None and end.topic == source.topic
+
+
+def top_speed(robot: Robot, driver: Part, navigates: Navigates) -> float:
+    """Return how fast the robot drives to a place at most [m/s], infinite if nobody says."""
+    limits = [navigates.max_speed, *(one.max_speed for one in driver.declared(CommandsMotion))]
+    limits += [one.drives.max_speed for one in Flow(robot).drives() if one.driver is driver]
+    return min((limit.value for limit in limits if limit), default=math.inf)
+
+
+def ways_of(robot: Robot, mission: RobotMission) -> Ways | None:
+    """Return an empty account of the mission's ways; None if it drives by several skills."""
+    used = {node.skill for node in mission.program.nodes if node.skill}
+    found = [(skill, *one) for skill in sorted(used) if (one := navigator_of(robot, skill))]
+    if not found:
+        return Ways(mission.program, Driving("", "", 1.0, 0.0), robot.manifest.places)
+    if len(found) > 1:
+        return None
+    skill, driver, navigates = found[0]
+    speed, tolerance = top_speed(robot, driver, navigates), navigates.tolerance
+    driving = Driving(skill, robot.skills[skill].skill.main, speed, tolerance.value if tolerance else 0.0)
+    return Ways(mission.program, driving, robot.manifest.places)

@@ -1,0 +1,78 @@
+"""Writing new files: all of them or none, and never in the place of one that is there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+from rbxcompose.findings import Finding, kind
+from rbxcompose.manifest.files import shown_name
+from rbxcompose.printable import plain
+
+EXISTS = kind(
+    "RBX9101",
+    """A file is there already
+
+`new` never overwrites anything. Choose another name, move the file away, or use another folder with `--into`.
+""",
+)
+NOT_WRITTEN = kind(
+    "RBX9104",
+    """A file cannot be written
+
+The system refuses: the folder is not writable, the disk is full, or a file stands where a folder should be. `new`
+leaves nothing behind.
+""",
+)
+
+
+def write_new(folder: Path, files: Mapping[str, str]) -> Finding | None:
+    """Write texts by their paths below `folder`; return why it could not be done, and then leave nothing behind."""
+    try:
+        with ExitStack() as undo:
+            waiting = [_prepare(folder / name, text, undo) for name, text in files.items()]
+            for temporary, path in waiting:
+                os.link(temporary, path)  # unlike a rename, it fails if the file is there
+                undo.callback(path.unlink)
+            undo.pop_all()
+    except FileExistsError as error:
+        path = Path(error.filename2 or error.filename)
+        return EXISTS.at(
+            None,
+            f"'{plain(shown_name(path))}' is there already; nothing was written",
+            help="choose another name, or another folder with '--into'",
+        )
+    except OSError as error:
+        message = f"'{plain(str(error.filename or folder))}' cannot be written: {error.strerror}"
+        return NOT_WRITTEN.at(None, message, help="nothing was written")
+    for temporary, _ in waiting:
+        with suppress(OSError):  # all is written; one more name of it does no harm
+            temporary.unlink()
+    return None
+
+
+def _prepare(path: Path, text: str, undo: ExitStack) -> tuple[Path, Path]:
+    """Write the text beside its place under a name of its own."""
+    if os.path.lexists(path):
+        raise FileExistsError(0, "", str(path))
+    for folder in _missing_folders(path):
+        folder.mkdir(exist_ok=True)
+        undo.callback(_remove_if_empty, folder)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    with temporary.open("x", encoding="utf-8", newline="\n") as file:
+        undo.callback(temporary.unlink)
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    return temporary, path
+
+
+def _missing_folders(path: Path) -> Iterator[Path]:
+    yield from reversed([folder for folder in path.parents if not folder.exists()])
+
+
+def _remove_if_empty(folder: Path) -> None:
+    with suppress(OSError):  # somebody else has put something into it
+        folder.rmdir()

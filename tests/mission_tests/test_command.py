@@ -1,0 +1,137 @@
+"""The command `test`, and the tests of the missions that ship."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from rbxcompose.cli.main import main as command
+from tests.conftest import ROOT
+from tests.mission_tests.trying import Trying
+
+PATROL = "missions/tests/patrol.test.yaml"
+
+
+def test_all_tests_of_the_missions_pass(repository: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(["test", "--json"]) == 0, capsys.readouterr().out
+    told = json.loads(capsys.readouterr().out)
+    assert len(told["tests"]) == len(list((ROOT / "missions").rglob("*.test.yaml"))) >= 5
+    assert all(test["passed"] for test in told["tests"])
+
+
+def test_the_mission_runs_alone_in_milliseconds(repository: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    took = []
+    for _ in range(3):
+        assert command(["test", "--json", PATROL]) == 0
+        took += [test["milliseconds"] for test in json.loads(capsys.readouterr().out)["tests"]]
+    assert min(took) < 50
+
+
+def test_a_filter_chooses_by_name(repository: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(["test", "missions", "--filter", "after_a_stop"]) == 0
+    out = capsys.readouterr().out
+    assert "1 passed" in out
+    assert "goes_on_after_a_stop" in out
+    assert command(["test", "missions", "--filter", "nothing_like_that"]) == 2
+
+
+def broken(folder: Path, *names: str) -> Path:
+    """Write a robot with one mistake and tests of it, return the folder of the tests."""
+    (folder / "robot.yaml").write_text("rbx: 1\nkind: Robot\nname: broken\ncomponents:\n  base:\n    type: bass\n")
+    for name in names:
+        head = f"rbx: 1\nkind: Test\nname: {name}\nrobot: robot.yaml\nmission: patrol\n"
+        (folder / f"{name}_file.yaml").write_text(head + "expect:\n  outcome: success\n")
+    return folder
+
+
+def test_a_filter_finds_a_test_whose_robot_has_mistakes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = str(broken(tmp_path, "first", "second"))
+    assert command(["test", folder, "--filter", "irst"]) == 1
+    captured = capsys.readouterr()
+    assert "FAILED  first" in captured.out
+    assert "second" not in captured.out
+    assert "of a type that does not exist: 'bass'" in captured.err
+    assert "no test has" not in captured.err
+    assert command(["test", folder, "--filter", "third"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err == "rbxcompose test: no test has 'third' in its name\n"
+
+
+def test_a_filter_that_finds_nothing_tells_which_files_it_could_not_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = broken(tmp_path, "first")
+    (folder / "torn.yaml").write_text('rbx: 1\nkind: Test\nname: "third\n')
+    assert command(["test", str(folder), "--filter", "third"]) == 2
+    error = capsys.readouterr().err
+    assert "torn.yaml:3" in error
+    assert "no test has 'third' in its name" in error
+
+
+@pytest.mark.parametrize("verb", ["test", "check"])
+def test_a_mistake_of_a_robot_is_told_once_for_all_of_its_tests(
+    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = broken(tmp_path, "first", "second", "third")
+    assert command([verb, *map(str, sorted(folder.glob("*_file.yaml")))]) == 1
+    captured = capsys.readouterr()
+    told = captured.err + captured.out
+    assert told.count("of a type that does not exist: 'bass'") == 1
+    assert told.count("RBX4203") == 1
+    assert "has mistakes, so that 3 tests cannot run" in told
+    assert command(["test", str(folder), "--json"]) == 1
+    tests = json.loads(capsys.readouterr().out)["tests"]
+    assert [len(one["problems"]) for one in tests] == [1, 1, 1]  # each test has its own reason
+
+
+def test_traces_coverage_and_junit(repository: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "out.xml"
+    assert command(["test", PATROL, "-v", "--coverage", "--junit", str(file)]) == 0
+    out = capsys.readouterr().out
+    assert "interrupt battery_low" in out
+    assert "patrol: 4 of 7 ways taken" in out
+    suite = ElementTree.parse(file).getroot().find("testsuite")
+    assert suite is not None
+    assert suite.attrib["failures"] == "0"
+
+
+def test_a_failure_and_a_mistake_are_exit_code_1(trying: Trying, capsys: pytest.CaptureFixture[str]) -> None:
+    trying.read("mocks:\n  go_to: failure\nexpect:\n  outcome: success\n", "states")
+    path = trying.folder / "tried.test.yaml"
+    assert command(["test", str(path)]) == 1
+    assert "expected outcome success" in capsys.readouterr().out
+    trying.read("mocks:\n  go: failure\nexpect:\n  outcome: success\n", "states")
+    assert command(["test", str(path)]) == 1
+    assert "RBX4201" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [["no_such_folder"], ["robots"], [PATROL, "--filter"]])
+def test_wrong_usage_is_exit_code_2(repository: Path, words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    try:
+        code = command(["test", *words])
+    except SystemExit as exit_:
+        code = exit_.code  # type: ignore[assignment]
+    assert code == 2
+    assert capsys.readouterr().err
+
+
+def test_a_mission_is_explored(repository: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(["mission", "explore", "patrol", "robots/turtlebot", "--states", "100"]) == 0
+    assert "can end with failure" in capsys.readouterr().out
+    assert command(["mission", "explore", "patrol", "robots/turtlebot", "--depth", "9", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["found"] == []
+    assert 0 < told["deepest"] <= 9
+    assert command(["mission", "explore", "patrl", "robots/turtlebot"]) == 1
+    assert "did you mean 'patrol'?" in capsys.readouterr().err
+
+
+def test_check_takes_a_test(repository: Path, trying: Trying, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(["check", PATROL]) == 0
+    assert "the test recharges_and_resumes is fine" in capsys.readouterr().out
+    trying.read("mocks:\n  go: failure\nexpect:\n  outcome: success\n", "states")
+    assert command(["check", str(trying.folder / "tried.test.yaml")]) == 1
+    assert "RBX4201" in capsys.readouterr().out

@@ -1,0 +1,143 @@
+"""Mistakes in a test are findings, with their places."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from rbxcompose.findings import Kind
+from rbxcompose.mission_tests import codes
+from rbxcompose.testing.golden import Golden
+from tests.mission_tests.trying import Trying
+
+FINE = "mocks:\n  go_to:\n  recharge:\nexpect:\n  outcome: success\n"
+BAD = """
+    with:
+      round: 1
+    mocks:
+      recharg:
+        takes: 5 s
+      go_to:
+        takes: 3 m
+        result: blocked
+        sets:
+          batery: 20 %
+          door: 3 s
+        fails_at: [0]
+        fails_for: [kitchen]
+    events:
+      - at: 5 s
+        set:
+          battery: 20 m
+      - at: 4 s
+        resume: true
+      - at: 90 s
+        stop: false
+      - at: 95 s
+      - at: 96 s
+        publish:
+          topic: cmd_vell
+    expect:
+      outcome: fine
+      for: 60 s
+      steps:
+        - go_too: dock
+        - ended: success
+        - go_to: {pose: docks, speed: 1 m/s}
+          ended: fainted
+        - go_to: dock
+          at: 61 s
+      never: [charge]
+      count:
+        recharg: 1
+        go_to: -1
+      data:
+        laps: 2
+      published:
+        - topic: news
+      outcom: success
+"""
+
+
+def test_each_mistake_is_told_at_its_place(trying: Trying, golden: Golden) -> None:
+    trial, found = trying.read(BAD)
+    assert trial is None
+    _, more = trying.read(
+        BAD.replace("takes: 3 m", "takes: 3 s")
+        .replace("[0]", "[1]")
+        .replace("stop: false", "stop: true")
+        .replace("outcom: success", "reports: []")
+    )
+    golden.check("mistakes.txt", found + more)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("mocks: 3\nexpect:\n  outcome: success\n", "'mocks'"),
+        ("mocks: [go_to]\nexpect:\n  outcome: success\n", "'mocks'"),
+        ("events: {at: 3 s}\nexpect:\n  outcome: success\n", "'events'"),
+        ("expect: success\n", "'expect'"),
+        ("expect:\n", "needs 'expect'"),
+        ("mocks:\n  go_to:\n", "needs 'expect'"),
+        ("expect:\n  outcome: running\n", "every test of a mission ends"),
+        ("expect:\n  outcome: running\n  for: 1e14 s\n", "'for' must be at most"),
+        ("expect:\n  steps: go_to\n", "'steps'"),
+        ("expect:\n  steps:\n    - recharge: dock\n", "takes no argument"),
+        ("expect:\n  steps:\n    - [go_to]\n", "this is no step"),
+        ("with: 3\nexpect:\n  outcome: success\n", "'with'"),
+        ("with:\n  rounds: -1\nexpect:\n  outcome: success\n", "'rounds'"),
+        ("expecting:\n  outcome: success\n", "unknown key 'expecting'"),
+    ],
+)
+def test_a_wrong_shape_is_told(trying: Trying, text: str, words: str) -> None:
+    trial, found = trying.read(text)
+    assert trial is None
+    assert words in found
+
+
+def test_values_without_the_brackets_of_a_list_are_told_with_them(trying: Trying) -> None:
+    trial, found = trying.read("mocks:\n  go_to:\n    fails_for: dock\nexpect:\n  for: 1 s\n")
+    assert trial is None
+    assert "a list has brackets: write '[dock]'" in found
+
+
+def test_a_mock_that_nothing_uses_is_a_warning(trying: Trying) -> None:
+    trial, found = trying.read("mocks:\n  go_to:\n  recharge:\nexpect:\n  for: 1 s\n", "states")
+    assert trial is not None
+    assert codes.UNUSED_MOCK.code in found
+
+
+def test_a_robot_with_mistakes_is_told_and_its_tests_do_not_run(trying: Trying) -> None:
+    path = trying.folder / "broken.test.yaml"
+    (trying.folder / "broken.yaml").write_text("rbx: 1\nkind: Robot\nname: broken\nplacs: {}\n", encoding="utf-8")
+    path.write_text(f"rbx: 1\nkind: Test\nname: t\nrobot: broken.yaml\nmission: patrol\n{FINE}", encoding="utf-8")
+    trial, report = trying.reading.read(path)
+    assert trial is None
+    assert report.has_errors
+    assert any("placs" in finding.message for finding in trying.reading.report)
+
+
+def test_a_robot_or_mission_that_is_not_there_is_told(trying: Trying) -> None:
+    path = trying.folder / "lost.test.yaml"
+    path.write_text(f"rbx: 1\nkind: Test\nname: t\nrobot: robt.yaml\nmission: patrol\n{FINE}", encoding="utf-8")
+    assert [finding.code for finding in trying.reading.read(path)[1]] == ["RBX1301"]
+    assert "did you mean 'patrol'?" in trying.read(FINE, "patrl")[1]
+
+
+@pytest.mark.parametrize(
+    "kind", [codes.UNKNOWN, codes.WRONG_VALUE, codes.NEVER, codes.NO_STEP], ids=lambda kind: kind.code
+)
+def test_the_example_on_its_page_is_wrong_and_right(trying: Trying, kind: Kind) -> None:
+    bad, good = re.findall(r"```yaml\n(.*?)```", kind.doc, re.DOTALL)
+    rest = "" if "expect:" in bad else "expect:\n  for: 100 s\n"
+    assert kind.code in trying.read(bad + rest)[1]
+    assert kind.code not in trying.read(good + rest)[1]
+
+
+def test_a_slip_of_the_hand_can_be_fixed(trying: Trying) -> None:
+    trying.read("mocks:\n  rechrge:\nexpect:\n  for: 1 s\n")
+    path = trying.folder / "tried.test.yaml"
+    fixes = [finding.fix for finding in trying.reading.read(path)[1] if finding.fix]
+    assert [fix.title for fix in fixes] == ["'rechrge' -> 'recharge'"]

@@ -1,0 +1,223 @@
+"""A component of a recorded run, run again: it sends the same, or the first difference is told."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rosbags.highlevel import AnyReader
+
+from rbxcompose.cli import main as command
+from rbxcompose.executive.requests import CancelMission
+from rbxcompose.msgs.cdr import encode
+from rbxcompose.msgs.std_msgs import String
+from rbxcompose.plan.dump import load
+from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.recording.message import Recorded
+from rbxcompose.recording.reader import RecordingReader
+from rbxcompose.recording.recovery import recover
+from rbxcompose.recording.tape import ORDERS, PLAN
+from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.writer import RecordingWriter
+from rbxcompose.replay.run import Rerun, missing_topics, rerun
+from rbxcompose.requests import as_data
+
+ROOT = Path(__file__).parents[2]
+COMPONENTS = ["battery", "base", "go_to", "charger", "cmd_vel", "transforms", "diagnostics", "mission"]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A stepped run of the patrol robot as `up --record` keeps it."""
+
+    path: Path
+    plan: Plan
+    records: list[Recorded]
+    topics: list[Topic]
+
+    def instance(self, name: str) -> Instance:
+        return next(one for one in self.plan.instances if one.name == name)
+
+    def again(self, name: str, records: list[Recorded] | None = None) -> Rerun:
+        return rerun(self.plan, self.instance(name), self.records if records is None else records)
+
+    def write(self, path: Path, records: list[Recorded]) -> Path:
+        """Write a recording of the same robot with other records."""
+        with path.open("wb") as file:
+            writer = RecordingWriter(file)
+            writer.attach(PLAN, read(self.path).attachments[PLAN])
+            for record in records:
+                writer.add(record)
+            writer.finish()
+        return path
+
+
+def read(path: Path) -> RecordingReader:
+    reader = RecordingReader(io.BytesIO(path.read_bytes()))
+    list(reader.messages())
+    return reader
+
+
+def said(capsys: pytest.CaptureFixture[str]) -> str:
+    """Return what was written to both streams."""
+    return "".join(capsys.readouterr())
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    folder = tmp_path_factory.mktemp("run")
+    path = folder / "run.mcap"
+    # In a process of its own: a robot forks, and this one may have had sessions of Zenoh, whose threads forbid that.
+    up = ["up", str(ROOT / "robots/turtlebot"), "--rate", "max", "--record", str(path)]
+    environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
+    subprocess.run([sys.executable, "-m", "rbxcompose", *up], env=environment, timeout=60, check=True)
+    reader = RecordingReader(io.BytesIO(path.read_bytes()))
+    records = list(reader.messages())
+    assert reader.damage == ""
+    return Recording(path, load(reader.attachments[PLAN].decode()), records, list(reader.topics))
+
+
+@pytest.mark.parametrize("name", COMPONENTS)
+def test_a_component_sends_again_what_it_sent(recording: Recording, name: str) -> None:
+    assert missing_topics(recording.plan, recording.instance(name), recording.topics) == []
+    found = recording.again(name)
+    assert (found.difference, found.errors) == (None, ())
+    assert found.equal == len([one for one in recording.records if one.topic.node == name]) > 0
+
+
+def test_another_speed_is_told_with_time_field_and_both_values(
+    recording: Recording, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = ["--robot", str(ROOT / "robots/turtlebot"), "--set", "args.speed=0.2"]
+    assert command.main(["replay", str(recording.path), "--into", "go_to", *other]) == 1
+    out = said(capsys)
+    assert "RBX9209" in out
+    assert "differs at 0.050 s on /cmd_vel/navigation, field 'linear.x': recorded 0.3, now 0.2" in out
+
+
+def test_the_command_tells_that_nothing_differs(recording: Recording, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["replay", str(recording.path), "--into", "battery", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["component"], told["difference"]) == ("battery", None)
+    assert told["equal"] > 0
+
+
+def test_what_it_sends_now_can_be_kept(recording: Recording, tmp_path: Path) -> None:
+    path = tmp_path / "new.mcap"
+    other = ["--robot", str(ROOT / "robots/turtlebot"), "--set", "args.speed=0.2", "--write", str(path)]
+    assert command.main(["replay", str(recording.path), "--into", "go_to", *other]) == 1
+    kept = list(RecordingReader(io.BytesIO(path.read_bytes())).messages())
+    assert kept[-1].log_time > 10e9  # it goes on behind the difference
+    assert {one.topic.node for one in kept} == {"go_to"}
+
+
+def test_an_output_that_is_too_few_or_too_many_is_told(recording: Recording) -> None:
+    mine = [number for number, one in enumerate(recording.records) if one.topic.node == "cmd_vel"]
+    fewer = [one for number, one in enumerate(recording.records) if number != mine[-1]]
+    again = recording.again("cmd_vel", fewer).difference
+    assert again
+    assert "message" in again.now or again.now.startswith("at ")
+    twice = sorted([*recording.records, recording.records[mine[-1]]], key=lambda one: one.log_time)
+    again = recording.again("cmd_vel", twice).difference
+    assert again
+    assert again.now == "nothing"
+
+
+def commanded(recording: Recording, data: object) -> Rerun:
+    """Run the missions again as if a command had come right after the start."""
+    orders = [number for number, one in enumerate(recording.records) if one.topic.name == ORDERS]
+    start = next(number for number in orders if b'"start"' in recording.records[number].payload)
+    payload = encode(String(data=json.dumps(["command", "mission", data])))
+    records = list(recording.records)
+    records.insert(start + 1, replace(records[start], payload=payload))
+    return recording.again("mission", records)
+
+
+def test_a_recorded_command_is_given_again(recording: Recording) -> None:
+    found = commanded(recording, as_data(CancelMission()))
+    assert found.errors == ()
+    assert found.difference  # it was not given then
+
+
+def test_a_command_that_another_version_recorded_is_told(recording: Recording) -> None:
+    found = commanded(recording, "cancel")
+    told = "a recorded command cannot be given again: the request cannot be read: '' is not known here"
+    assert (found.difference, found.errors) == (None, (f"mission: {told}",))
+
+
+def test_without_an_input_the_first_output_that_needs_it_differs(recording: Recording) -> None:
+    without = [one for one in recording.records if one.topic.name != "/cmd_vel/navigation"]
+    assert recording.again("cmd_vel", without).difference
+
+
+def test_a_recording_that_was_cut_is_compared_up_to_there(recording: Recording) -> None:
+    half = recording.records[: len(recording.records) // 2]
+    found = recording.again("go_to", half)
+    assert found.difference is None
+    assert 0 < found.equal < recording.again("go_to").equal
+
+
+def test_inputs_that_are_not_in_the_recording_are_named(
+    recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    without = [one for one in recording.records if one.topic.name not in ("/tf", "/tf_static")]
+    path = recording.write(tmp_path / "less.mcap", without)
+    assert command.main(["replay", str(path), "--into", "go_to"]) == 1
+    assert "lacks inputs of 'go_to': /tf, /tf_static" in said(capsys)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (["--into", "goto"], 1, "did you mean 'go_to'?"),
+        (["--write", "x.mcap"], 2, "--write needs --into"),
+        (["--into", "go_to", "--set", "args.speed=0.2"], 2, "needs --into and --robot PATH"),
+    ],
+)
+def test_what_cannot_be_is_told(
+    recording: Recording, capsys: pytest.CaptureFixture[str], words: list[str], code: int, told: str
+) -> None:
+    assert command.main(["replay", str(recording.path), *words]) == code
+    assert told in said(capsys)
+
+
+def test_a_recording_from_outside_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with (tmp_path / "a.mcap").open("wb") as file:
+        RecordingWriter(file).finish()
+    assert command.main(["replay", str(tmp_path / "a.mcap"), "--into", "go_to"]) == 1
+    assert "was not recorded from within a stepped run" in said(capsys)
+
+
+def test_recovery_keeps_the_plan_and_the_silent_topics(recording: Recording) -> None:
+    whole = io.BytesIO()
+    recover(io.BytesIO(recording.path.read_bytes()[:-2000]), whole)
+    reader = RecordingReader(io.BytesIO(whole.getvalue()))
+    records = list(reader.messages())
+    assert PLAN in reader.attachments
+    assert {one.name for one in reader.topics} >= {"/cmd_vel/navigation", "/tf_static"}
+    assert recording.again("diagnostics", records).difference is None
+
+
+def test_an_independent_reader_of_ros_bags_opens_it_with_the_events_of_services(recording: Recording) -> None:
+    with AnyReader([recording.path]) as reader:
+        [events] = [one for one in reader.connections if one.topic == "/go_to/_action/send_goal/_service_event"][:1]
+        first: Any = next(reader.deserialize(raw, one.msgtype) for one, _, raw in reader.messages([events]))
+    assert events.msgtype == "nav2_msgs/action/NavigateToPose_SendGoal_Event"
+    assert (len(first.request), len(first.response)) in ((1, 0), (0, 1))
+
+
+def test_a_field_in_a_list_is_named_by_its_place(recording: Recording) -> None:
+    number, record = next((n, one) for n, one in enumerate(recording.records) if one.topic.node == "diagnostics")
+    changed = replace(record, payload=record.payload.replace(b"OK", b"KO", 1))
+    if changed == record:
+        changed = replace(record, payload=record.payload.replace(b"motion", b"notion", 1))
+    found = recording.again("diagnostics", [*recording.records[:number], changed, *recording.records[number + 1 :]])
+    assert found.difference
+    assert found.difference.field.startswith("status[")
