@@ -133,7 +133,7 @@ def _prepare_state(run: Run) -> None:
 def _write_state(run: Run) -> None:
     # The supervisor's own way to write it, without the processes that it would lead.
     supervisor = object.__new__(Supervisor)
-    said = SimpleNamespace(_folder=run.made["folder"], state=lambda: _state("new"))
+    said = SimpleNamespace(_folder=run.made["folder"], state=lambda: _state("new"), _complained="")
     said.log = lambda level, text: run.told.append(f"{level.name}: {text}")
     supervisor.__dict__.update(vars(said))
     supervisor._write_state()

@@ -96,7 +96,7 @@ class Planner(Component[NoConfig]):
         self.info("deactivated")
 
 
-@component("toy_wheels")
+@component("toy_castors")
 class Wheels(Component[NoConfig]):
     """Counts what it gets."""
 
@@ -125,7 +125,7 @@ class Process:
         self.records: list[Record] = []
         self.clock, self.scheduler, self.inbox = Late(), Scheduler(), Inbox()
         self.bus = Bus(self.scheduler, self.clock, log=lambda owner, text: None)
-        both = (instance("planner", "toy_planner"), instance("wheels", "toy_wheels"))
+        both = (instance("planner", "toy_planner"), instance("wheels", "toy_castors"))
         self.senders: set[str] = set()
         self.host = Host(
             Plan("toys", "toys.yaml", both),

@@ -83,8 +83,8 @@ def test_each_entry_runs_as_a_component_under_its_name(project: Project) -> None
     robot = project.checked.compilation.robot
     assert robot
     assert {name: part.type_name for name, part in robot.parts.items() if part.path[:1] == ("lamps",)} == {
-        "front": "toy_lamp",
-        "rear": "toy_lamp",
+        "front": "toy_lantern",
+        "rear": "toy_lantern",
     }
     assert robot.part_span("rear").line == 8
 

@@ -34,14 +34,14 @@ class ToyLampConfig(Config):
     """How many lamps shine before it."""
 
 
-@component("toy_lamp")
+@component("toy_lantern")
 class ToyLamp(Component[ToyLampConfig]):
     """Shines."""
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     for name, lamp in contents.of(lamps).items():
-        yield WantedComponent(name, "toy_lamp", {"after": len(lamp.after)}, ("lamps", name))
+        yield WantedComponent(name, "toy_lantern", {"after": len(lamp.after)}, ("lamps", name))
 
 
 @section(
