@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.robots.commands import add_asking_options, pass_on
+from rbxcompose.cli.output.console import refuse
+from rbxcompose.cli.robots.commands import add_asking_options, show_answer
+from rbxcompose.cli.robots.lookup import NO_ANSWER, NotDoneError, answer_of, find_robot, known_state
+from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import StopRobot
 
 
@@ -18,5 +21,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Stop the robot."""
-    return pass_on(arguments, StopRobot())
+    """Stop the robot, over the bus if its supervisor does not answer."""
+    try:
+        folder = find_robot(arguments.robot)
+        answer = _stopped(folder)
+    except NotDoneError as error:
+        return refuse(error.finding)
+    show_answer(arguments, folder, answer)
+    return 0
+
+
+def _stopped(folder: RobotFolder) -> str:
+    state = known_state(folder)
+    if state is None or not state.supervisor.is_stopped:  # else no time is lost on it
+        try:
+            return answer_of(folder, StopRobot())
+        except NotDoneError as error:
+            if error.finding.code != NO_ANSWER.code:
+                raise
+    from rbxcompose.cli.robots.stop_by_bus import stop_by_bus  # joining the bus takes its time to import
+
+    return stop_by_bus(folder)

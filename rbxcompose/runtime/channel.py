@@ -124,6 +124,11 @@ class States:
 
 
 @dataclass(frozen=True, slots=True)
+class StoppedByBus:
+    """Somebody had this process hold everything that moves, past the supervisor."""
+
+
+@dataclass(frozen=True, slots=True)
 class AtRest:
     """Nothing moves any more after `Brake`."""
 
@@ -213,6 +218,7 @@ Order = (
 Word = (
     Configured
     | States
+    | StoppedByBus
     | AtRest
     | Failed
     | MissionOver

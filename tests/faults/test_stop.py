@@ -10,9 +10,10 @@ import pytest
 
 from rbxcompose.runtime.log import NAME as LOG
 from tests.faults.observer import MOTION
-from tests.faults.patrol import Patrol
+from tests.faults.patrol import LONGEST_STOP, SUPERVISOR, Patrol
 
 STANDSTILL = 3.0  # [s]; longer than any process may be silent
+WHOLE_COMMAND = 3.0  # [s] on a loaded machine
 ODOMETRIES = 25  # as many as come in half a second
 
 
@@ -53,3 +54,25 @@ def test_a_machine_that_slept_brakes_and_goes_on(tmp_path: Path) -> None:
         assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
         assert set(patrol.running()) == set(processes)
         assert "time stood still for 3." in (patrol.state.path / LOG).read_text(encoding="utf-8")
+
+
+@pytest.mark.timeout(60)
+def test_a_stop_reaches_the_base_while_the_supervisor_is_suspended(tmp_path: Path) -> None:
+    with Patrol(tmp_path, times=10) as patrol:
+        observer = patrol.observer
+        assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
+        supervisor = patrol.named(SUPERVISOR)
+        assert supervisor is not None
+        supervisor.send_signal(signal.SIGSTOP)
+        asked = time.monotonic()
+        told = patrol.do("stop")
+        assert "stopped over the bus: mission, robot, world" in told
+        assert "NOT" not in told
+        assert patrol.wait_for(lambda: not observer.is_moving)
+        assert time.monotonic() - asked < LONGEST_STOP + WHOLE_COMMAND
+        supervisor.send_signal(signal.SIGCONT)
+        log = patrol.state.path / LOG
+        assert patrol.wait_for(lambda: "stop over the bus" in log.read_text(encoding="utf-8"))
+        patrol.do("release")
+        patrol.do("mission", "resume")
+        assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 NAME = "_rbxcompose"  # of the node; tools do not list what begins with `_`
 LONGEST_QUEUE = 1000  # messages that wait to be shown
 PATIENCE = 2.0  # [s] for an answer of the router
+_EACH = zenoh.ConsolidationMode.NONE
 _PAUSE = 0.01  # [s] between two looks for the router
 NO_HASHES = "TypeHashNotSupported"  # what ROS 2 Humble writes in the place of a hash
 
@@ -117,6 +118,13 @@ class Guest:
             self._session.liveliness().get(f"{SPACE}/{self.domain}/**", timeout=PATIENCE)
         )
         return Graph.of(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
+
+    def ask(self, key: str, seconds: float) -> list[bytes]:
+        """Return the answers of all who answer at a key within so long [s]."""
+        replies: Iterator[zenoh.Reply] = iter(
+            self._session.get(key, target=zenoh.QueryTarget.ALL, consolidation=_EACH, timeout=seconds)
+        )
+        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
 
     def bus(self, kind: Kind | None = None) -> Bus:
         """Return a bus to speak on, in the way of those who have this kind of data; the same one each time."""

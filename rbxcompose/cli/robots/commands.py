@@ -8,6 +8,7 @@ import json
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot
 from rbxcompose.requests import Command
+from rbxcompose.runtime.folder import RobotFolder
 
 
 def add_asking_options(parser: argparse.ArgumentParser) -> None:
@@ -23,5 +24,10 @@ def pass_on(arguments: argparse.Namespace, command: Command) -> int:
         answer = answer_of(folder, command)
     except NotDoneError as error:
         return refuse(error.finding)
-    tell(json.dumps({"robot": folder.path.name, "answer": answer}) if arguments.json else answer)
+    show_answer(arguments, folder, answer)
     return 0
+
+
+def show_answer(arguments: argparse.Namespace, folder: RobotFolder, answer: str) -> None:
+    """Print what a robot answered."""
+    tell(json.dumps({"robot": folder.path.name, "answer": answer}) if arguments.json else answer)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rbxcompose.bus import shared_memory
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.renewal import RenewableTransport
+from rbxcompose.bus.transport import Transport
 from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import Clock
@@ -27,6 +28,7 @@ class Connection:
 
     bus: Bus
     lifeline: Lifeline
+    transport: Transport
 
 
 def open_bus(
@@ -65,4 +67,4 @@ def open_bus(
         post=inbox.put,
         log=lambda text: log("robot", text),
     )
-    return Connection(bus, lifeline)
+    return Connection(bus, lifeline, transport)

@@ -31,6 +31,7 @@ from rbxcompose.runtime.process_group.driver import Driver, ExternalDriver, Real
 from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.process_group.inbox import Inbox
 from rbxcompose.runtime.process_group.lifeline import Lifeline
+from rbxcompose.runtime.process_group.stop_line import open_stop_line
 from rbxcompose.runtime.process_group.watchdog import HANG, Watchdog
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
@@ -138,6 +139,11 @@ class Group:
             case _:
                 raise RuntimeError(f"not a message for a process group: {message}")
 
+    def _stop_by_bus(self) -> None:
+        """Hold everything that moves: the supervisor, which may not run, hears of it when it does."""
+        self._made_host().stop()
+        self._channel.send(say.StoppedByBus())
+
     def orphaned(self) -> None:
         """Come to rest and end: the supervisor has gone."""
         self._is_orphaned = self._is_ending = True
@@ -189,6 +195,7 @@ class Group:
         tape = self._taping.tape if self._taping else None
         connection = open_bus(self._plan, router, self._scheduler, self._clock, self._inbox, self._complain, tape)
         self._bus, self._lifeline = connection.bus, connection.lifeline
+        open_stop_line(connection.transport, self._plan.robot, self._name, self._stop_by_bus, self._inbox.put)
         self._host = Host(
             self._plan,
             instances,

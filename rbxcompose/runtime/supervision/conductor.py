@@ -141,6 +141,8 @@ class Conductor:
                 self._mission_over(message)
             case say.TimeIsUp():
                 self.go_down(FINE, "the time is up")
+            case say.StoppedByBus():
+                self._stopped_by_bus()
             case say.AtRest():
                 member.is_at_rest = True
                 if self._closing:
@@ -301,6 +303,11 @@ class Conductor:
     def stop(self) -> None:
         """Hold everything that moves until `release`."""
         self._set_stopped(True)
+
+    def _stopped_by_bus(self) -> None:
+        if not self.is_stopped:
+            self._effects.log(Level.WARN, "stop over the bus: everything that moves is held until 'release'")
+            self.stop()
 
     def release(self) -> None:
         """Allow motion again."""

@@ -28,7 +28,7 @@ from rbxcompose.runtime.supervision.gauges import gauges_of
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.runtime.supervision.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
-from rbxcompose.runtime.supervision.silence import DEAD, LOOK
+from rbxcompose.runtime.supervision.silence import DEAD, LOOK, SILENT
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.registry import declared
@@ -77,7 +77,7 @@ class Supervisor:
         adopt_orphans()
         self._parent: Parent | None = Parent(self._launch)
         self._parent_process = self._parent.process
-        self._parent_ran = self._clock.now()  # [s]
+        self._parent_ran = self._parent_looked = self._clock.now()  # [s]
         self._scheduler.every(LOOK, _OWNER, lambda dt: self._look_around())
         self._selector.register(self._parent, selectors.EVENT_READ, self._hear_parent)
         self._selector.register(self._wakened, selectors.EVENT_READ, self._hear_signals)
@@ -275,9 +275,10 @@ class Supervisor:
 
     def _look_at_parent(self) -> None:
         """End a parent that a signal keeps from running: it forks nothing, and tells of no end of a process."""
-        now = self._clock.now()
-        if self._parent is None or not self._parent.process.is_stopped:
-            self._parent_ran = now
+        now, looked = self._clock.now(), self._parent_looked
+        self._parent_looked = now
+        if self._parent is None or not self._parent.process.is_stopped or now - looked > SILENT:
+            self._parent_ran = now  # or this process did not run itself: it cannot tell
         elif now - self._parent_ran > DEAD:
             self.log(Level.ERROR, "the pre-fork parent was suspended by a signal and is killed")
             self._parent.process.send_signal(signal.SIGKILL)
