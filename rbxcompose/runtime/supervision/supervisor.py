@@ -23,12 +23,13 @@ from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFo
 from rbxcompose.runtime.process_group.watchdog import MARK
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
 from rbxcompose.runtime.records import Record
+from rbxcompose.runtime.supervision import silence
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
 from rbxcompose.runtime.supervision.gauges import gauges_of
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.runtime.supervision.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
-from rbxcompose.runtime.supervision.silence import DEAD, LOOK, SILENT
+from rbxcompose.runtime.supervision.silence import DEAD, LOOK
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.registry import declared
@@ -277,7 +278,7 @@ class Supervisor:
         """End a parent that a signal keeps from running: it forks nothing, and tells of no end of a process."""
         now, looked = self._clock.now(), self._parent_looked
         self._parent_looked = now
-        if self._parent is None or not self._parent.process.is_stopped or now - looked > SILENT:
+        if self._parent is None or not self._parent.process.is_stopped or now - looked > silence.SILENT:
             self._parent_ran = now  # or this process did not run itself: it cannot tell
         elif now - self._parent_ran > DEAD:
             self.log(Level.ERROR, "the pre-fork parent was suspended by a signal and is killed")
