@@ -15,8 +15,10 @@ from rbxcompose.check_runner import run_checks
 from rbxcompose.composition.overlay import SET
 from rbxcompose.composition.robot_file import load_robot
 from rbxcompose.findings import Related, Report, Severity, Span
+from rbxcompose.manifest.limits import PROFILE_BYTES, PROFILES_BYTES
 from rbxcompose.manifest.reader import Texts
 from rbxcompose.manifest.walk import TWICE
+from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.model.build import build_robot
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.build import build_plan
@@ -74,7 +76,13 @@ def compile_robot(
 
     out = compiled(profiles)
     if out.robot is not None and not profiles:
+        left = PROFILES_BYTES
         for name, span in out.robot.manifest.profiles.items():
+            left -= max(PROFILE_BYTES, sum(map(len, out.sources.values())))
+            if left < 0:
+                message = f"the profiles from '{name}' on cannot be tried: they are too many for a robot of this size"
+                out.report.add(TOO_LARGE.at(span, message, help="take some profiles out"))
+                break
             _tell_profile(span, compiled([name]), out, {SET, *out.robot.manifest.overlays})
     if out.robot is not None and not out.report.has_errors:
         out.plan = build_plan(out.robot)

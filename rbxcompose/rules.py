@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Generic, TypeVar
 
 from rbxcompose.findings import Finding, Kind, Severity, register_kind
 
 S = TypeVar("S")
+MOST = 100  # findings of one rule about one subject: pairs of a thousand things are a million
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +25,12 @@ class Rule(Kind, Generic[S]):
     find: Callable[[S], Iterable[Finding]] = lambda subject: ()
 
     def __call__(self, subject: S) -> Iterable[Finding]:
-        """Yield what is wrong with `subject`."""
-        return self.find(subject)
+        """Return what is wrong with `subject`; of very much, the first `MOST` findings."""
+        found = list(islice(self.find(subject), MOST + 1))
+        if len(found) > MOST:
+            rest = f"there are more than these {MOST} findings of {self.code}"
+            found[MOST - 1 :] = [replace(found[MOST - 1], help=f"{found[MOST - 1].help}; {rest}".removeprefix("; "))]
+        return found
 
 
 def declared(find: Callable[[S], Iterable[Finding]], code: str, severity: Severity, is_fixable: bool) -> Rule[S]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 
+from rbxcompose.executive.log_store import LogStore
 from rbxcompose.executive.mission_run import MakeWorld, Running, claims_of
 from rbxcompose.executive.requests import ListedMission, LogPart, PictureData, Seen
 from rbxcompose.executive.shell import Equipment
@@ -21,8 +21,6 @@ from rbxcompose.missions.program.statuses import IDLE, NAMES
 from rbxcompose.missions.view.picture import picture_of, picture_to_data
 from rbxcompose.requests import Refused
 
-MOST_RECORDS = 20_000  # of the log that are kept
-
 Told = Callable[[str, Level, str], None]  # mission, level, line of its story
 
 
@@ -33,8 +31,7 @@ class Missions:
         self._equipment, self.make, self._tell, self._publish = equipment, make, tell, publish
         self.observer: Observer | None = None  # of all that begin from now on
         self.runs: dict[str, Running] = {}
-        self.records: deque[Record] = deque(maxlen=MOST_RECORDS)
-        self.written = 0  # records so far
+        self._log = LogStore()
         self._counts: dict[str, int] = {}
 
     def __iter__(self) -> Iterator[Running]:
@@ -127,8 +124,7 @@ class Missions:
 
     def since(self, number: int) -> LogPart:
         """Return the records of the log that were written after so many."""
-        first = self.written - len(self.records)
-        return LogPart(self.written, [one for at, one in enumerate(self.records, first) if at >= number])
+        return LogPart(self._log.written, self._log.since(number))
 
     def _begun(self, name: str) -> Running:
         if name not in self.runs:
@@ -158,6 +154,5 @@ class Missions:
         return ""
 
     def _write(self, record: Record) -> None:
-        self.written += 1
-        self.records.append(record)
+        self._log.append(record)
         self._publish(record)

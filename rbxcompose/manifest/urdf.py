@@ -6,7 +6,7 @@ from typing import NamedTuple
 from xml.parsers import expat
 
 from rbxcompose.findings import Finding, Related, Span, kind
-from rbxcompose.manifest.limits import DEPTH, NODES
+from rbxcompose.manifest.limits import DEPTH, URDF_ELEMENTS
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.printable import plain
 
@@ -139,8 +139,8 @@ class _Reader:
         if len(self.open) >= DEPTH:
             message = f"more than {DEPTH} elements lie inside each other"
             raise _RefusedError(TOO_LARGE.at(self._tag(name), message))
-        if self.elements > NODES:
-            raise _RefusedError(TOO_LARGE.at(self._tag(name), f"more than {NODES:,} elements in one file"))
+        if self.elements > URDF_ELEMENTS:
+            raise _RefusedError(TOO_LARGE.at(self._tag(name), f"more than {URDF_ELEMENTS:,} elements in one file"))
         self.open.append(_Element(name, self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1))
 
     def _ended(self, name: str) -> None:

@@ -13,6 +13,19 @@ MISSION = "rbx: 1\nkind: Mission\nname: bad\n"
 BATTERY = "components:\n  battery: {type: battery_sim, runtime: 45 s}\nvalues:\n  battery: battery.battery_level\n"
 
 
+DRIVING = (
+    "components:\n  base: {type: diff_drive_sim}\n  go_to: {type: go_to}\nplaces:\n  home: {x: 1 m, y: 1 m}\n"
+    "missions:\n  bad: ../../missions/bad.yaml\nstart: bad\n"
+)
+
+
+def states(count: int, last: str = "wait") -> str:
+    """A machine of so many states, one after the other."""
+    rows = "".join(f"      s{n}:\n        do:\n          - wait: 1 s\n        next: s{n + 1}\n" for n in range(count))
+    end = f"      s{count}:\n        do:\n          - {last}: 1 s\n        next: finished\n"
+    return f"do:\n  machine:\n    start: s0\n    states:\n{rows}{end}"
+
+
 @dataclass(frozen=True, slots=True)
 class Project:
     """Files by their path, what else is to be made in the folder, and what must be told of `robots/bad/robot.yaml`."""
@@ -200,7 +213,22 @@ PROJECTS: dict[str, Project] = {
             + "".join(f"  i{n}: {{when: $battery < 1 %, do: x}}\n" for n in range(5000))
         ),
     ),
-    "a loop over 100,000 items": Project("RBX4102", mission("do: [{for: x, in: [" + "1," * 100_000 + "], do: fly}]\n")),
+    "3,000 branches that need the base": Project(
+        "RBX4152",
+        {
+            **mission("do:\n  parallel:\n" + "    - go_to: home\n" * 3_000),
+            **robot(DRIVING),
+        },
+    ),
+    "10,000 states": Project("RBX1103", mission(states(10_000))),
+    "3,000 states in a row": Project("RBX4102", mission(states(3_000, "fly"))),
+    "9,000 misspelt names": Project("RBX4102", mission("do:\n" + "".join(f"  - fly_{n}: x\n" for n in range(9_000)))),
+    "60,000 steps": Project("RBX1103", mission("do:\n" + "  - wait: 1 s\n" * 60_000)),
+    "1,000 profiles": Project(
+        "RBX1103", robot("profiles:\n" + "".join(f"  p{n}: {{about: {n}}}\n" for n in range(1_000)))
+    ),
+    "90,000 unknown keys": Project("RBX1103", robot("".join(f"k{n}: 1\n" for n in range(90_000)))),
+    "a loop over 30,000 items": Project("RBX4102", mission("do: [{for: x, in: [" + "1," * 30_000 + "], do: fly}]\n")),
     "50,000 items inside each other": Project(
         "RBX1103", mission("data:\n  a: [" + "[1, 2, 3, 4]," * 10_000 + "]\ndo: [{log: $a}]\n")
     ),

@@ -9,7 +9,7 @@ import pytest
 
 from rbxcompose.composition.dump import dump_robot
 from rbxcompose.findings import KINDS
-from rbxcompose.manifest.limits import DEPTH, NODES, URDF_BYTES
+from rbxcompose.manifest.limits import DEPTH, URDF_BYTES, URDF_ELEMENTS
 from rbxcompose.manifest.urdf import mistake_in_urdf
 from rbxcompose.plan.diff import difference
 from rbxcompose.plan.dump import dump, load
@@ -100,8 +100,11 @@ def nested(depth: int) -> str:
 
 def test_the_limits_are_those_that_are_told() -> None:
     assert mistake_in_urdf(nested(DEPTH), "cart.urdf") is None
-    assert mistake_in_urdf(f"<robot>{'<a/>' * (NODES - 1)}</robot>", "cart.urdf") is None
-    for text, column in ((nested(DEPTH + 1), 8 + 3 * (DEPTH - 1)), (f"<robot>{'<a/>' * NODES}</robot>", 4 + 4 * NODES)):
+    assert mistake_in_urdf(f"<robot>{'<a/>' * (URDF_ELEMENTS - 1)}</robot>", "cart.urdf") is None
+    for text, column in (
+        (nested(DEPTH + 1), 8 + 3 * (DEPTH - 1)),
+        (f"<robot>{'<a/>' * URDF_ELEMENTS}</robot>", 4 + 4 * URDF_ELEMENTS),
+    ):
         mistake = mistake_in_urdf(text, "cart.urdf")
         assert mistake
         assert (mistake.code, mistake.span and mistake.span[:3]) == ("RBX1103", ("cart.urdf", 1, column))

@@ -67,7 +67,7 @@ def recorded() -> tuple[Robot, list[dict[str, Any]]]:
     robot.go_to.end(Outcome.ABORTED, "stuck")
     robot.advance(20.0)
     assert robot.mission.missions.runs["test"].is_over, robot.lines
-    return robot, [json.loads(json.dumps(one)) for one in robot.mission.missions.records]
+    return robot, [json.loads(json.dumps(one)) for one in robot.mission.missions.since(0).records]
 
 
 def told(records: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from rbxcompose.missions.program.machines import States
 from rbxcompose.missions.program.program import Node, Program
@@ -24,6 +24,21 @@ def reached(start: str, leads: Leads) -> frozenset[str]:
     while open_ones:
         new = leads.get(open_ones.pop(), frozenset()) - found
         found.update(new)
+        open_ones.extend(new)
+    return frozenset(found)
+
+
+def leading_to(goals: Iterable[str], leads: Leads) -> frozenset[str]:
+    """Return all states and ends from which a way leads to one of `goals`, these included."""
+    back: dict[str, set[str]] = {}
+    for name, targets in leads.items():
+        for target in targets:
+            back.setdefault(target, set()).add(name)
+    found = set(goals)
+    open_ones = list(found)
+    while open_ones:
+        new = back.get(open_ones.pop(), set()) - found
+        found |= new
         open_ones.extend(new)
     return frozenset(found)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 
-from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.findings import Finding, Related, Severity, Span
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.claims import claims_below
 from rbxcompose.missions.analysis.examined import Examined
@@ -39,12 +39,15 @@ def same_claim(mission: Examined) -> Iterator[Finding]:
     for node in program.nodes:
         if node.step.branches is None:
             continue
-        claimed = [dict(claims_below(program.below(child), robot)) for child in node.children]
-        for first, second in combinations(claimed, 2):
-            for resource in first.keys() & second.keys():
+        claimed: dict[str, list[Span]] = {}  # by what is claimed, a place for each branch
+        for child in node.children:
+            for resource, span in dict(claims_below(program.below(child), robot)).items():
+                claimed.setdefault(resource, []).append(span)
+        for resource, spans in claimed.items():
+            for first, second in combinations(spans, 2):
                 yield same_claim.at(
-                    second[resource],
+                    second,
                     f"two branches that run at the same time need the {resource}",
                     help="do one after the other",
-                    related=[Related(first[resource], "the other one")],
+                    related=[Related(first, "the other one")],
                 )

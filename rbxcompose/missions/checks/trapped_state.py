@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
-from rbxcompose.missions.analysis.transitions import reached, transitions
+from rbxcompose.missions.analysis.transitions import leading_to, reached, transitions
 from rbxcompose.missions.program.program import Node
 
 
@@ -56,8 +56,9 @@ def trapped_state(mission: Examined) -> Iterator[Finding]:
         goals = {*machine.ends, *(state.name for state in states if _is_endless(state))}
         if not used & machine.ends.keys():
             continue  # it is meant to go on for ever
+        free = leading_to(goals, leads)
         for state in states:
-            if state.name in used and not reached(state.name, leads) & goals:
+            if state.name in used and state.name not in free:
                 yield trapped_state.at(
                     state.span,
                     f"from the state '{state.name}' no way leads to an end",
