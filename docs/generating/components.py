@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from docs.generating.markdown import about, code, example, example_of, indented, page, table
@@ -16,15 +15,6 @@ from rbxcompose.schema.components import examples_of
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import In, Looks, Out, Port, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import PLUGINS, component_type
-
-MADE_OF_SECTIONS: Mapping[str, str] = {
-    "diagnostics": "Every robot runs one; its groups are those of the section `diagnostics`.",
-    "mission": "A robot with missions runs one.",
-    "robot_description": "A robot with a `body` runs one.",
-    "mux": "There is one for each entry of the section `muxes`.",
-    "transforms": "Every robot runs one.",
-}
-"""The types that nobody writes under `components`: the compiler makes their instances."""
 
 DIRECTIONS = {
     "in": "subscribes",
@@ -64,8 +54,8 @@ def of_type(name: str) -> str:
     """Return what is known of a type."""
     cls = component_type(name)
     parts = [f"## {code(name)}\n{about(cls)}\n"]
-    if name in MADE_OF_SECTIONS:
-        parts.append(f"{MADE_OF_SECTIONS[name]} It is not listed under `components`.\n")
+    if cls.made_by:
+        parts.append(f"{cls.made_by} It is not listed under `components`.\n")
     else:
         parts.append(f"{facts(cls)}\n")
         parts.append(example(f"components:\n{indented(example_of(cls))}", "yaml robot"))

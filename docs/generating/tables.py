@@ -6,13 +6,16 @@ import argparse
 import inspect
 import re
 from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 from docs.generating.commands import parsers, written
-from docs.generating.components import MADE_OF_SECTIONS
 from docs.generating.families import families
 from docs.generating.markdown import about, code, lowered, table
 from docs.generating.missions import told_by
+from docs.generating.robot import models_below
 from docs.generating.shapes import with_default
+from rbxcompose.manifest.registry import sections as registered
+from rbxcompose.manifest.section import Section
 from rbxcompose.missions.program.registry import Kind, kinds
 from rbxcompose.sdk.registry import PLUGINS, component_type
 
@@ -32,12 +35,24 @@ def filled(text: str) -> str:
 
 def components() -> str:
     """Return the component types that stand under `components`, with their settings."""
-    types = {name: component_type(name) for name in sorted(PLUGINS.shipped - MADE_OF_SECTIONS.keys())}
-    rows = [(name, one, with_default(one.config_type())) for name, one in types.items()]
+    types = {name: component_type(name) for name in sorted(PLUGINS.shipped)}
+    rows = [(name, one, with_default(one.config_type())) for name, one in types.items() if not one.made_by]
     linked = [
         (f"[{code(name)}](reference/components.md#{name})", title(one), ", ".join(keys)) for name, one, keys in rows
     ]
     return table(("type", "what it is", "settings (default)"), linked)
+
+
+def sections() -> str:
+    """Return every section of a manifest, with the keys below it that are no names."""
+    rows = [(f"[{code(one.name)}](reference/robot.md#{one.name})", lowered(one.doc), keys(one)) for one in registered()]
+    return table(("section", "what it is", "keys"), [(name, doc.rstrip("."), words) for name, doc, words in rows])
+
+
+def keys(one: Section[Any, Any]) -> str:
+    """Return the keys of a section's models, without repetition."""
+    fields = (field for _, model in models_below(one.type, "") for field in model.model_fields.items())
+    return ", ".join(dict.fromkeys(code(field.alias or name) for name, field in fields))
 
 
 def title(documented: object) -> str:
@@ -97,5 +112,6 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "components": components,
     "families": families,
     "nodes": nodes,
+    "sections": sections,
     "steps": steps,
 }

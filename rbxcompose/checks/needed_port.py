@@ -76,4 +76,5 @@ def _finding(robot: Robot, part: Part, ends: list[End]) -> Finding:
 
 
 def _fits(end: End, other: End) -> bool:
-    return type(other.port) is SERVED_BY[type(end.port)] and other.type_name == end.type_name
+    is_another = other.instance != end.instance  # what listens to itself gets nothing
+    return is_another and type(other.port) is SERVED_BY[type(end.port)] and other.type_name == end.type_name

@@ -43,6 +43,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
         health: {type: diagnostics, analyzers: {power: {match: [battery, charger]}}}
     """
 
+    made_by = "Every robot runs one; its groups are those of the section `diagnostics`."
     rate = 5.0
     diagnostics = In(DiagnosticArray, "/diagnostics", is_open=True)
     diagnostics_agg = Out(DiagnosticArray, "/diagnostics_agg")

@@ -119,6 +119,7 @@ class Mission(Component[MissionConfig]):
         executive: {type: mission}
     """
 
+    made_by = "A robot with missions runs one."
     process = "mission"
 
     @classmethod

@@ -54,6 +54,8 @@ class Mux(Component[MuxConfig]):
         cmd_vel: {type: mux, output: cmd_vel, inputs: {teleop: {priority: 100, timeout: 0.5 s}}}
     """
 
+    made_by = "There is one for each entry of the section `muxes`."
+
     @classmethod
     def ports(cls, config: MuxConfig) -> dict[str, Port[Any]]:
         """Return the output, an input per source and one per lock."""

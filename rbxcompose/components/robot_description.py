@@ -21,6 +21,7 @@ class RobotDescription(Component[RobotDescriptionConfig]):
         shape: {type: robot_description, urdf: '<robot name="cart"><link name="base"/></robot>'}
     """
 
+    made_by = "A robot with a `body` runs one."
     robot_description = Out(String, "robot_description", qos="latched")
 
     def activate(self) -> None:

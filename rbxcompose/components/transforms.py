@@ -26,6 +26,7 @@ class Transforms(Component[TransformsConfig]):
         frames: {type: transforms, map: building, odom: map}
     """
 
+    made_by = "Every robot runs one."
     tf_static = Out(TFMessage, "/tf_static", qos="latched")
 
     @classmethod

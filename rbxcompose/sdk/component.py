@@ -69,6 +69,7 @@ class Component(Generic[C]):
     process: ClassVar[str] = "robot"  # default process group
     blocking: ClassVar[bool] = False  # may wait or compute for long: runs in a thread of its own
     simulated: ClassVar[bool] = False  # exists only in simulation
+    made_by: ClassVar[str] = ""  # tells which section makes it, for a type that users do not list themselves
     type_name: ClassVar[str] = ""  # set by the decorator
 
     def __init__(self, name: str, config: C, context: Context) -> None:

@@ -10,7 +10,11 @@ from rbxcompose.clock import SteppedClock
 from rbxcompose.config import Place
 from rbxcompose.levels import Level
 from rbxcompose.model.wires import ends_of
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
+from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterValue
 from rbxcompose.msgs.types import Message
+from rbxcompose.params.core import changed
+from rbxcompose.params.values import to_message
 from rbxcompose.plan.model import Instance, Plan, Wire
 from rbxcompose.qos import Qos
 from rbxcompose.references import PLACE
@@ -111,6 +115,27 @@ class Bench:
         found: list[M] = []
         self.bus.subscribe(OWNER, topic, message, qos, found.append)
         return found
+
+    def statuses(self, name: str) -> list[DiagnosticStatus]:
+        """Return a list that grows by each status that an instance reports to diagnostics."""
+        found: list[DiagnosticStatus] = []
+
+        def take(message: DiagnosticArray) -> None:
+            found.extend(status for status in message.status if status.name == name)
+
+        self.bus.subscribe(OWNER, "/diagnostics", DiagnosticArray, Qos.EVENT, take)
+        return found
+
+    def set_live(self, name: str, **settings: object) -> None:
+        """Change settings of an instance that are marked `Live`, to SI numbers or to text with a unit.
+
+        Raises:
+            UnsettableError: if it has no such setting, or one that is not live, or does not take the value.
+            Refused: if the component refuses it.
+        """
+        hosted = self.host.hosted[name]
+        parameters = [Parameter(setting, to_message(value) or ParameterValue()) for setting, value in settings.items()]
+        hosted.reconfigure(changed(hosted.config, parameters))
 
     def texts(self) -> list[str]:
         """Return what was logged, as `source: text`."""

@@ -7,10 +7,20 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.findings import Finding
+from rbxcompose.msgs.std_msgs import Float32
+from rbxcompose.sdk import Component, Config, In, Out, component
 from rbxcompose.testing.manifests import check_text
 
 HEAD = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  base: {type: diff_drive_sim}\n  go_to: {type: go_to}\n"
 TELEOP = "muxes:\n  cmd_vel:\n    inputs:\n      teleop: {priority: 100, timeout: 0.5 s}\n"
+
+
+@component("toy_relay")
+class Relay(Component[Config]):
+    """Passes a level on."""
+
+    taken = In(Float32, "taken")
+    given = Out(Float32, "given")
 
 
 def only(text: str, folder: Path) -> Finding:
@@ -40,6 +50,13 @@ def test_a_lock_named_like_an_input_is_told_at_both_places(tmp_path: Path) -> No
     assert finding.message.startswith("mux 'cmd_vel' uses the name 'teleop' twice, for an input and for a lock")
     assert finding.span
     assert (finding.span.line, [related.span.line for related in finding.related]) == (13, [10])
+
+
+def test_a_component_is_not_told_to_listen_to_itself(tmp_path: Path) -> None:
+    robot = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  relay: {type: toy_relay}\n"
+    assert only(robot, tmp_path).help == "add the component that gives it"
+    other = "  other: {type: toy_relay, connect: {taken: given, given: level}}\n"
+    assert only(robot + other, tmp_path).help == "connect it: 'connect: {taken: level}'"
 
 
 OVERLAY = "rbx: 1\nkind: Overlay\nname: over\n"

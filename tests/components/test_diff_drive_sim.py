@@ -2,11 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.qos import Qos
 from rbxcompose.testing import Bench, instance
 
 FORWARDS = Twist(linear=Vector3(x=0.4))
@@ -84,11 +82,8 @@ def test_commands_that_are_not_followed_are_counted_by_what_was_done_with_them(
     speeds: list[float], message: str
 ) -> None:
     robot = bench()
-    told: list[str] = []
-    robot.bus.subscribe(
-        "test", "/diagnostics", DiagnosticArray, Qos.EVENT, lambda one: told.extend(each.message for each in one.status)
-    )
+    told = robot.statuses("base")
     for speed in speeds:
         robot.publish("/cmd_vel", Twist(linear=Vector3(x=speed)))
     robot.advance(0.1)
-    assert message in told
+    assert message in [status.message for status in told]

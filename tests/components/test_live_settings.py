@@ -8,21 +8,14 @@ import pytest
 
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.params.core import changed
 from rbxcompose.testing import Bench, instance
-from tests.params.test_params_core import parameter
-
-
-def set_live(bench: Bench, name: str, **values: object) -> None:
-    hosted = bench.host.hosted[name]
-    hosted.reconfigure(changed(hosted.config, [parameter(*one) for one in values.items()]))
 
 
 def test_a_battery_drains_at_its_new_pace_from_where_it_is() -> None:
     bench = Bench(instance("battery", "battery_sim", {"runtime": "100 s"}))
     levels = bench.collect("/battery_level", Float32)
     bench.advance(10.0)
-    set_live(bench, "battery", runtime=10.0, warn=0.95)
+    bench.set_live("battery", runtime=10.0, warn=0.95)
     bench.advance(1.0)
     assert [round(one.data) for one in levels][-2:] == [90, 80]
     assert "battery: Medium battery: 90 %" in bench.texts()
@@ -31,7 +24,7 @@ def test_a_battery_drains_at_its_new_pace_from_where_it_is() -> None:
 def test_a_base_follows_its_new_limits_from_the_next_command_on() -> None:
     bench = Bench(instance("base", "diff_drive_sim"))
     base: Any = bench.component("base")
-    set_live(bench, "base", max_speed=0.1, command_timeout="2 s")
+    bench.set_live("base", max_speed=0.1, command_timeout="2 s")
     bench.publish("/cmd_vel", Twist(linear=Vector3(x=0.15)))
     bench.advance(1.5)
     assert base.core.velocity.linear == pytest.approx(0.1)
@@ -41,6 +34,6 @@ def test_a_base_follows_its_new_limits_from_the_next_command_on() -> None:
 
 def test_going_to_a_place_takes_its_new_speed() -> None:
     bench = Bench(instance("go_to", "go_to"))
-    set_live(bench, "go_to", speed="0.1 m/s", tolerance="1 cm")
+    bench.set_live("go_to", speed="0.1 m/s", tolerance="1 cm")
     go_to: Any = bench.component("go_to")
     assert (go_to.core.settings.speed, go_to.core.settings.distance_tolerance) == (0.1, 0.01)

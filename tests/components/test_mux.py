@@ -1,9 +1,8 @@
 from __future__ import annotations
 
-from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.std_msgs import Empty
-from rbxcompose.qos import Qos
 from rbxcompose.testing import Bench, instance
 
 SLOW, FAST, ZERO = Twist(linear=Vector3(x=0.1)), Twist(linear=Vector3(x=0.4)), Twist()
@@ -74,13 +73,7 @@ def locked_bench() -> tuple[Bench, list[DiagnosticStatus]]:
     inputs = {"teleop": {"priority": 100, "timeout": "0.5 s"}, "navigation": {"priority": 10, "timeout": "0.5 s"}}
     locks = {"deadman": {"priority": 50, "timeout": "0.3 s"}}
     robot = Bench(instance("cmd_vel", "mux", {"output": "cmd_vel", "inputs": inputs, "locks": locks}))
-    told: list[DiagnosticStatus] = []
-
-    def note(message: DiagnosticArray) -> None:
-        told.extend(status for status in message.status if status.name == "cmd_vel")
-
-    robot.bus.subscribe("test", "/diagnostics", DiagnosticArray, Qos.EVENT, note)
-    return robot, told
+    return robot, robot.statuses("cmd_vel")
 
 
 def test_a_lock_without_a_heartbeat_is_a_warning_that_names_what_is_locked_out() -> None:

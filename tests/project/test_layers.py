@@ -74,8 +74,8 @@ ABOVE = {
     "sections": "sdk",
     "sim": "",
     "skills": "sdk",
-    "testing": "bus compiler components model.wires plan.model recording.message rendering.text runtime.process_group "
-    "runtime.records sdk",
+    "testing": "bus compiler components model.wires params plan.model recording.message rendering.text "
+    "runtime.process_group runtime.records sdk",
 }
 CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}  # pure: no bus, thread or clock
 TABLE = {

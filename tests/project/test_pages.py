@@ -6,14 +6,12 @@ import subprocess
 import sys
 
 from docs import generate
-from docs.generating.components import MADE_OF_SECTIONS
 from docs.generating.families import declared, next_code
 from rbxcompose.check_runner import OWN
 from rbxcompose.expressions.types import TYPES
 from rbxcompose.finding_pages import FAMILIES, all_kinds, family_of
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import ROBOT
-from rbxcompose.sdk.registry import PLUGINS
 
 
 def test_every_page_is_there_and_none_is_out_of_date() -> None:
@@ -32,10 +30,6 @@ def test_every_section_has_an_example() -> None:
 def test_every_type_has_its_row() -> None:
     page = generate.pages()["reference/expressions.md"]
     assert [name for name in (*TYPES, "choice") if f"| `{name}` |" not in page] == []
-
-
-def test_only_types_that_ship_are_made_of_sections() -> None:
-    assert MADE_OF_SECTIONS.keys() <= PLUGINS.shipped
 
 
 def test_every_code_belongs_to_a_family() -> None:
