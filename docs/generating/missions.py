@@ -11,7 +11,7 @@ from rbxcompose.expressions.text import Template
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.manifest.arguments import ArgumentModel
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.language.asked import Asked, Assignment
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.reader import INTERRUPT_KEYS
@@ -47,7 +47,7 @@ class Told(Asking):
         super().__init__(key)
         self.words: dict[str, str] = {}
 
-    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Scalar | None:
+    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> ScalarNode | None:
         """Note a word."""
         self.words[key] = what
         return super().scalar(key, what)
@@ -72,7 +72,7 @@ class Told(Asking):
         self.words[key] = "the name of a branch"
         return super().branch(key, branches)
 
-    def name(self, key: str, what: str) -> Scalar:
+    def name(self, key: str, what: str) -> ScalarNode:
         """Note a name."""
         self.words[key] = what
         return super().name(key, what)

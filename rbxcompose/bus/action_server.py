@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 from rbxcompose.bus.allowance import Allowance
 from rbxcompose.bus.gate import BURST, GOALS
 from rbxcompose.bus.goals import Goal, Goals, GoalState
-from rbxcompose.bus.local import Node
+from rbxcompose.bus.local import Participant
 from rbxcompose.bus.names import ActionNames
 from rbxcompose.bus.services import Request, Server, Services
 from rbxcompose.bus.topics import Publisher, Topics
@@ -69,7 +69,7 @@ class ActionServer(Generic[G, R, F]):
         self,
         topics: Topics,
         services: Services,
-        node: Node,
+        node: Participant,
         name: str,
         action: type[Action[G, R, F]],
         accept: Callable[[G], str],

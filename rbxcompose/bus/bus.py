@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from rbxcompose.bus.action_client import ActionClient
 from rbxcompose.bus.action_server import ActionServer
 from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import Node, Process, Refusing
+from rbxcompose.bus.local import BusProcess, Participant, Refusing
 from rbxcompose.bus.orders import OrderPublisher
 from rbxcompose.bus.services import Client, Request, Server, Services
 from rbxcompose.bus.tokens import publishers_pattern
@@ -53,9 +53,9 @@ class Bus:
     ) -> None:
         self._transport = transport if transport is not None else Nowhere()
         space = f"/{namespace.strip('/')}" if namespace else ""
-        self._process = Process(scheduler, clock, self._transport, WIRE_PROFILES[wire], domain, space, log)
+        self._process = BusProcess(scheduler, clock, self._transport, WIRE_PROFILES[wire], domain, space, log)
         self._topics, self._services = Topics(), Services(witness=witness)
-        self._nodes: dict[str, Node] = {}
+        self._nodes: dict[str, Participant] = {}
 
     def __len__(self) -> int:
         """Return how many publishers, subscriptions, servers and clients are declared."""
@@ -181,12 +181,12 @@ class Bus:
             self.close_owner(owner)
         self._transport.close()
 
-    def _node(self, owner: str) -> Node:
+    def _node(self, owner: str) -> Participant:
         if owner not in self._nodes:
-            self._nodes[owner] = Node(self._process, owner)
+            self._nodes[owner] = Participant(self._process, owner)
         return self._nodes[owner]
 
 
-def _kept(node: Node, end: C) -> C:
+def _kept(node: Participant, end: C) -> C:
     node.keep(end)
     return end

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from rbxcompose.bus.allowance import Allowances
 from rbxcompose.bus.attachment import AttachmentError, decode_attachment
-from rbxcompose.bus.local import Node
+from rbxcompose.bus.local import Participant
 from rbxcompose.bus.refusals import Refusal, Refusals
 from rbxcompose.bus.transport import Question
 
@@ -21,7 +21,7 @@ SOMEBODY = b""  # who asks without saying who it is
 class Gate:
     """Lets in what each asker may ask. It is called in threads of the transport and wakes nobody for the rest."""
 
-    def __init__(self, node: Node, name: str, rate: float, put: Callable[[Question], None]) -> None:
+    def __init__(self, node: Participant, name: str, rate: float, put: Callable[[Question], None]) -> None:
         """Hand at most `rate` requests a second [Hz] of each asker to `put`; `name` is what findings call it."""
         self.owner, self.name = node.owner, name
         self.refusals = Refusals()

@@ -13,7 +13,7 @@ from rbxcompose.bus.attachment import Attachment, decode_attachment
 from rbxcompose.bus.classes import SERVICE_QOS
 from rbxcompose.bus.gate import REQUESTS, Gate
 from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import Node, Registry
+from rbxcompose.bus.local import Participant, Registry
 from rbxcompose.bus.tokens import EntityKind, gid, session_of
 from rbxcompose.bus.transport import Answer, Closable, Question
 from rbxcompose.bus.witness import Call, Witness
@@ -79,7 +79,7 @@ class Server(Generic[Q, R]):
     def __init__(
         self,
         services: Services,
-        node: Node,
+        node: Participant,
         name: str,
         service: type[Service[Q, R]],
         handle: Callable[[Request[Q, R]], None],
@@ -198,7 +198,7 @@ class _Waiting(Generic[R]):
 class Client(Generic[Q, R]):
     """Asks a service. A server of the same process is preferred; replies come by the scheduler."""
 
-    def __init__(self, services: Services, node: Node, name: str, service: type[Service[Q, R]]) -> None:
+    def __init__(self, services: Services, node: Participant, name: str, service: type[Service[Q, R]]) -> None:
         endpoint = node.endpoint(EntityKind.CLIENT, name, service, SERVICE_QOS)
         self.route, self.gid = endpoint.route, endpoint.gid
         self._services, self._process, self._owner = services, node.process, node.owner

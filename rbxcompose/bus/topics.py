@@ -12,7 +12,7 @@ from rbxcompose.bus.allowance import Allowances
 from rbxcompose.bus.attachment import Attachment, AttachmentError, decode_attachment
 from rbxcompose.bus.classes import expects_speech, most_per_second, queue_depth, ros_qos
 from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import Node, Registry
+from rbxcompose.bus.local import Participant, Registry
 from rbxcompose.bus.refusals import Refusal, Refusals
 from rbxcompose.bus.tokens import EntityKind
 from rbxcompose.bus.transport import Arrival, Closable
@@ -47,7 +47,7 @@ class Topics:
 class Publisher(Generic[M]):
     """Publishes one message per call."""
 
-    def __init__(self, topics: Topics, node: Node, topic: str, message: type[M], qos: Qos) -> None:
+    def __init__(self, topics: Topics, node: Participant, topic: str, message: type[M], qos: Qos) -> None:
         endpoint = node.endpoint(EntityKind.PUBLISHER, topic, message, ros_qos(qos))
         self.route, self.gid = endpoint.route, endpoint.gid
         self.kept: Delivery[M] | None = None  # the last message of a latched topic
@@ -94,7 +94,7 @@ class Subscription(Generic[M]):
     def __init__(
         self,
         topics: Topics,
-        node: Node,
+        node: Participant,
         topic: str,
         message: type[M],
         qos: Qos,

@@ -38,7 +38,7 @@ def command_timeout(robot: Robot) -> Iterator[Finding]:
     for base, drives in robot.declared(Drives):
         allowed = drives.stops_after
         for source in flow.fed_by(base, drives.commands) if allowed else ():
-            period = period_of(robot.parts[source.instance])
+            period = period_of(robot.components[source.instance])
             if allowed and period is not None and allowed.value <= period:
                 yield command_timeout.at(
                     setting_span(robot, (base, allowed.field)),
@@ -47,5 +47,5 @@ def command_timeout(robot: Robot) -> Iterator[Finding]:
                     help=f"make it several times as long: '{format_quantity(10 * period, TIME)}'"
                     if allowed.field
                     else OTHER_TYPE,
-                    related=[Related(robot.part_span(source.instance), "sends the commands")],
+                    related=[Related(robot.component_span(source.instance), "sends the commands")],
                 )

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.model.robot import Part, Robot
+from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.model.wires import End
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.capabilities import RunsMissions
@@ -43,15 +43,17 @@ def needed_port(robot: Robot) -> Iterator[Finding]:
     """
     given = {(type(end.port), end.topic) for end in robot.ends}
     lost = {end.type_name for ends in robot.writers.values() for end in ends if is_unheard(robot, end)}
-    for part in robot.parts.values():
-        if part.declared(RunsMissions):
+    for component in robot.components.values():
+        if component.declared(RunsMissions):
             continue  # its values may come from outside, and its skills are those that are there
-        needed = [end for end in part.ends if type(end.port) in SERVED_BY and not getattr(end.port, "is_open", False)]
+        needed = [
+            end for end in component.ends if type(end.port) in SERVED_BY and not getattr(end.port, "is_open", False)
+        ]
         missing = [end for end in needed if (SERVED_BY[type(end.port)], end.topic) not in given]
         # A command that goes nowhere is told where it leaves.
         ends = [end for end in missing if not (_is_command(end) and end.type_name in lost)]
         if ends:
-            yield _finding(robot, part, ends)
+            yield _finding(robot, component, ends)
 
 
 def is_unheard(robot: Robot, end: End) -> bool:
@@ -63,13 +65,13 @@ def _is_command(end: End) -> bool:
     return isinstance(end.port, In) and end.port.qos is Qos.COMMAND
 
 
-def _finding(robot: Robot, part: Part, ends: list[End]) -> Finding:
+def _finding(robot: Robot, component: RobotComponent, ends: list[End]) -> Finding:
     names = " and ".join(f"'{end.topic}'" for end in ends)
     near = [(end, other) for end in ends for other in robot.ends if _fits(end, other)]
     fix = ", ".join(f"{end.name}: {other.topic.strip('/')}" for end, other in near)
     return needed_port.at(
         robot.end_span(ends[0]),
-        f"'{part.name}' needs {names}, which nobody in the robot gives",
+        f"'{component.name}' needs {names}, which nobody in the robot gives",
         help=f"connect it: 'connect: {{{fix}}}'" if fix else "add the component that gives it",
         related=[Related(robot.end_span(other), f"'{other.topic}' is of this type") for _, other in near],
     )

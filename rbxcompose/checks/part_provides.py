@@ -43,8 +43,8 @@ def part_provides(robot: Robot) -> Iterator[Finding]:
     ```
     """
     for part in robot.manifest.parts.values():
-        ends = [end for name in own_instances(part) & robot.parts.keys() for end in robot.parts[name].ends]
-        if (part.components & robot.written) - robot.parts.keys():
+        ends = [end for name in own_instances(part) & robot.components.keys() for end in robot.components[name].ends]
+        if (part.components & robot.written) - robot.components.keys():
             continue  # one of its components has mistakes, which are said at their own places
         for claim in part.claims:
             if claim.about is not About.NEED and (what := _lacking(robot, claim, ends)):

@@ -48,11 +48,11 @@ def two_servers(robot: Robot) -> Iterator[Finding]:
         other = first.setdefault(end.topic, end.instance)
         if other != end.instance:
             yield two_servers.at(
-                robot.part_span(end.instance),
+                robot.component_span(end.instance),
                 f"'{end.instance}' and '{other}' both serve '{end.topic}'",
                 label="this one",
                 help=f"give one of them another name: 'connect: {{{end.name}: ...}}'",
-                related=[Related(robot.part_span(other), "and this one")],
+                related=[Related(robot.component_span(other), "and this one")],
             )
 
 

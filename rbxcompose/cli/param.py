@@ -27,7 +27,7 @@ from rbxcompose.cli.bus.place import add_bus_options
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping as MappingNode
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs import registry

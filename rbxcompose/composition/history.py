@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Mapping, Node, Path, at
+from rbxcompose.manifest.tree import MappingNode, Path, TreeNode, at
 
 ROBOT_LAYER = "the robot"
 
@@ -16,7 +16,7 @@ class Step:
     """What one layer wrote: a node with its place, or None where it took the value away."""
 
     layer: str
-    node: Node | None
+    node: TreeNode | None
     span: Span
 
 
@@ -54,7 +54,9 @@ class History:
     def removed(self, section: str) -> dict[str, Span]:
         """Return the entries of a section that were there and are gone, each with the place that took it away."""
         names = {path[1] for path in self._steps if len(path) == 2 and path[0] == section}
-        names |= {name for step in self.of((section,)) if isinstance(step.node, Mapping) for name in step.node.entries}
+        names |= {
+            name for step in self.of((section,)) if isinstance(step.node, MappingNode) for name in step.node.entries
+        }
         last = {str(name): steps[-1] for name in names if (steps := self.of((section, name)))}
         return {name: step.span for name, step in last.items() if step.node is None}
 

@@ -22,7 +22,7 @@ from rbxcompose.manifest.limits import ALL_BYTES, INCLUDE_DEPTH, INSTANCES
 from rbxcompose.manifest.registry import naming, sections
 from rbxcompose.manifest.renamer import Topic
 from rbxcompose.manifest.section import PART, Contents, Section
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence, at, key_span, value_span
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import WRONG_TYPE
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.references import COMPONENT, VALUE
@@ -80,9 +80,9 @@ class Instance:
     name: str  # its path: `arm.hand`
     file: str  # as findings show it
     span: Span  # of the entry that includes it
-    root: Mapping
-    arguments: Mapping  # the section `args` of its file
-    given: Mapping  # `with:`
+    root: MappingNode
+    arguments: MappingNode  # the section `args` of its file
+    given: MappingNode  # `with:`
     claims: tuple[Claim, ...]
 
 
@@ -90,7 +90,7 @@ class Instance:
 class _File:
     """A part's file: its tree, and what it needs and provides."""
 
-    root: Mapping
+    root: MappingNode
     claims: tuple[Claim, ...]
 
 
@@ -114,7 +114,7 @@ class Parts:
     _count: int = 0
     _size: int = 0
 
-    def instances(self, root: Mapping, path: str = "", above: tuple[_Open, ...] = ()) -> Iterator[Instance]:
+    def instances(self, root: MappingNode, path: str = "", above: tuple[_Open, ...] = ()) -> Iterator[Instance]:
         """Yield what `include:` of a file brings, an instance behind those that it includes itself."""
         for name, entry, read in Contents(root, self.robot, self.documents).of(include):
             opened = self._open(read, entry, above) if read else None
@@ -174,7 +174,7 @@ class Parts:
         self.is_complete &= self._files[path] is not None
         return self._files[path]
 
-    def _renamed(self, name: str, read: Include, written: Node, inside: list[Instance]) -> Iterator[Instance]:
+    def _renamed(self, name: str, read: Include, written: TreeNode, inside: list[Instance]) -> Iterator[Instance]:
         """Yield an instance and what it includes under the names of the file that includes it."""
         connect = {
             topic: Topic(new, value_span(written, ("connect", topic)), key_span(written, ("connect", topic)))
@@ -208,7 +208,7 @@ def _instance(name: str, file: _File, opened: _Open, entry: Entry) -> Instance:
         span=opened.span,
         root=replace(scoped, entries={key: one for key, one in scoped.entries.items() if key not in own}),
         arguments=replace(scoped, entries={key: one for key, one in scoped.entries.items() if key == args.name}),
-        given=given if isinstance(given, Mapping) else Mapping({}, opened.span),
+        given=given if isinstance(given, MappingNode) else MappingNode({}, opened.span),
         claims=file.claims,
     )
 
@@ -221,16 +221,16 @@ def _circle(chain: list[_Open], span: Span) -> Finding:
     return CIRCLE.at(span, f"parts include each other in a circle: {names}", related=related)
 
 
-def in_scope(root: Mapping, scope: str) -> Mapping:
+def in_scope(root: MappingNode, scope: str) -> MappingNode:
     """Return a tree whose `${args...}` mean the arguments of the instance `scope`."""
 
-    def scoped(node: Node) -> Node:
+    def scoped(node: TreeNode) -> TreeNode:
         match node:
-            case Scalar(text=text):
+            case ScalarNode(text=text):
                 return replace(node, scope=scope) if "$" in text else node
-            case Sequence(items=items):
+            case SequenceNode(items=items):
                 return replace(node, items=tuple(map(scoped, items)))
-            case Mapping(entries=entries):
+            case MappingNode(entries=entries):
                 return replace(node, entries={name: Entry(one.key, scoped(one.value)) for name, one in entries.items()})
 
     return replace(root, entries={name: Entry(one.key, scoped(one.value)) for name, one in root.entries.items()})
@@ -250,6 +250,6 @@ def included_parts(instances: SequenceOf[Instance]) -> dict[str, IncludedPart]:
     return found
 
 
-def _names(roots: Iterable[Mapping], those: Iterable[Section[Any, Any]]) -> frozenset[str]:
+def _names(roots: Iterable[MappingNode], those: Iterable[Section[Any, Any]]) -> frozenset[str]:
     chosen = list(those)
     return frozenset(name for root in roots for section in chosen for name in section.names_in(root))

@@ -12,8 +12,7 @@ from operator import is_
 from rbxcompose.composition.history import History, Step
 from rbxcompose.findings import Related, Report, Span, correction, kind, suggest
 from rbxcompose.manifest.registry import section_named
-from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar
-from rbxcompose.manifest.tree import Sequence as NodeSequence
+from rbxcompose.manifest.tree import BROKEN, Entry, MappingNode, Path, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.walk import REMOVE
 
 NOTHING_TO_CHANGE = kind(
@@ -95,8 +94,8 @@ SET = "--set"
 
 
 def compose(
-    base: Mapping, overlays: Iterable[tuple[Mapping, str]], report: Report, history: History | None = None
-) -> Mapping:
+    base: MappingNode, overlays: Iterable[tuple[MappingNode, str]], report: Report, history: History | None = None
+) -> MappingNode:
     """Return `base`, which is settled, changed by each overlay in turn; each comes with its name for findings."""
     composed = base
     for overlay, name in overlays:
@@ -104,12 +103,12 @@ def compose(
     return composed
 
 
-def join(parts: Iterable[tuple[Mapping, str, Span]], report: Report, history: History) -> Mapping:
+def join(parts: Iterable[tuple[MappingNode, str, Span]], report: Report, history: History) -> MappingNode:
     """Return what several parts bring together; each comes with its instance and the place that includes it.
 
     A part stands behind those that it includes, and may change them; what else two parts bring is a finding.
     """
-    joined = Mapping()
+    joined = MappingNode()
     for root, instance, span in parts:
         joined = _Join(instance, span, report, history).mapping(joined, _spelt_out(root), ())
     return joined
@@ -120,26 +119,26 @@ def part_layer(instance: str) -> str:
     return f"part '{instance}'"
 
 
-def settled(root: Mapping, report: Report) -> Mapping:
+def settled(root: MappingNode, report: Report) -> MappingNode:
     """Return a tree that nothing lies below: short forms written in full, and a finding for each `!remove`."""
     return _settled_map(_spelt_out(root), report)
 
 
-def _spelt_out(root: Mapping) -> Mapping:
+def _spelt_out(root: MappingNode) -> MappingNode:
     """Write the short forms of section entries in full, so that every layer can change a part of them."""
     entries = dict(root.entries)
     for name, entry in root.entries.items():
         short = section.short if (section := section_named(name)) else None
-        if short is not None and short.is_merged and isinstance(named := entry.value, Mapping):
+        if short is not None and short.is_merged and isinstance(named := entry.value, MappingNode):
             full = {key: replace(one, value=_in_full(one.value, short.key)) for key, one in named.entries.items()}
             entries[name] = replace(entry, value=replace(named, entries=full))
     return replace(root, entries=entries)
 
 
-def _in_full(value: Node, key: str) -> Node:
-    if not isinstance(value, Scalar):
+def _in_full(value: TreeNode, key: str) -> TreeNode:
+    if not isinstance(value, ScalarNode):
         return value
-    return Mapping({key: Entry(Scalar(key, value.span), value)}, value.span)
+    return MappingNode({key: Entry(ScalarNode(key, value.span), value)}, value.span)
 
 
 class _Merge:
@@ -150,7 +149,7 @@ class _Merge:
         self.report = report
         self.history = history
 
-    def mapping(self, base: Mapping, over: Mapping, path: Path) -> Mapping:
+    def mapping(self, base: MappingNode, over: MappingNode, path: Path) -> MappingNode:
         entries = dict(base.entries)
         for name, entry in over.entries.items():
             self.entry(entries, entry, (*path, name))
@@ -163,7 +162,7 @@ class _Merge:
         is_gone = is_removal(entry.value)
         if below is None:
             (self._nothing_to_remove if is_gone else self._add)(entries, entry, path)
-        elif isinstance(below.value, Mapping) and isinstance(entry.value, Mapping) and not entry.value.tag:
+        elif isinstance(below.value, MappingNode) and isinstance(entry.value, MappingNode) and not entry.value.tag:
             if self.may_merge(path):
                 entries[name] = replace(below, value=self.mapping(below.value, entry.value, path))
             else:
@@ -199,7 +198,7 @@ class _Merge:
         name = entry.key.text
         section = section_named(path[0]) if len(path) == 2 else None
         one, needed = (section.entry, section.needs) if section else ("", "")
-        if needed and isinstance(entry.value, Mapping) and needed not in entry.value:
+        if needed and isinstance(entry.value, MappingNode) and needed not in entry.value:
             message = f"{self.overlay} changes the {one} '{name}', which the robot does not have"
             help_text = suggest(name, entries, str(path[0])) or f"a new {one} needs a '{needed}:'"
             fix = correction(name, entries, entry.key.span)
@@ -244,37 +243,37 @@ def _is_shared(path: Path) -> bool:
     return section is not None and section.is_shared(path[1:])
 
 
-def _settled(node: Node, report: Report) -> Node:
+def _settled(node: TreeNode, report: Report) -> TreeNode:
     """Return a node without the tags of maps: nothing lies below it that they could speak of.
 
     A list keeps its `!replace`, which says that what is not in it any more was meant to go.
     """
     match node:
-        case Scalar():
+        case ScalarNode():
             return node
-        case Mapping():
+        case MappingNode():
             return _settled_map(node, report)
-        case NodeSequence(items=items):
+        case SequenceNode(items=items):
             inner = tuple(_settled(item, report) for item in items)
             return node if all(map(is_, inner, items)) else replace(node, items=inner)
 
 
-def is_removal(node: Node) -> bool:
+def is_removal(node: TreeNode) -> bool:
     """Tell whether a layer takes away what lies below it."""
-    return isinstance(node, Mapping) and node.tag == REMOVE
+    return isinstance(node, MappingNode) and node.tag == REMOVE
 
 
-def _settled_map(node: Mapping, report: Report) -> Mapping:
+def _settled_map(node: MappingNode, report: Report) -> MappingNode:
     """Return a map without tags; the same object if there are none."""
     changed: dict[str, Entry] = {}
     for name, entry in node.entries.items():
         value = entry.value
-        if isinstance(value, Scalar):
+        if isinstance(value, ScalarNode):
             continue
         if is_removal(value):
             message = f"'!remove' has nothing to remove '{name}' from"
             report.add(NOT_AN_OVERLAY.at(value.span, message, help="it belongs in a profile"))
-            changed[name] = Entry(entry.key, Scalar("", value.span, filled=BROKEN))  # so that nobody misses it
+            changed[name] = Entry(entry.key, ScalarNode("", value.span, filled=BROKEN))  # so that nobody misses it
         elif (inner := _settled(value, report)) is not value:
             changed[name] = Entry(entry.key, inner)
-    return Mapping({**node.entries, **changed}, node.span) if changed or node.tag else node
+    return MappingNode({**node.entries, **changed}, node.span) if changed or node.tag else node

@@ -13,7 +13,7 @@ from rbxcompose.manifest.arguments import Argument
 from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.fill_names import Names, Typed, with_arguments
 from rbxcompose.manifest.section import Contents
-from rbxcompose.manifest.tree import BROKEN, Mapping
+from rbxcompose.manifest.tree import BROKEN, MappingNode
 from rbxcompose.manifest.validate import UNKNOWN_KEY
 from rbxcompose.sections.args import args
 
@@ -40,7 +40,7 @@ args:
 )
 
 
-def fill_scopes(composed: Composed, names: Names) -> tuple[Mapping, Mapping]:
+def fill_scopes(composed: Composed, names: Names) -> tuple[MappingNode, MappingNode]:
     """Return the robot's sections and its `include:` with every `${...}` filled in.
 
     The arguments' own values come first: those of the robot, then those of each instance, which are given in the scope

@@ -9,7 +9,7 @@ from rbxcompose.findings import Report, Span, kind, suggest
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.registry import section_named, sections
 from rbxcompose.manifest.section import ROBOT, Scope
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.sections.include import include
 
 BAD_SET = kind(
@@ -28,8 +28,8 @@ HEADER = ("about",)  # what it may change of the header
 
 
 def read_sets(
-    sets: Sequence[str], root: Mapping, report: Report, sources: dict[str, str], *, of_include: bool = False
-) -> list[tuple[Mapping, str]]:
+    sets: Sequence[str], root: MappingNode, report: Report, sources: dict[str, str], *, of_include: bool = False
+) -> list[tuple[MappingNode, str]]:
     """Return one overlay for each `PATH=VALUE`; together they are one source, a line for each.
 
     Those of `include` come in a run of their own, since parts are read before all else is composed.
@@ -44,7 +44,7 @@ def read_sets(
     return [(overlay, f"'{SET}'") for overlay in overlays if overlay]
 
 
-def _set_overlay(text: str, line: int, root: Mapping, report: Report) -> Mapping | None:
+def _set_overlay(text: str, line: int, root: MappingNode, report: Report) -> MappingNode | None:
     written, equals, value_text = text.partition("=")
     span = Span(SET, line, 1, line, len(written) + 1)
     names = written.strip().split(".")
@@ -64,11 +64,11 @@ def _set_overlay(text: str, line: int, root: Mapping, report: Report) -> Mapping
         report.add(BAD_SET.at(span, message, help=f"write {SET} {path[1]}.KEY=VALUE"))
         return None
     for name in reversed(path):
-        value = Mapping({name: Entry(Scalar(name, span), value)}, span)
-    return value if isinstance(value, Mapping) else None
+        value = MappingNode({name: Entry(ScalarNode(name, span), value)}, span)
+    return value if isinstance(value, MappingNode) else None
 
 
-def _set_path(names: list[str], span: Span, root: Mapping, report: Report) -> list[str] | None:
+def _set_path(names: list[str], span: Span, root: MappingNode, report: Report) -> list[str] | None:
     """Return the path from the root, or None after a finding if it leads to nothing."""
     section = section_named(names[0]) if names[0] not in HEADER else None
     scope = section.scope if section else Scope.NOTHING
@@ -93,7 +93,7 @@ def settable() -> list[str]:
     return [*HEADER, *(one.name for one in sections(ROBOT) if one.scope is not Scope.NOTHING)]
 
 
-def in_section(names: Sequence[str], root: Mapping) -> str:
+def in_section(names: Sequence[str], root: MappingNode) -> str:
     """Return the help for a path that begins with a name of a section, not with the section; else nothing."""
     for section in sections():
         if section.is_map and section.scope is not Scope.NOTHING and names[0] in section.names_in(root):
@@ -101,10 +101,10 @@ def in_section(names: Sequence[str], root: Mapping) -> str:
     return ""
 
 
-def _set_value(text: str, line: int, column: int, report: Report) -> Node | None:
+def _set_value(text: str, line: int, column: int, report: Report) -> TreeNode | None:
     """Read the value of a `--set`; blank lines and columns before it make its places those of the argument."""
     if not text.strip():
-        return Scalar("", Span(SET, line, column, line, column + 1))
+        return ScalarNode("", Span(SET, line, column, line, column + 1))
     node, findings = read_text("\n" * (line - 1) + " " * column + text, SET)
     report.extend(findings)
     return node

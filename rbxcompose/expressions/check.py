@@ -12,6 +12,7 @@ from rbxcompose.expressions.tree import (
     Call,
     Comparison,
     Expression,
+    ExpressionNode,
     Field,
     Flag,
     Index,
@@ -19,7 +20,6 @@ from rbxcompose.expressions.tree import (
     Junction,
     Membership,
     Minus,
-    Node,
     Not,
     Number,
     Text,
@@ -105,11 +105,11 @@ class _Checker:
     def sorted(self) -> list[Problem]:
         return sorted(self.problems, key=lambda problem: (problem.start, problem.end))
 
-    def wrong(self, node: Node, message: str, fix: str = "", meant: str | None = "") -> Type:
+    def wrong(self, node: ExpressionNode, message: str, fix: str = "", meant: str | None = "") -> Type:
         self.problems.append(Problem(message, node.start, node.end, fix, meant or ""))
         return UNKNOWN
 
-    def type_of(self, node: Node, expected: Type = UNKNOWN) -> Type:
+    def type_of(self, node: ExpressionNode, expected: Type = UNKNOWN) -> Type:
         """Return the type of a node; `expected` tells which choices a bare word may be."""
         match node:
             case Number(value=value, dimension=dimension):
@@ -146,7 +146,7 @@ class _Checker:
             case Arithmetic():
                 return self.arithmetic(node)
 
-    def require(self, node: Node, expected: Type) -> Type:
+    def require(self, node: ExpressionNode, expected: Type) -> Type:
         """Say what is wrong if a node is not of the type `expected`; return that type."""
         found = self.type_of(node, expected)
         if accepts(expected, found):
@@ -217,7 +217,7 @@ class _Checker:
             self.joined(node, left, right, "is compared with")
         return FLAG
 
-    def pair(self, left: Node, right: Node) -> tuple[_Typed, _Typed]:
+    def pair(self, left: ExpressionNode, right: ExpressionNode) -> tuple[_Typed, _Typed]:
         """Return two nodes with their types; a bare word may be a choice of the other one's type."""
         if isinstance(left, Word | Text):
             other = self.type_of(right)
@@ -244,7 +244,7 @@ class _Checker:
                 self.wrong(node.group, f"'in' needs a list or a map; this is {group.phrase}")
         return FLAG
 
-    def equality(self, node: Node, left: _Typed, right: _Typed) -> None:
+    def equality(self, node: ExpressionNode, left: _Typed, right: _Typed) -> None:
         if left.type.measure and right.type.measure:
             self.joined(node, left, right, "is compared with")
         elif not are_comparable(left.type, right.type):
@@ -252,7 +252,7 @@ class _Checker:
             fix = "write 'distance(a, b) < 10 cm'" if poses else ""
             self.wrong(node, f"{left.type.phrase} is compared with {right.type.phrase}", fix)
 
-    def joined(self, node: Node, left: _Typed, right: _Typed, verb: str) -> Type:
+    def joined(self, node: ExpressionNode, left: _Typed, right: _Typed, verb: str) -> Type:
         """Return the type of a sum, of the least or the greatest of two measured values."""
         one, other = left.type.measure, right.type.measure
         if not one or not other:
@@ -276,7 +276,7 @@ class _Checker:
             self.wrong(typed.node, f"this must be a number; it is {typed.type.phrase}")
         return typed.type.measure is not None
 
-    def measured(self, node: Node) -> Type:
+    def measured(self, node: ExpressionNode) -> Type:
         found = self.type_of(node)
         return found if self.is_measured(_Typed(node, found)) else UNKNOWN
 
@@ -344,7 +344,7 @@ class _Checker:
 class _Typed:
     """A node with its type."""
 
-    node: Node
+    node: ExpressionNode
     type: Type
 
 

@@ -15,6 +15,7 @@ from rbxcompose.expressions.tree import (
     Call,
     Comparison,
     Expression,
+    ExpressionNode,
     Field,
     Flag,
     Index,
@@ -22,7 +23,6 @@ from rbxcompose.expressions.tree import (
     Junction,
     Membership,
     Minus,
-    Node,
     Not,
     Number,
     Text,
@@ -87,7 +87,7 @@ def holds(expression: Expression, scope: Scope) -> bool:
         return False
 
 
-def _run(node: Node) -> Run:
+def _run(node: ExpressionNode) -> Run:
     """Return what computes the value of a part of an expression."""
     match node:
         case Variable():
@@ -112,7 +112,7 @@ def _run(node: Node) -> Run:
             return lambda scope: [run(scope) for run in runs]
 
 
-def _ask(node: Node) -> Ask:
+def _ask(node: ExpressionNode) -> Ask:
     """Return what tells whether a part of an expression is true; it may be nothing else."""
     match node:
         case Flag(value=flag):
@@ -143,7 +143,7 @@ def _is_among(sought: Value, group: list[Value]) -> bool:
     return any(is_same(sought, each) for each in group)
 
 
-def _measure(node: Node) -> Measure:
+def _measure(node: ExpressionNode) -> Measure:
     """Return what computes a part of an expression that must be a number."""
     if isinstance(node, Number):
         number = node.value
@@ -173,14 +173,14 @@ def _variable(node: Variable) -> Run:
     return run
 
 
-def _known(look_up: Callable[[str], Value], name: str, shown: str, node: Node) -> Value:
+def _known(look_up: Callable[[str], Value], name: str, shown: str, node: ExpressionNode) -> Value:
     try:
         return look_up(name)
     except KeyError:
         raise EvaluationError(f"unknown name '{shown}'", node.start, node.end) from None
 
 
-def _number(value: Value, node: Node) -> float:
+def _number(value: Value, node: ExpressionNode) -> float:
     # NaN compares as false whatever is asked, so that `not` would make it true.
     if isinstance(value, float) and value == value:
         return value
@@ -189,13 +189,13 @@ def _number(value: Value, node: Node) -> float:
     raise EvaluationError("this is not a number", node.start, node.end)
 
 
-def _moderate(value: float, node: Node) -> float:
+def _moderate(value: float, node: ExpressionNode) -> float:
     if not abs(value) < MOST:
         raise EvaluationError("the result is not finite or not below 1e15", node.start, node.end)
     return value
 
 
-def _limited(value: Value, node: Node) -> Value:
+def _limited(value: Value, node: ExpressionNode) -> Value:
     if isinstance(value, str) and len(value) > LONGEST_TEXT:
         raise EvaluationError(f"the text has more than {LONGEST_TEXT:,} characters", node.start, node.end)
     if isinstance(value, list | tuple | Mapping) and len(value) > MOST_ITEMS:
@@ -203,7 +203,7 @@ def _limited(value: Value, node: Node) -> Value:
     return value
 
 
-def _limited_within(value: Value, node: Node) -> Value:
+def _limited_within(value: Value, node: ExpressionNode) -> Value:
     """Return a value; one that a mission makes larger with each round, such as `[$x, $x]`, comes to its end here."""
     level, left = [value], MOST_IN_ALL
     for _ in range(MOST_LEVELS):
@@ -222,7 +222,7 @@ def _inside(value: Value) -> Collection[Value]:
     return value if isinstance(value, list | tuple) else ()
 
 
-def _items(value: Value, node: Node) -> list[Value]:
+def _items(value: Value, node: ExpressionNode) -> list[Value]:
     try:
         return items(value)
     except ValueError as error:

@@ -14,6 +14,7 @@ from rbxcompose.expressions.tree import (
     Comparison,
     Expression,
     ExpressionError,
+    ExpressionNode,
     Field,
     Flag,
     Index,
@@ -21,7 +22,6 @@ from rbxcompose.expressions.tree import (
     Junction,
     Membership,
     Minus,
-    Node,
     Not,
     Number,
     Text,
@@ -130,7 +130,7 @@ class _Parser:
         message = f"an operator is missing before '{token.text}'"
         return ExpressionError(message, token.start, token.end, _FOREIGN.get(token.text, ""))
 
-    def expression(self, binding: int = 0) -> Node:
+    def expression(self, binding: int = 0) -> ExpressionNode:
         """Read operands and all operators between them that bind more strongly than `binding`."""
         self.level += 1
         if self.level > LEVELS:
@@ -146,7 +146,7 @@ class _Parser:
         self.level -= 1
         return left
 
-    def operation(self, left: Node, strength: int) -> Node:
+    def operation(self, left: ExpressionNode, strength: int) -> ExpressionNode:
         operator = self.take()
         if operator.text in ("and", "or"):
             operands = [left, self.expression(strength)]
@@ -170,7 +170,7 @@ class _Parser:
             case _:
                 return Comparison(start, end, operator.text, left, right)
 
-    def operand(self) -> Node:
+    def operand(self) -> ExpressionNode:
         token = self.take()
         match token.kind:
             case TokenKind.NUMBER if token.quantity:
@@ -185,7 +185,7 @@ class _Parser:
                 return self.symbol(token)
         raise ExpressionError("a value is missing at the end", token.start, token.end)
 
-    def symbol(self, token: Token) -> Node:
+    def symbol(self, token: Token) -> ExpressionNode:
         match token.text:
             case "true" | "false":
                 return Flag(token.start, token.end, token.text == "true")
@@ -224,9 +224,9 @@ class _Parser:
         arguments, end = self.items(")", self.take())
         return Call(name.start, end, name.text, arguments)
 
-    def items(self, closing: str, opened: Token) -> tuple[tuple[Node, ...], int]:
+    def items(self, closing: str, opened: Token) -> tuple[tuple[ExpressionNode, ...], int]:
         """Read values between commas up to the closing bracket; return them and where it ends."""
-        read: list[Node] = []
+        read: list[ExpressionNode] = []
         if not self.at(closing):
             read.append(self.expression())
             while self.at(","):
@@ -234,7 +234,7 @@ class _Parser:
                 read.append(self.expression())
         return tuple(read), self.close(closing, opened).end
 
-    def parts(self, node: Node) -> Node:
+    def parts(self, node: ExpressionNode) -> ExpressionNode:
         """Read the fields and indices that follow data."""
         while self.at(".", "["):
             opened = self.take()

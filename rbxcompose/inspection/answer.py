@@ -10,7 +10,7 @@ from rbxcompose.composition.history import ROBOT_LAYER
 from rbxcompose.composition.overlay import SET
 from rbxcompose.findings import Span
 from rbxcompose.inspection.origin import Origin, as_data
-from rbxcompose.manifest.tree import Node
+from rbxcompose.manifest.tree import TreeNode
 from rbxcompose.printable import plain
 from rbxcompose.units import UNITS, Dimension, format_number
 
@@ -56,7 +56,7 @@ class Answer:
     hints: tuple[tuple[str, str], ...] = ()  # a label and a text
     place: str = ""
     body: str = ""
-    node: Node | None = None
+    node: TreeNode | None = None
 
     def text(self) -> str:
         """Return it for people."""

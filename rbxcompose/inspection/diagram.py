@@ -11,12 +11,12 @@ from rbxcompose.inspection.wire_keys import qos_of
 from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.program.sources import Way
-from rbxcompose.model.robot import Part, Robot, RobotMission
+from rbxcompose.model.robot import Robot, RobotComponent, RobotMission
 from rbxcompose.model.wires import End
 from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction
 
-MISSION = "mission"  # the part that runs missions
+MISSION = "mission"  # the component that runs missions
 TRANSFORMS = ("/tf", "/tf_static")  # what a look-up reads
 STATUSES = "/diagnostics"  # where every component reports, though none declares it
 
@@ -140,26 +140,26 @@ def key_of(mission: str | None) -> str:
 
 def _programs(robot: Robot) -> list[str]:
     """Return the missions, the one that `up` starts first."""
-    return sorted(robot.missions, key=lambda name: name != robot.manifest.start) if MISSION in robot.parts else []
+    return sorted(robot.missions, key=lambda name: name != robot.manifest.start) if MISSION in robot.components else []
 
 
 def _boxes(robot: Robot) -> Iterator[Box]:
-    for part in robot.parts.values():
-        shape = Shape.MUX if part.declared(Forwards) else Shape.COMPONENT
-        about = (part.cls.__doc__ or "").strip().partition("\n")[0]
-        yield Box(part.name, part.name, part.type_name, part.process, shape, about)
+    for component in robot.components.values():
+        shape = Shape.MUX if component.declared(Forwards) else Shape.COMPONENT
+        about = (component.cls.__doc__ or "").strip().partition("\n")[0]
+        yield Box(component.name, component.name, component.type_name, component.process, shape, about)
     for name in _programs(robot):
         program = robot.missions[name].program
-        yield Box(key_of(name), name, "mission", robot.parts[MISSION].process, Shape.PROGRAM, program.about)
+        yield Box(key_of(name), name, "mission", robot.components[MISSION].process, Shape.PROGRAM, program.about)
 
 
 def _wires(robot: Robot) -> Iterator[Wire]:
     """Yield the wires by what they carry and by name; nothing is drawn that nobody uses."""
     found: dict[tuple[Line, str], _Open] = {}
-    for part in robot.parts.values():
-        if part.name != MISSION:  # its missions are drawn in its place
-            for end in part.ends:
-                _add(robot, part, end, found)
+    for component in robot.components.values():
+        if component.name != MISSION:  # its missions are drawn in its place
+            for end in component.ends:
+                _add(robot, component, end, found)
     for name in _programs(robot):
         _add_mission(robot, robot.missions[name], key_of(name), found)
     _add_look_ups(robot, found)
@@ -168,14 +168,14 @@ def _wires(robot: Robot) -> Iterator[Wire]:
         yield Wire(topic, kind, wire.type, wire.qos, tuple(wire.sources), tuple(wire.targets), about)
 
 
-def _add(robot: Robot, part: Part, end: End, found: dict[tuple[Line, str], _Open]) -> None:
+def _add(robot: Robot, component: RobotComponent, end: End, found: dict[tuple[Line, str], _Open]) -> None:
     kind = _kind(end)
     if kind is None:
         return
     wire = found.setdefault((kind, end.topic), _Open(kind, end.type_name))
     wire.qos = wire.qos or qos_of(end.port)
     tips = wire.sources if isinstance(end.port, Out | Calls | CallsAction) else wire.targets
-    tips.append(Tip(part.name, _note(robot, part, end)))
+    tips.append(Tip(component.name, _note(robot, component, end)))
 
 
 def _kind(end: End) -> Line | None:
@@ -189,9 +189,9 @@ def _kind(end: End) -> Line | None:
     return None
 
 
-def _note(robot: Robot, part: Part, end: End) -> str:
+def _note(robot: Robot, component: RobotComponent, end: End) -> str:
     """Return the priority of an input or a lock of a mux."""
-    mux = robot.manifest.muxes.get(part.name)
+    mux = robot.manifest.muxes.get(component.name)
     if mux is None or not isinstance(end.port, In):
         return ""
     entry = mux.inputs.get(end.name) or mux.locks.get(end.name.removeprefix("lock_"))
@@ -229,7 +229,11 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
 
 def _add_look_ups(robot: Robot, found: dict[tuple[Line, str], _Open]) -> None:
     """Let each topic of transforms lead to those that look something up, by a line of its own kind."""
-    boxes = [part.name for part in robot.parts.values() if any(isinstance(end.port, Looks) for end in part.ends)]
+    boxes = [
+        component.name
+        for component in robot.components.values()
+        if any(isinstance(end.port, Looks) for end in component.ends)
+    ]
     boxes = [name for name in boxes if name != MISSION]
     boxes += [key_of(name) for name in _programs(robot) if POSE in robot.missions[name].program.reads()]
     for topic in TRANSFORMS:

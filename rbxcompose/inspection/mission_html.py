@@ -10,19 +10,19 @@ from rbxcompose.inspection.mission_style import STYLE
 from rbxcompose.inspection.mission_text import MARKS, status_of
 from rbxcompose.missions.program.look import Form
 from rbxcompose.missions.program.statuses import IDLE, NAMES
-from rbxcompose.missions.view.picture import Drawn, Picture
+from rbxcompose.missions.view.picture import Drawn, MissionPicture
 
 _LETTER, _SMALL = 7.6, 6.6  # width of a letter of names and of small text [px]
 _BESIDE = (Form.BESIDE, Form.MACHINE)
 _BOX, _PILL = 34.0, 22.0  # heights [px]
 
 
-def mission_html(picture: Picture, statuses: Sequence[int] = ()) -> str:
+def mission_html(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
     """Return the text of the page, with how each node stands if that is known; light or dark as the reader has it."""
     return "".join(f"{line}\n" for line in _page(picture, statuses))
 
 
-def _page(picture: Picture, statuses: Sequence[int]) -> Iterator[str]:
+def _page(picture: MissionPicture, statuses: Sequence[int]) -> Iterator[str]:
     title = escape(picture.name)
     yield "<!doctype html>"
     yield f'<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'

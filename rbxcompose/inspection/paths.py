@@ -8,7 +8,7 @@ from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.file_models import robot_keys
 from rbxcompose.manifest.registry import naming
 from rbxcompose.manifest.section import Scope
-from rbxcompose.manifest.tree import Mapping, Node, Path, Sequence, at
+from rbxcompose.manifest.tree import MappingNode, Path, SequenceNode, TreeNode, at
 from rbxcompose.model.robot import Robot
 from rbxcompose.printable import plain
 from rbxcompose.references import COMPONENT
@@ -36,7 +36,7 @@ def path_of(robot: Robot, text: str) -> Path:
         names.insert(0, _section_of(manifest, str(names[0])))
     for index, name in enumerate(names):
         above = found_at(manifest, tuple(names[:index]))
-        if isinstance(above, Sequence) and str(name).isdecimal():
+        if isinstance(above, SequenceNode) and str(name).isdecimal():
             names[index] = int(name)
     return tuple(names)
 
@@ -52,12 +52,12 @@ def short(path: Path) -> str:
     return ".".join(map(str, path[1:] if path[0] == "components" and len(path) > 1 else path))
 
 
-def tree_of(manifest: RobotManifest, path: Path) -> Mapping:
+def tree_of(manifest: RobotManifest, path: Path) -> MappingNode:
     """Return the tree that a path leads into: what is included is read before the rest, and kept beside it."""
     return manifest.include if path[:1] == (include.name,) else manifest.root
 
 
-def found_at(manifest: RobotManifest, path: Path) -> Node | None:
+def found_at(manifest: RobotManifest, path: Path) -> TreeNode | None:
     """Return what stands at a path of the composed robot, or None."""
     return at(tree_of(manifest, path), path)
 
@@ -69,14 +69,14 @@ def no_such_path(robot: Robot, path: Path, guide: Guide) -> Finding:
     length = next(n for n in range(1, len(path) + 1) if not is_known(robot.manifest, guide, path[:n]))
     above, name = path[: length - 1], str(path[length - 1])
     node = found_at(robot.manifest, above)
-    valid = {*guide.keys(above), *(node.entries if isinstance(node, Mapping) else ())}
+    valid = {*guide.keys(above), *(node.entries if isinstance(node, MappingNode) else ())}
     place = f"'{short(above)}'" if above else ""
     if above in ((), ("components",)):
         place = f"robot '{robot.manifest.name}'"
-        valid |= {*robot.parts, *(key for key in robot_keys() if key in robot.manifest.root)}
-    elif len(above) == 2 and str(above[1]) in robot.parts:
-        valid |= {end.name for end in robot.parts[str(above[1])].ends}
-    if isinstance(node, Sequence):
+        valid |= {*robot.components, *(key for key in robot_keys() if key in robot.manifest.root)}
+    elif len(above) == 2 and str(above[1]) in robot.components:
+        valid |= {end.name for end in robot.components[str(above[1])].ends}
+    if isinstance(node, SequenceNode):
         valid = {str(index) for index in range(len(node.items))}
     message = f"{place} has no '{plain(name, 60)}'"
     if above == ("components",) and (meant := in_section([str(key) for key in path[1:]], robot.manifest.root)):

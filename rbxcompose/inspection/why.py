@@ -15,7 +15,7 @@ from rbxcompose.inspection.expand import expand_below
 from rbxcompose.inspection.origin import origin_of, shown
 from rbxcompose.inspection.paths import found_at, is_known, no_such_path, path_of, short, tree_of
 from rbxcompose.inspection.port import why_port
-from rbxcompose.manifest.tree import Mapping, Node, Path, Scalar, key_span
+from rbxcompose.manifest.tree import MappingNode, Path, ScalarNode, TreeNode, key_span
 from rbxcompose.missions.engine.value_text import show as show_value
 from rbxcompose.missions.program.program import Input
 from rbxcompose.model.robot import Robot
@@ -33,7 +33,7 @@ def why(robot: Robot, text: str) -> Answer | Finding:
     path = path_of(robot, text)
     node = found_at(robot.manifest, path)
     guide = _guide(robot.manifest, path)
-    if isinstance(node, Mapping) and path[0] == "args" and len(path) == 2:
+    if isinstance(node, MappingNode) and path[0] == "args" and len(path) == 2:
         return _argument_in_effect(robot, guide, path, node)
     if node is not None:
         return _written(robot, guide, path, node)
@@ -49,9 +49,9 @@ def _guide(manifest: RobotManifest, path: Path) -> Guide:
     return Guide(installed_schema("Robot"), tree_of(manifest, path), types)
 
 
-def _written(robot: Robot, guide: Guide, path: Path, node: Node) -> Answer:
+def _written(robot: Robot, guide: Guide, path: Path, node: TreeNode) -> Answer:
     about, place = _about(robot, guide, path), origin_of(robot.manifest, path, node)
-    if isinstance(node, Mapping) and node.entries:
+    if isinstance(node, MappingNode) and node.entries:
         body = expand_below(robot.manifest, path, node, dict(_defaults(guide, path, node)))
         where = key_span(tree_of(robot.manifest, path), path)
         return Answer(short(path), _kind(path, node), about, place=str(where), body=body, node=node)
@@ -68,7 +68,7 @@ def _written(robot: Robot, guide: Guide, path: Path, node: Node) -> Answer:
     )
 
 
-def _argument_in_effect(robot: Robot, guide: Guide, path: Path, declared: Mapping) -> Answer:
+def _argument_in_effect(robot: Robot, guide: Guide, path: Path, declared: MappingNode) -> Answer:
     """Return the value that an argument has: its default, or what a layer above has put in the place of that."""
     written = {name: shown(entry.value) for name, entry in declared.entries.items()}
     limits = [f"{words} {written[key]}" for key, words in (("min", "at least"), ("max", "at most")) if key in written]
@@ -82,7 +82,7 @@ def _argument_in_effect(robot: Robot, guide: Guide, path: Path, declared: Mappin
     return replace(answer, path=short(path), about=written.get("about", ""), hints=hints)
 
 
-def _kind(path: Path, node: Mapping) -> str:
+def _kind(path: Path, node: MappingNode) -> str:
     type_ = node.get("type")
     if path[0] == "components" and len(path) == 2 and type_ is not None:
         return f"a component of type {shown(type_)}"
@@ -91,8 +91,8 @@ def _kind(path: Path, node: Mapping) -> str:
 
 def _about(robot: Robot, guide: Guide, path: Path) -> str:
     """Return what a key is for, in the words of its type."""
-    if len(path) == 2 and path[0] == "components" and str(path[1]) in robot.parts:
-        return (robot.parts[str(path[1])].cls.__doc__ or "").strip().partition("\n")[0]
+    if len(path) == 2 and path[0] == "components" and str(path[1]) in robot.components:
+        return (robot.components[str(path[1])].cls.__doc__ or "").strip().partition("\n")[0]
     return guide.describe(path)
 
 
@@ -106,8 +106,8 @@ def _removed(manifest: RobotManifest, path: Path) -> tuple[Layer, ...]:
     return tuple(_layer(step) for step in manifest.history.of(path))
 
 
-def _dimension(guide: Guide, path: Path, node: Node) -> Dimension | None:
-    if not isinstance(node, Scalar):
+def _dimension(guide: Guide, path: Path, node: TreeNode) -> Dimension | None:
+    if not isinstance(node, ScalarNode):
         return None
     if isinstance(node.filled, Quantity):
         return node.filled.dimension
@@ -119,9 +119,9 @@ def _dimension(guide: Guide, path: Path, node: Node) -> Dimension | None:
     return guide.value(path).dimension
 
 
-def _si(node: Node, dimension: Dimension | None) -> float | None:
+def _si(node: TreeNode, dimension: Dimension | None) -> float | None:
     """Return a quantity in SI, None if it is none or wrong, which `check` tells."""
-    if dimension is None or not isinstance(node, Scalar):
+    if dimension is None or not isinstance(node, ScalarNode):
         return None
     try:
         return to_si(node.filled if node.filled is not None else node.text, dimension)
@@ -133,7 +133,7 @@ def _sources(manifest: RobotManifest, path: Path) -> Iterator[Source]:
     """Yield the arguments that a value was filled in from, each followed by those that it was given."""
     steps = manifest.history.of(path)
     written = steps[-1].node if steps else None
-    if not isinstance(written, Scalar) or "${" not in written.text:
+    if not isinstance(written, ScalarNode) or "${" not in written.text:
         return
     for name in _ARGUMENT.findall(written.text):
         yield from _argument(manifest, name, written.scope)
@@ -159,16 +159,16 @@ def _unwritten(robot: Robot, guide: Guide, path: Path) -> Answer | None:
     if not all(is_known(robot.manifest, guide, path[:length]) for length in range(1, len(path) + 1)):
         return None
     if guide.keys(path):
-        body = expand_below(robot.manifest, path, Mapping(), dict(_defaults(guide, path, Mapping())))
+        body = expand_below(robot.manifest, path, MappingNode(), dict(_defaults(guide, path, MappingNode())))
         return Answer(short(path), "the defaults, no file writes it", guide.describe(path), is_default=True, body=body)
     value, default = guide.value(path), _default(guide.value(path).default)
-    part = robot.parts.get(str(path[1])) if len(path) == 3 and path[0] == "components" else None
-    of = f" of type '{part.type_name}'" if part else ""
+    component = robot.components.get(str(path[1])) if len(path) == 3 and path[0] == "components" else None
+    of = f" of type '{component.type_name}'" if component else ""
     said = f"no file writes it: this is the default{of}" if default else "no file writes it, and it has no default"
     where = key_span(tree_of(robot.manifest, path), path[:-1]) if found_at(robot.manifest, path[:-1]) else None
     below = f"'{path[-1]}:' below {where}, or " if where is not None and len(path) > 1 else ""
     dimension = value.dimension
-    si = _si(Scalar(default, robot.manifest.root.span), dimension) if default else None
+    si = _si(ScalarNode(default, robot.manifest.root.span), dimension) if default else None
     hints = (("where", said), ("to set it", below + _to_set(path)))
     return Answer(short(path), default or "nothing", guide.describe(path), dimension, si, is_default=True, hints=hints)
 
@@ -209,7 +209,7 @@ def _default(value: object) -> str:
     return "" if value is None or isinstance(value, dict) else plain(str(value))
 
 
-def _defaults(guide: Guide, path: Path, node: Mapping) -> Iterator[tuple[str, str]]:
+def _defaults(guide: Guide, path: Path, node: MappingNode) -> Iterator[tuple[str, str]]:
     """Yield the keys of a map that nobody wrote and that have a default, with that."""
     for key in guide.keys(path):
         if key not in node and (default := _default(guide.value((*path, key)).default)):

@@ -88,4 +88,4 @@ def _skill(spot: Spot, word: str) -> Span | None:
     if robot is None or source is None:
         return None
     ends = (end for end in robot.ends if end.port.kind in _SERVING and end.topic == source.topic)
-    return next((robot.part_span(end.instance) for end in ends), None)
+    return next((robot.component_span(end.instance) for end in ends), None)

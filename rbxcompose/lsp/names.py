@@ -11,7 +11,7 @@ from rbxcompose.manifest.options import OWN_PORT
 from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.registry import naming, section_named
 from rbxcompose.manifest.shapes import kind_of_keys
-from rbxcompose.manifest.tree import Mapping, Scalar, at
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, at
 from rbxcompose.manifest.tree import Path as TreePath
 from rbxcompose.model.robot import Robot
 from rbxcompose.references import COMPONENT, PORT, RUNNING, VALUE
@@ -45,7 +45,7 @@ class Known:
     """The names of a robot as it was last read, and those of the file that is being typed, each with a few words."""
 
     path: Path
-    root: Mapping
+    root: MappingNode
     robot: Robot | None
 
     def of(self, kind: str, path: TreePath = ()) -> dict[str, str]:
@@ -71,7 +71,7 @@ class Known:
         found: dict[str, str] = {}
         for section in naming(kind):
             named = at(self.root, (section.name, *section.at))
-            if isinstance(named, Mapping):
+            if isinstance(named, MappingNode):
                 found |= {name: _about(named, name) for name in named.entries if name.isidentifier()}
         return found
 
@@ -84,7 +84,7 @@ class Known:
         return {name: words for one in naming(kind) for name, words in one.described(contents).items()}
 
     def _parts(self) -> dict[str, str]:
-        return {name: part.type_name for name, part in self.robot.parts.items()} if self.robot else {}
+        return {name: component.type_name for name, component in self.robot.components.items()} if self.robot else {}
 
     def _ports(self) -> Iterator[tuple[str, str]]:
         for end in self.robot.ends if self.robot else ():
@@ -92,7 +92,7 @@ class Known:
                 yield f"{end.instance}.{end.name}", f"{end.port.kind}: {end.type_name} on {end.topic}"
 
     def _own_ports(self, component: str) -> Iterator[tuple[str, str]]:
-        part = self.robot.parts.get(component) if self.robot else None
+        part = self.robot.components.get(component) if self.robot else None
         for end in part.ends if part else ():
             yield end.name, f"{end.port.kind}: {end.type_name} on {end.topic}"
 
@@ -106,12 +106,12 @@ class Known:
     def _part_arguments(self, instance: str) -> dict[str, str]:
         """Return the arguments of the part that an instance is of."""
         written = at(self.root, (include.name, instance, "part"))
-        path = resolve(written.text, self.path, written.span) if isinstance(written, Scalar) else None
+        path = resolve(written.text, self.path, written.span) if isinstance(written, ScalarNode) else None
         part = read_file(path, str(path), {})[0] if isinstance(path, Path) else None
-        named = part.get(args.name) if isinstance(part, Mapping) else None
-        return {name: _about(named, name) for name in named.entries} if isinstance(named, Mapping) else {}
+        named = part.get(args.name) if isinstance(part, MappingNode) else None
+        return {name: _about(named, name) for name in named.entries} if isinstance(named, MappingNode) else {}
 
 
-def _about(named: Mapping, name: str) -> str:
+def _about(named: MappingNode, name: str) -> str:
     word = at(named, (name, "type"))
-    return word.text if isinstance(word, Scalar) else ""
+    return word.text if isinstance(word, ScalarNode) else ""

@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel
 
 from rbxcompose.config import Dimensioned
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Sequence
+from rbxcompose.manifest.tree import Entry, MappingNode, Path, SequenceNode, TreeNode
 from rbxcompose.references import Refers
 from rbxcompose.units import Dimension
 
@@ -58,20 +58,20 @@ def below(hint: Any, key: str | int) -> Iterator[Any]:
             yield get_args(one)[0]
 
 
-def with_references(node: Node, hint: Any, change: Callable[[str, Node], Node]) -> Node:
+def with_references(node: TreeNode, hint: Any, change: Callable[[str, TreeNode], TreeNode]) -> TreeNode:
     """Return a node with `change(kind, value)` in the place of each value that is a name of a kind by its type."""
     for kind in kinds_of(hint):
         node = change(kind, node)
     match node:
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             values = {name: _changed_below(one.value, hint, name, change) for name, one in entries.items()}
             return replace(node, entries={name: Entry(one.key, values[name]) for name, one in entries.items()})
-        case Sequence(items=items):
+        case SequenceNode(items=items):
             return replace(node, items=tuple(_changed_below(one, hint, i, change) for i, one in enumerate(items)))
     return node
 
 
-def _changed_below(node: Node, hint: Any, key: str | int, change: Callable[[str, Node], Node]) -> Node:
+def _changed_below(node: TreeNode, hint: Any, key: str | int, change: Callable[[str, TreeNode], TreeNode]) -> TreeNode:
     for inner in below(hint, key):
         node = with_references(node, inner, change)
     return node

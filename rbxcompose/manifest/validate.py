@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
-from collections.abc import Mapping as AnyMapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import cache
@@ -19,7 +18,17 @@ from rbxcompose.manifest.conversions import changed, repaired
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import dimension_at, keys_at
 from rbxcompose.manifest.slips import Refused, value_slip
-from rbxcompose.manifest.tree import BROKEN, Mapping, Node, Path, Scalar, Sequence, at, key_span, value_span
+from rbxcompose.manifest.tree import (
+    BROKEN,
+    MappingNode,
+    Path,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    at,
+    key_span,
+    value_span,
+)
 from rbxcompose.printable import plain
 from rbxcompose.units import Quantity, UnitError, format_quantity
 
@@ -149,16 +158,16 @@ _MOST_FINDINGS = 100  # of one part: nobody writes more by mistake, and each cos
 _ROUNDS = 8  # of repairs; each one goes at least one level deeper into a value
 
 
-def to_plain(node: Node) -> object:
+def to_plain(node: TreeNode) -> object:
     """Return plain data: scalars by YAML's core types, filled ones with their typed value, maps and lists of these."""
     match node:
-        case Scalar(filled=None):
+        case ScalarNode(filled=None):
             return plain_value(node)
-        case Scalar():
+        case ScalarNode():
             return node.filled
-        case Sequence(items=items):
+        case SequenceNode(items=items):
             return [to_plain(item) for item in items]
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             return {name: to_plain(entry.value) for name, entry in entries.items()}
 
 
@@ -178,10 +187,10 @@ def is_valid(model: Any, data: object) -> bool:
 
 def validate(
     model: type[T],
-    node: Node,
+    node: TreeNode,
     path: Path,
     report: Report,
-    context: AnyMapping[str, object] | None = None,
+    context: Mapping[str, object] | None = None,
     *,
     also: Iterable[str] = (),
 ) -> T | None:
@@ -207,7 +216,7 @@ def validate(
 
 
 def _findings(
-    model: Any, node: Node, path: Path, errors: list[ErrorDetails], also: tuple[str, ...]
+    model: Any, node: TreeNode, path: Path, errors: list[ErrorDetails], also: tuple[str, ...]
 ) -> Iterator[Finding]:
     """Turn pydantic's errors into findings: one for each place, none for what was said before."""
     located = [(_locate(node, error), error) for error in errors]
@@ -225,7 +234,7 @@ def _findings(
             yield _slip(model, node, path, loc, error) or _finding(model, node, path, loc, error)
 
 
-def _locate(node: Node, error: ErrorDetails) -> Path:
+def _locate(node: TreeNode, error: ErrorDetails) -> Path:
     """Return the place of an error in the tree; pydantic's own steps, such as members of a union, are left out."""
     found: Path = ()
     for step in error["loc"]:
@@ -248,26 +257,28 @@ def where(path: Path) -> str:
     return f"'{'.'.join(map(str, path))}'"
 
 
-def _unknown_key(known: Iterable[str], node: Node, path: Path, loc: Path, lacking: set[Path]) -> tuple[Finding, str]:
+def _unknown_key(
+    known: Iterable[str], node: TreeNode, path: Path, loc: Path, lacking: set[Path]
+) -> tuple[Finding, str]:
     """Return the finding for an unknown key, and the missing key that it is a misspelling of, if any."""
     key = str(loc[-1])
     missing = [str(place[-1]) for place in lacking if place[:-1] == loc[:-1]]
     meant = get_close_matches(key, missing, n=1, cutoff=SIMILAR)
     message = f"unknown key '{plain(key, 60)}' in {where((*path, *loc[:-1]))}"
     above = at(node, loc[:-1])
-    taken = above.entries if isinstance(above, Mapping) else ()
+    taken = above.entries if isinstance(above, MappingNode) else ()
     finding = UNKNOWN_KEY.misspelt(key_span(node, loc), message, key, meant or known, KEYS, taken=taken)
     return finding, meant[0] if meant else ""
 
 
-def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails) -> Finding:
+def _finding(model: Any, node: TreeNode, path: Path, loc: Path, error: ErrorDetails) -> Finding:
     name = _called((*path, *loc))
     value = at(node, loc)
     context = error.get("ctx", {})
     span = value_span(node, loc)
     if error["loc"][-1:] == ("[key]",) or error["type"] == "string_pattern_mismatch":
         place = key_span(node, loc) if error["loc"][-1:] == ("[key]",) else span
-        text = value.text if isinstance(value, Scalar) and place is span else name
+        text = value.text if isinstance(value, ScalarNode) and place is span else name
         help_text = "small letters, digits and underscores, beginning with a letter"
         return BAD_NAME.at(place, f"'{text}' is no name", help=help_text)
     match error["type"]:
@@ -301,9 +312,9 @@ def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails)
     return WRONG_TYPE.at(span, f"'{name}': {error['msg'][:1].lower()}{error['msg'][1:]}", label=label_of(value))
 
 
-def not_a_choice(span: Span, name: str, value: Node | None, choices: list[str]) -> Finding:
+def not_a_choice(span: Span, name: str, value: TreeNode | None, choices: list[str]) -> Finding:
     """Return the finding for a value that is none of the few words that its key takes."""
-    written = str(value.text if value.filled is None else value.filled) if isinstance(value, Scalar) else ""
+    written = str(value.text if value.filled is None else value.filled) if isinstance(value, ScalarNode) else ""
     if len(choices) == 1:
         label = "" if written else label_of(value)
         fix = correction(written, choices, span)
@@ -319,27 +330,29 @@ def _called(path: Path) -> str:
     return f"{above[-1]}[{last}]" if isinstance(last, int) and above else str(last)
 
 
-def is_broken(node: Node | None) -> bool:
+def is_broken(node: TreeNode | None) -> bool:
     """Tell whether a value could not be filled in, or is no number that can be taken, which was said."""
-    return isinstance(node, Scalar) and (node.filled is BROKEN or (node.filled is None and bool(number_trouble(node))))
+    return isinstance(node, ScalarNode) and (
+        node.filled is BROKEN or (node.filled is None and bool(number_trouble(node)))
+    )
 
 
-def label_of(node: Node | None) -> str:
+def label_of(node: TreeNode | None) -> str:
     """Return what a node is, for the label of a finding: "this is text"."""
-    if isinstance(node, Scalar) and isinstance(node.filled, Quantity):
+    if isinstance(node, ScalarNode) and isinstance(node.filled, Quantity):
         return f"this is {node.filled.dimension.phrase}"
     return describe(to_plain(node)) if node is not None else ""
 
 
-def unit_finding(error: UnitError, node: Node, name: str) -> Finding:
+def unit_finding(error: UnitError, node: TreeNode, name: str) -> Finding:
     """Return the finding for a value that is not the quantity that it should be."""
     # What does not even look like a number needs no lesson on numbers.
-    is_word = isinstance(node, Scalar) and node.filled is None and node.text[:1] not in "+-.0123456789"
+    is_word = isinstance(node, ScalarNode) and node.filled is None and node.text[:1] not in "+-.0123456789"
     label = label_of(node) if is_word or not error.detail else error.detail
     return WRONG_TYPE.at(node.span, f"'{name}' {error.message}", label=label, help="" if is_word else error.help)
 
 
-def _slip(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails) -> Finding | None:
+def _slip(model: Any, node: TreeNode, path: Path, loc: Path, error: ErrorDetails) -> Finding | None:
     """Return the finding about a slip, if the model has nothing against what it stands for."""
     refused_at = loc[:-1] if error["type"] == "missing" else loc
     written = at(node, refused_at)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from rbxcompose.findings import Span
 from rbxcompose.manifest import test_file as trials
-from rbxcompose.manifest.tree import Node, Path, at, key_span, value_span
-from rbxcompose.manifest.tree import Sequence as Listed
+from rbxcompose.manifest.tree import Path, SequenceNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.mission_tests import codes
 from rbxcompose.mission_tests.model import Deed, Event
@@ -20,13 +19,13 @@ from rbxcompose.msgs.plain import from_plain
 AT, SET, PUBLISH = "at", "set", "publish"
 
 
-def read_events(context: Context, node: Node | None, models: Sequence[trials.Event]) -> tuple[Event, ...]:
+def read_events(context: Context, node: TreeNode | None, models: Sequence[trials.Event]) -> tuple[Event, ...]:
     """Return the events in the order of the text."""
-    items = node.items if isinstance(node, Listed) else ()
+    items = node.items if isinstance(node, SequenceNode) else ()
     return tuple(_event(context, item, model) for item, model in zip(items, models, strict=False))
 
 
-def _event(context: Context, node: Node, model: trials.Event) -> Event:
+def _event(context: Context, node: TreeNode, model: trials.Event) -> Event:
     words = [word for word, _ in entries_of(node) if word != AT]
     if not words:
         context.report.add(codes.NEVER.at(node.span, "nothing happens here", help="give 'set', 'publish', 'stop', ..."))
@@ -34,7 +33,7 @@ def _event(context: Context, node: Node, model: trials.Event) -> Event:
     return Event(model.at, tuple(deed for deed in deeds if deed), value_span(node, (AT,)))
 
 
-def _deed(context: Context, word: str, node: Node, model: trials.Event) -> Deed | None:
+def _deed(context: Context, word: str, node: TreeNode, model: trials.Event) -> Deed | None:
     if word == SET:
         return Deed(SET, context.settings(at(node, (SET,)), {}))
     if word == PUBLISH and model.publish:
@@ -42,7 +41,7 @@ def _deed(context: Context, word: str, node: Node, model: trials.Event) -> Deed 
     return Deed(word)
 
 
-def _published(context: Context, node: Node, sent: trials.Sent) -> Deed | None:
+def _published(context: Context, node: TreeNode, sent: trials.Sent) -> Deed | None:
     """Return a message for a topic that somebody reads or writes."""
     topics, topic = _topics(context), resolve(sent.topic, context.robot.manifest.bus.namespace or "")
     if topic not in topics:
@@ -71,7 +70,7 @@ def _topics(context: Context) -> dict[str, str]:
 class Places:
     """Where the parts of a message stand."""
 
-    node: Node
+    node: TreeNode
     below: Path
 
     def key(self, path: Path) -> Span:

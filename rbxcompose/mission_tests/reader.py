@@ -14,8 +14,7 @@ from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.header import Header
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.test_file import SECTIONS, TEST, TrialFile
-from rbxcompose.manifest.tree import Entry, Node, Scalar
-from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, validate
 from rbxcompose.mission_tests import codes
 from rbxcompose.mission_tests.event_reader import PUBLISH, read_events
@@ -37,7 +36,7 @@ class Written:
 
     path: Path
     name: str
-    root: Tree | None
+    root: MappingNode | None
     report: Report
 
 
@@ -64,7 +63,7 @@ class Reading:
         report = Report()
         root = Documents(report, self.sources).read(path, TEST)
         name = root.get("name") if root else None
-        return Written(path, name.text if isinstance(name, Scalar) and name.text else path.name, root, report)
+        return Written(path, name.text if isinstance(name, ScalarNode) and name.text else path.name, root, report)
 
     def understand(self, written: Written) -> Trial | None:
         """Return the test that is written, None if it cannot run; what is wrong is added to its report."""
@@ -90,7 +89,7 @@ class Reading:
             which = "the test" if len(ones) == 1 else f"{len(ones)} tests"
             yield replace(ones[0], message=_no_robot(robot, which))
 
-    def _robot(self, root: Tree, path: Path, report: Report) -> Compilation | None:
+    def _robot(self, root: MappingNode, path: Path, report: Report) -> Compilation | None:
         """Return what the compiler makes of the robot, if it can run."""
         written = _text(root, "robot", "the robot's file", report)
         if written is None:
@@ -117,25 +116,25 @@ def _no_robot(robot: str, which: str) -> str:
     return f"the robot '{robot}' has mistakes, so that {which} cannot run"
 
 
-def _without_values(root: Tree) -> Tree:
+def _without_values(root: MappingNode) -> MappingNode:
     """Return the header and the names of the sections; what these hold is looked at where it is read."""
-    sections = {name: Entry(entry.key, Scalar("", entry.value.span)) for name, entry in root.entries.items()}
+    sections = {name: Entry(entry.key, ScalarNode("", entry.value.span)) for name, entry in root.entries.items()}
     header = {name: entry for name, entry in root.entries.items() if name in Header.model_fields}
     return replace(root, entries={**sections, **header})
 
 
-def _text(root: Tree, key: str, what: str, report: Report) -> Scalar | None:
+def _text(root: MappingNode, key: str, what: str, report: Report) -> ScalarNode | None:
     value = root.get(key)
     if value is None:
         report.add(MISSING_KEY.at(root.span, f"a test needs '{key}': {what}"))
-    elif isinstance(value, Scalar) and value.text:
+    elif isinstance(value, ScalarNode) and value.text:
         return value
     else:
         report.add(WRONG_TYPE.at(value.span, f"'{key}' must be {what}", label=label_of(value)))
     return None
 
 
-def _read(root: Tree, robot: Robot, plan: Plan, report: Report) -> Trial | None:
+def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial | None:
     chosen = _text(root, "mission", "the name of a mission", report)
     if chosen is None:
         return None
@@ -157,7 +156,7 @@ def _read(root: Tree, robot: Robot, plan: Plan, report: Report) -> Trial | None:
         return None
     expect = read_expect(context, root.get("expect"), model)
     _look_at_times(events, expect.until, report)
-    header = {key: value.text for key in ("name", "about") if isinstance(value := root.get(key), Scalar)}
+    header = {key: value.text for key in ("name", "about") if isinstance(value := root.get(key), ScalarNode)}
     return Trial(
         header.get("name", ""),
         header.get("about", ""),
@@ -184,20 +183,22 @@ def _is_complete(facts: Facts, mocks: Mapping[str, Mock], events: tuple[Event, .
     return is_answered and facts.values <= values and not any(deed.word == PUBLISH for deed in deeds)
 
 
-def _there(root: Tree) -> list[tuple[str, Any]]:
+def _there(root: MappingNode) -> list[tuple[str, Any]]:
     """Return the sections that have something in them, with their models."""
     return [(key, model) for key, model in SECTIONS.items() if key in root and not _is_empty(root.entries[key].value)]
 
 
-def _is_empty(node: Node) -> bool:
-    return isinstance(node, Scalar) and node.plain and not node.text
+def _is_empty(node: TreeNode) -> bool:
+    return isinstance(node, ScalarNode) and node.plain and not node.text
 
 
-def _inputs(root: Tree, robot: Robot, chosen: Scalar, program: Program, report: Report) -> Mapping[str, object]:
+def _inputs(
+    root: MappingNode, robot: Robot, chosen: ScalarNode, program: Program, report: Report
+) -> Mapping[str, object]:
     """Return the inputs: those that the test gives, then the robot's, then the defaults."""
     given = root.get("with")
     entries: dict[str, Entry] = {}
-    if isinstance(given, Tree):
+    if isinstance(given, MappingNode):
         entries = given.entries
     elif given is not None and not _is_empty(given):
         report.add(WRONG_TYPE.at(given.span, "'with' must be a map from inputs to values", label=label_of(given)))

@@ -11,7 +11,7 @@ from rbxcompose.expressions.types import POSE, UNKNOWN, Type, TypeKind
 from rbxcompose.expressions.values import NotArrived, Value, is_number, is_same
 from rbxcompose.expressions.values import Place as Placed
 from rbxcompose.findings import Finding
-from rbxcompose.manifest.tree import Node, Scalar
+from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.mission_tests import codes
 from rbxcompose.mission_tests.model import Setting
 from rbxcompose.missions.analysis.scope_types import NodeScope, View
@@ -59,10 +59,10 @@ def names_of(robot: RobotNames) -> Mapping[str, Type]:
 
 
 def check_setting(
-    node: Node, wanted: Type, program: Program, robot: RobotNames, known: Mapping[str, Type]
+    node: TreeNode, wanted: Type, program: Program, robot: RobotNames, known: Mapping[str, Type]
 ) -> Iterator[Finding]:
     """Yield what is wrong with a value that a test gives to something of the type `wanted`."""
-    if not isinstance(node, Scalar):
+    if not isinstance(node, ScalarNode):
         if wanted.kind not in STRUCTURED and wanted != UNKNOWN:
             yield codes.WRONG_VALUE.at(node.span, f"this must be {wanted.phrase}")
         return
@@ -70,9 +70,9 @@ def check_setting(
     yield from check_written(View(program, robot, program.nodes[program.main], scope), node, wanted, codes.WRONG_VALUE)
 
 
-def setting_of(node: Node, wanted: Type, robot: RobotNames) -> Setting:
+def setting_of(node: TreeNode, wanted: Type, robot: RobotNames) -> Setting:
     """Return what computes a value that is written down; only for one without findings."""
-    if not isinstance(node, Scalar):
+    if not isinstance(node, ScalarNode):
         constant = literal(node).value
         return lambda scope: constant
     if wanted.kind is TypeKind.TEXT:
@@ -94,7 +94,7 @@ def _word(value: Value) -> Value:
     return value.name if isinstance(value, Placed) else value
 
 
-def read_value(node: Node, wanted: Type, robot: RobotNames, what: str) -> tuple[Value, list[Finding]]:
+def read_value(node: TreeNode, wanted: Type, robot: RobotNames, what: str) -> tuple[Value, list[Finding]]:
     """Return a value that is expected, of the type `wanted`, and what is wrong with it."""
     if wanted == UNKNOWN:
         return literal(node).value, []

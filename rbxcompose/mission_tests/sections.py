@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.findings import Report
-from rbxcompose.manifest.tree import Entry, Node
-from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode
 from rbxcompose.mission_tests import codes
 from rbxcompose.mission_tests.mission_facts import Facts
 from rbxcompose.mission_tests.model import Setting
@@ -27,7 +26,7 @@ class Context:
     facts: Facts
     report: Report
 
-    def settings(self, node: Node | None, known: Mapping[str, Type]) -> dict[str, Setting]:
+    def settings(self, node: TreeNode | None, known: Mapping[str, Type]) -> dict[str, Setting]:
         """Return what is set by name; expressions also see what is `known` beside the robot's values."""
         found: dict[str, Setting] = {}
         valid = names_of(self.names)
@@ -50,7 +49,7 @@ class Context:
         return UNKNOWN if name in self.program.saved else None
 
 
-def entries_of(node: Node | None) -> Iterator[tuple[str, Entry]]:
+def entries_of(node: TreeNode | None) -> Iterator[tuple[str, Entry]]:
     """Yield the entries of a map; nothing of anything else, which was told before."""
-    if isinstance(node, Tree):
+    if isinstance(node, MappingNode):
         yield from node.entries.items()

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping
 from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, choice_of, quantity_of
 from rbxcompose.levels import Level
 from rbxcompose.missions.program.sources import ValueSource
-from rbxcompose.model.robot import Part
+from rbxcompose.model.robot import RobotComponent
 from rbxcompose.model.wires import End, resolve
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.ports import In, Out
@@ -24,7 +24,11 @@ DATA = "data"  # the field of the standard messages
 
 
 def value_of(
-    entry: ValueEntry, parts: Mapping[str, Part], ends: Iterable[End], namespace: str, groups: Collection[str] = ()
+    entry: ValueEntry,
+    components: Mapping[str, RobotComponent],
+    ends: Iterable[End],
+    namespace: str,
+    groups: Collection[str] = (),
 ) -> ValueSource | None:
     """Return what a value is, or None if its source is not there (a check says so).
 
@@ -34,7 +38,7 @@ def value_of(
         component, _, port = entry.port.partition(".")
         if component == DIAGNOSTICS and port in groups:
             return ValueSource(LEVELS_TOPIC, LEVELS_TYPE, "level", type=choice_of(*LEVEL_WORDS), group=port)
-        end = parts[component].end(port) if component in parts else None
+        end = components[component].end(port) if component in components else None
         return _of_port(end, entry.unit) if end else None
     if entry.topic is None:
         return None

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from rbxcompose.manifest.tree import Mapping as MappingNode
-from rbxcompose.manifest.tree import Node, Path, Scalar, at
+from rbxcompose.manifest.tree import MappingNode, Path, ScalarNode, TreeNode, at
 from rbxcompose.schema.scalars import DIMENSION, Schema
 from rbxcompose.schema.settle import referred
 from rbxcompose.units import DIMENSIONS, Dimension
@@ -73,7 +72,7 @@ class Guide:
         """Return the key of a definition for which a schema stands, or the schema itself."""
         return referred(schema, self.schema) if "/properties/" in schema.get("$ref", "") else schema
 
-    def _opened(self, schema: Schema, node: Node | None, path: Path, depth: int = 0) -> Iterator[Schema]:
+    def _opened(self, schema: Schema, node: TreeNode | None, path: Path, depth: int = 0) -> Iterator[Schema]:
         """Yield a schema, and all that it stands for or that holds beside it."""
         if depth > _DEEPEST:
             return
@@ -87,7 +86,7 @@ class Guide:
         for one in inner:
             yield from self._opened(one, node, path, depth + 1)
 
-    def _holds(self, condition: Schema, node: Node | None, path: Path) -> bool:
+    def _holds(self, condition: Schema, node: TreeNode | None, path: Path) -> bool:
         if "not" in condition:
             return not any(self._holds(one, node, path) for one in condition["not"]["anyOf"])
         wanted = {name: one.get("const") for name, one in condition.get("properties", {}).items()}
@@ -101,7 +100,7 @@ class Guide:
         value = node.get(name)
         if value is None and name == "type" and path:
             return self.types.get(str(path[-1]), "")
-        return value.text if isinstance(value, Scalar) else ""
+        return value.text if isinstance(value, ScalarNode) else ""
 
 
 def _below(schema: Schema, key: str | int) -> Iterator[Schema]:

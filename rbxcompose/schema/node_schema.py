@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from rbxcompose.expressions.text import Template
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import COUNT, FLAG, UNKNOWN, Type, TypeKind
-from rbxcompose.manifest.tree import Entry, Mapping, Scalar
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode
 from rbxcompose.missions.language.asked import Asked, Assignment
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.layout import Nobody
@@ -41,8 +41,8 @@ class Asking(NodeReader):
     """A reader that has every key, and keeps for each the schema of what it is asked for."""
 
     def __init__(self, key: str) -> None:
-        word = Scalar(key, Mapping().span)
-        super().__init__(Mapping({key: Entry(word, word)}), key, 0, Nobody())
+        word = ScalarNode(key, MappingNode().span)
+        super().__init__(MappingNode({key: Entry(word, word)}), key, 0, Nobody())
         self.schemas: dict[str, Schema] = {}
         self.optional: set[str] = set()
 
@@ -51,7 +51,7 @@ class Asking(NodeReader):
         self.optional.add(key)
         return True
 
-    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Scalar | None:
+    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> ScalarNode | None:
         """Note a word."""
         self.schemas[key] = {"type": "string", "minLength": 1}
         return None
@@ -69,7 +69,7 @@ class Asking(NodeReader):
         self.schemas[key] = {**count, "pattern": pattern, "examples": [3, *words]}
         return words[0]
 
-    def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Mapping | None:
+    def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> MappingNode | None:
         """Note a map."""
         self.schemas[key] = MAPS.get(key, {"type": "object", "minProperties": 1})
         return None
@@ -79,10 +79,10 @@ class Asking(NodeReader):
         self.schemas[key] = ITEM_NAME
         return ""
 
-    def name(self, key: str, what: str) -> Scalar:
+    def name(self, key: str, what: str) -> ScalarNode:
         """Note a name."""
         self.schemas[key] = ITEM_NAME
-        return Scalar("", Mapping().span)
+        return ScalarNode("", MappingNode().span)
 
     def branches(self) -> tuple[str, ...]:
         """Note a list or a map of nodes."""
@@ -100,7 +100,7 @@ class Asking(NodeReader):
         self.schemas[target] = {"type": "string", "minLength": 1}
         self.schemas[body] = ANYTHING
         self.optional.add(body)
-        return Message(Scalar("", Mapping().span), None)
+        return Message(ScalarNode("", MappingNode().span), None)
 
     def moments(self, keys: Iterable[str]) -> Moments:
         """Note hooks, each of which may be missing."""

@@ -12,7 +12,7 @@ from rbxcompose.config import Config, Name, Time
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.section import Reading
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.validate import validate
 from rbxcompose.references import ANALYZER, RUNNING, Refers
 
@@ -37,9 +37,9 @@ class Diagnostics(Config):
     """Groups by name."""
 
 
-def _rename(renames: Renames, name: str, node: Node) -> Node:
+def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
     """Return an analyzer with patterns that match what the part's components and muxes are called outside."""
-    if not isinstance(node, Mapping):
+    if not isinstance(node, MappingNode):
         return node
     changed = {
         key: Entry(one.key, _patterns(renames, one.value)) if key in ("match", "expected") else one
@@ -48,14 +48,14 @@ def _rename(renames: Renames, name: str, node: Node) -> Node:
     return replace(node, entries=changed)
 
 
-def _patterns(renames: Renames, node: Node) -> Node:
+def _patterns(renames: Renames, node: TreeNode) -> TreeNode:
     """Return a list of names and patterns; one that also matches muxes of the part names them beside it."""
-    if not isinstance(node, Sequence):
+    if not isinstance(node, SequenceNode):
         return node
-    items: list[Node] = []
+    items: list[TreeNode] = []
     for item in node.items:
-        changed = _pattern(renames, item.text) if isinstance(item, Scalar) and "${" not in item.text else []
-        items += [replace(item, text=text) for text in changed] if isinstance(item, Scalar) and changed else [item]
+        changed = _pattern(renames, item.text) if isinstance(item, ScalarNode) and "${" not in item.text else []
+        items += [replace(item, text=text) for text in changed] if isinstance(item, ScalarNode) and changed else [item]
     return replace(node, items=tuple(items))
 
 
@@ -87,7 +87,7 @@ def diagnostics(reading: Reading[Diagnostics]) -> Diagnostics:
               expected: [charger]
     """
     node = reading.node
-    if not isinstance(node, Mapping):
+    if not isinstance(node, MappingNode):
         return reading.whole() or Diagnostics()
     others = {name: entry for name, entry in node.entries.items() if name != "analyzers"}
     validate(Diagnostics, replace(node, entries=others), ("diagnostics",), reading.report)

@@ -11,8 +11,7 @@ from rbxcompose.manifest.fields import PortName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.section import ANY, Contents, Reading, Scope
-from rbxcompose.manifest.tree import Entry, Node, at
-from rbxcompose.manifest.tree import Mapping as MappingNode
+from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode, at
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type
@@ -54,7 +53,7 @@ class Mux(Config):
     """Locks by name."""
 
 
-def _rename(renames: Renames, name: str, node: Node) -> Node:
+def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
     """Return a mux whose inputs and locks follow its topics."""
     if not isinstance(node, MappingNode):
         return node
@@ -65,7 +64,7 @@ def _rename(renames: Renames, name: str, node: Node) -> Node:
     return MappingNode(changed, node.span, node.tag)
 
 
-def _topics(name: str, node: Node) -> Iterator[str]:
+def _topics(name: str, node: TreeNode) -> Iterator[str]:
     yield name
     for key in _BELOW_TOPIC:
         named = at(node, (key,))

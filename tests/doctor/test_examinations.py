@@ -221,11 +221,11 @@ def test_folders_and_secrets_that_others_may_open_are_an_error(tmp_path: Path) -
 
 def test_a_device_must_be_there_and_open(tmp_path: Path) -> None:
     robot = robot_of(tmp_path, "components: {base: {type: diff_drive_sim}}\n")
-    part = robot.parts["base"]
+    component = robot.components["base"]
 
     def naming(device: str) -> Facts:
-        config = part.config.model_copy(update={"max_speed": {"ports": [device]}})
-        return replace(FINE, file=replace(robot, parts={"base": replace(part, config=config)}))
+        config = component.config.model_copy(update={"max_speed": {"ports": [device]}})
+        return replace(FINE, file=replace(robot, components={"base": replace(component, config=config)}))
 
     assert told("devices", naming("/dev/null")) == [("ok", "/dev/null of 'base' can be opened")]
     assert told("devices", naming("/dev/no_such_tty")) == [

@@ -14,7 +14,7 @@ from rbxcompose.findings import Report
 from rbxcompose.geometry import Pose2
 from rbxcompose.levels import Level
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.goals import skill_of
@@ -77,7 +77,7 @@ PLACES = {"dock": Place("dock", 0.5, 0.5, 0.0), "corner": Place("corner", 1.0, 0
 
 def program_of(text: str) -> Program:
     root, findings = read_text(textwrap.dedent(text), "mission.yaml")
-    assert isinstance(root, Tree)
+    assert isinstance(root, MappingNode)
     assert not findings
     report = Report()
     program = read_program(root, report)

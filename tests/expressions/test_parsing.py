@@ -13,12 +13,12 @@ from rbxcompose.expressions.tree import (
     Arithmetic,
     Comparison,
     ExpressionError,
+    ExpressionNode,
     Field,
     Index,
     Junction,
     Membership,
     Minus,
-    Node,
     Not,
     Number,
     Variable,
@@ -28,7 +28,7 @@ from rbxcompose.expressions.tree import (
 )
 
 
-def shape(node: Node) -> str:
+def shape(node: ExpressionNode) -> str:
     """Write a tree with all its brackets."""
     below = [shape(child) for child in children(node)]
     match node:

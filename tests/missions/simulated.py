@@ -11,7 +11,7 @@ from rbxcompose.expressions.types import FLAG, POSE, TEXT, TYPES, quantity_of
 from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
 from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
@@ -40,11 +40,11 @@ SERVICES = {"reset": "std_srvs/srv/Trigger", "light": "std_srvs/srv/SetBool"}
 ROBOT = RobotNames(VALUES, PLACES, SKILLS, topics=TOPICS, services=SERVICES)
 
 
-def tree(text: str, file: str = "mission.yaml") -> Tree:
+def tree(text: str, file: str = "mission.yaml") -> MappingNode:
     """Return the located tree of a mission's text."""
     root, findings = read_text(textwrap.dedent(text), file)
     assert not findings
-    assert isinstance(root, Tree)
+    assert isinstance(root, MappingNode)
     return root
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from rbxcompose.findings import KINDS, Finding, Kind, Report
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.language.reader import read_program
@@ -246,7 +246,7 @@ def test_each_docs_page_shows_what_is_found_and_how_it_is_right(code: str) -> No
     for text, is_found in ((bad, True), (good, False)):
         root, findings = read_text(text, "page.yaml")
         assert not findings or is_found
-        if isinstance(root, Mapping):
+        if isinstance(root, MappingNode):
             report = Report()
             program = read_program(root, report, ROBOT.skills)
             if program:

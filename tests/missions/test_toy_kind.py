@@ -28,7 +28,7 @@ from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.look import Look
 from rbxcompose.missions.program.outcomes import ANY, SUCCEEDS, Outcomes
 from rbxcompose.missions.program.possible import Possibility, started
-from rbxcompose.missions.program.program import Endings, Node, RobotNames
+from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
 from rbxcompose.missions.program.registry import kind, kinds
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
 from rbxcompose.missions.view.picture import picture_of
@@ -85,13 +85,15 @@ class Persist(Loop):
         reader.child("do")
         return cls(most, reader.duration("gap"))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         return endings.of(node.children[0]) if node.children else ANY
 
     def endless(self, ends: Outcomes) -> Advice | None:
         return None
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         yield Possibility(node.span, f"{node.path}: body", started(node.children[0]))
 
     @property

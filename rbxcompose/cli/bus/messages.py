@@ -16,7 +16,7 @@ from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.findings import Report, Span, kind
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import Mapping, Node, Scalar, key_span, value_span
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, key_span, value_span
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.plain import Path, from_plain
 from rbxcompose.msgs.types import Interface, Message
@@ -45,7 +45,7 @@ T = TypeVar("T", bound=Interface)
 class _Places:
     """Places within a tree."""
 
-    root: Node
+    root: TreeNode
 
     def key(self, path: Path) -> Span:
         """Return the place of a key."""
@@ -72,11 +72,11 @@ def message_from(message: type[M], text: str) -> M | None:
     return made
 
 
-def _data(node: Node) -> object:
+def _data(node: TreeNode) -> object:
     match node:
-        case Scalar():
+        case ScalarNode():
             return plain_value(node)
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             return {name: _data(entry.value) for name, entry in entries.items()}
     return [_data(item) for item in node.items]
 

@@ -24,7 +24,7 @@ from rbxcompose.missions.program.program import Skill
 from rbxcompose.missions.program.sources import SkillSource, Way
 from rbxcompose.missions.program.statuses import IDLE, NAMES
 from rbxcompose.missions.view.mirror import joined, status_list
-from rbxcompose.missions.view.picture import Picture, picture_from_data, picture_of
+from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.skills import python_skills
 from rbxcompose.sdk.skills import skill_names
@@ -84,7 +84,7 @@ def show(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _live(name: str) -> tuple[Picture, Sequence[int]] | None:
+def _live(name: str) -> tuple[MissionPicture, Sequence[int]] | None:
     """Return the picture of a mission that has been running, and how its nodes stand or ended."""
     folder = find_robot(None)
     if not any(one.name == name and one.state != NAMES[IDLE] for one in answer_of(folder, ListMissions())):

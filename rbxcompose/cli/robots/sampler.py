@@ -11,7 +11,7 @@ from rbxcompose.bus.graph import End, Graph, Name
 from rbxcompose.cli.bus.guest import Guest, Heard
 from rbxcompose.cli.missions.replicas import MissionsSeen
 from rbxcompose.cli.robots.lookup import known_state
-from rbxcompose.cli.robots.picture import MOST_WARNINGS, Load, Part, Picture, Tree
+from rbxcompose.cli.robots.picture import MOST_WARNINGS, ComponentPicture, Load, RobotPicture, Tree
 from rbxcompose.inspection.mission_text import running_lines
 from rbxcompose.levels import Level, level_of
 from rbxcompose.missions.view.mirror import ACTIVE, status_list
@@ -62,7 +62,7 @@ class Sampler:
         is_charged = self._charges.keys() >= self._gauges.keys() & self._listened
         return is_healthy and is_charged and (self._missions is None or self._missions.is_complete)
 
-    def sample(self) -> Picture | None:
+    def sample(self) -> RobotPicture | None:
         """Return how things are now, or None if the robot is down."""
         now, state = self._guest.clock.now(), known_state(self._folder)
         if state is None:
@@ -133,24 +133,24 @@ class Sampler:
         self._times = times
         return loads
 
-    def _picture(self, state: RobotState, rates: Mapping[str, float], loads: list[Load]) -> Picture:
+    def _picture(self, state: RobotState, rates: Mapping[str, float], loads: list[Load]) -> RobotPicture:
         leaves = {name.rpartition("/")[2]: one for name, one in self._statuses.items() if name.count("/") > 1}
         alive = state.alive()
-        parts = [_part(one, one.process in alive, rates, leaves.get(one.name)) for one in state.components]
-        missions = [one.message for one in parts if one.name == state.executive and one.message]
+        components = [_picture_of(one, one.process in alive, rates, leaves.get(one.name)) for one in state.components]
+        missions = [one.message for one in components if one.name == state.executive and one.message]
         batteries = [
             (name, f"{100 * self._charges[one.topic]:.1f} %")
             for name, one in state.batteries.items()
             if one.topic in self._charges
         ]
         groups = [one for one in self._statuses.values() if one.name.count("/") == 1]
-        return Picture(
+        return RobotPicture(
             robot=state.robot,
             is_supervised=state.is_supervised,
             router=state.router if "router" in alive or "router" not in state.processes else None,
             mission=missions[0] if missions else "",
             batteries=batteries,
-            parts=parts,
+            components=components,
             loads=loads,
             health=[(one.name.lstrip("/"), level_of(one.level), one.message) for one in groups],
             warnings=list(self._warnings),
@@ -184,8 +184,10 @@ def _tree(name: str, seen: Mapping[str, Any]) -> Tree:
     return Tree(name, seen["state"], running_lines(picture, status_list(seen, picture.count), _WIDEST))
 
 
-def _part(one: ComponentState, is_alive: bool, rates: Mapping[str, float], told: DiagnosticStatus | None) -> Part:
-    return Part(
+def _picture_of(
+    one: ComponentState, is_alive: bool, rates: Mapping[str, float], told: DiagnosticStatus | None
+) -> ComponentPicture:
+    return ComponentPicture(
         one.name,
         one.type,
         one.state if is_alive else "dead",

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.parser_error import Trouble
-from rbxcompose.manifest.tree import Node, Path
+from rbxcompose.manifest.tree import Path, TreeNode
 from rbxcompose.slips import Repair, Slips
 
 # What the parser says, in its words.
@@ -33,4 +33,4 @@ class Refused(NamedTuple):
 
 
 text_slip: Slips[Callable[[Trouble], Finding | None]] = Slips(__name__)
-value_slip: Slips[Callable[[Refused, Node], Repair[Node] | None]] = Slips(__name__)
+value_slip: Slips[Callable[[Refused, TreeNode], Repair[TreeNode] | None]] = Slips(__name__)

@@ -9,11 +9,11 @@ from rbxcompose.expressions.check import Problem, check_value
 from rbxcompose.expressions.tree import Expression, Word
 from rbxcompose.expressions.types import PLACE, POSE, TEXT, UNKNOWN, Type, TypeKind
 from rbxcompose.findings import Finding, Kind, Span, nearest, replacement
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.condition_watches import POSE as POSE_NAME
 from rbxcompose.missions.language.spans import inner_span
-from rbxcompose.missions.program.program import Node, Program, RobotNames
+from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 
 _MEASURED = (TypeKind.QUANTITY, TypeKind.COUNT, TypeKind.FLAG)  # what no place can be
 
@@ -49,7 +49,7 @@ class View:
 
     program: Program
     robot: RobotNames
-    node: Node
+    node: MissionNode
     scope: NodeScope
 
     @property
@@ -57,7 +57,7 @@ class View:
         """Tell whether the node, or any below it, takes time by itself."""
         return any(below.step.waits for below in self.program.below(self.node.number))
 
-    def typed(self, expression: Expression, wanted: Type, scalar: Scalar, kind: Kind) -> Iterator[Finding]:
+    def typed(self, expression: Expression, wanted: Type, scalar: ScalarNode, kind: Kind) -> Iterator[Finding]:
         """Yield what is wrong with an expression that must have the type `wanted`."""
         return findings_of(expression, wanted, scalar, self.scope, kind)
 
@@ -91,7 +91,7 @@ def views(program: Program, robot: RobotNames) -> Iterator[View]:
 
 
 def findings_of(
-    expression: Expression, wanted: Type, scalar: Scalar, scope: NodeScope, kind: Kind
+    expression: Expression, wanted: Type, scalar: ScalarNode, scope: NodeScope, kind: Kind
 ) -> Iterator[Finding]:
     """Yield what is wrong with an expression; what is neither a name nor a place is of the given kind."""
     for problem in check_value(expression, scope, wanted):

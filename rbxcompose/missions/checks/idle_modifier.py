@@ -10,7 +10,7 @@ from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.facts import place_in_text
 from rbxcompose.missions.program.answers import Serves
 from rbxcompose.missions.program.outcomes import FAILS
-from rbxcompose.missions.program.program import CONTINUE, Node, Program
+from rbxcompose.missions.program.program import CONTINUE, MissionNode, Program
 
 
 @mission_check("RBX4127", Severity.WARNING)
@@ -51,7 +51,7 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
                 )
 
 
-def _comes_again(program: Program, node: Node) -> bool:
+def _comes_again(program: Program, node: MissionNode) -> bool:
     """Tell whether anything in the mission can start a node a second time."""
     if any(one.afterwards != CONTINUE for one in program.interrupts):
         return True

@@ -8,7 +8,7 @@ from rbxcompose.findings import Finding
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.machines import States
-from rbxcompose.missions.program.program import Node
+from rbxcompose.missions.program.program import MissionNode
 
 
 @mission_check("RBX4140", is_fixable=True)
@@ -58,7 +58,7 @@ def _start(machine: States) -> Iterator[Finding]:
         yield unknown_state.misspelt(machine.start_span, message, machine.start, machine.names, what)
 
 
-def _targets(state: Node, machine: States) -> Iterator[Finding]:
+def _targets(state: MissionNode, machine: States) -> Iterator[Finding]:
     leads_to = state.step.leads_to
     known = (*machine.names, *machine.ends)
     if leads_to is None:

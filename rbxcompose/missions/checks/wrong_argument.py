@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.findings import Finding
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.scope_types import View
@@ -66,7 +66,7 @@ def _argument(view: View, skill: Skill, argument: Argument) -> Iterator[Finding]
         taken = {one.name for one in view.node.step.arguments}
         arguments = skill.arguments
         yield wrong_argument.misspelt(argument.span, message, name, arguments, "its arguments", taken=taken)
-    elif isinstance(argument.value, Scalar):
+    elif isinstance(argument.value, ScalarNode):
         if argument.value.plain and not argument.value.text:
             yield wrong_argument.at(argument.span, f"the argument '{name}' of '{skill.name}' has no value")
         else:

@@ -12,7 +12,7 @@ from rbxcompose.missions.engine.scopes import ItemScope, MissionScope, SinceScop
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.modifiers.registry import decorator_of
 from rbxcompose.missions.program.history import WithHistory
-from rbxcompose.missions.program.program import Node, Program, RobotNames
+from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 from rbxcompose.missions.program.registry import task_of
 
 
@@ -56,7 +56,7 @@ class Builder:
             task = self._kept(decorator_of(modifier, site, task))
         return self._around(site, since, task, branch)
 
-    def _below(self, node: Node, run: Run, scope: MissionScope) -> Iterator[Task]:
+    def _below(self, node: MissionNode, run: Run, scope: MissionScope) -> Iterator[Task]:
         names = node.step.branches.names if node.step.branches else ()
         for child, branch in zip(node.children, names or ("",) * len(node.children), strict=True):
             yield self.build(child, run, scope, branch)

@@ -13,7 +13,7 @@ from rbxcompose.missions.program.families import LeafStep
 from rbxcompose.missions.program.messages import Message
 from rbxcompose.missions.program.moments import Effects
 from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import RUNNING
 from rbxcompose.msgs import registry
@@ -70,11 +70,11 @@ class Call(LeafStep):
         """Read the service and `request`."""
         return cls(reader.message(reader.key, "request"))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that the service may refuse."""
         return ANY
 
-    def text(self, node: Node) -> str:
+    def text(self, node: MissionNode) -> str:
         """Return the service."""
         return self.message.target.text
 

@@ -13,7 +13,7 @@ from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.branches import Choice
 from rbxcompose.missions.program.families import Choosing
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SKIPPED
 
@@ -84,7 +84,7 @@ class Choose(Choosing):
         """Return the cases, and what is done for all other values."""
         return (*(f"case {case.expression.text}" for case in self.choice.cases), "else")
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return what any case may do; a value that is not there is a failure."""
         found = ALWAYS_SUCCEEDS.both(either(map(endings.of, node.children)))
         return found.both(ALWAYS_FAILS) if node.asked else found

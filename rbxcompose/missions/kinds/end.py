@@ -11,7 +11,7 @@ from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.families import Deed
 from rbxcompose.missions.program.moments import NO_EFFECTS
 from rbxcompose.missions.program.outcomes import FAILS, NEVER, SUCCEEDS, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
 
@@ -64,7 +64,7 @@ class End(Deed):
         result = reader.choice(reader.key, (SUCCEEDS, FAILS))
         return cls(result, reader.template("message") if reader.has("message") else None)
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it never ends: the mission does."""
         return NEVER
 

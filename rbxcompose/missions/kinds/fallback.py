@@ -9,7 +9,7 @@ from rbxcompose.missions.program.in_turn import OPTIONS, RANDOM, InTurn, InTurnT
 from rbxcompose.missions.program.look import Look
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
 from rbxcompose.missions.program.possible import Possibility, started
-from rbxcompose.missions.program.program import Node, RobotNames
+from rbxcompose.missions.program.program import MissionNode, RobotNames
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SUCCESS
 
@@ -42,7 +42,9 @@ class Fallback(InTurn):
         """Return failure."""
         return "" if self.order == RANDOM else FAILS
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield each node but the first, which is always tried."""
         for index, child in enumerate(node.children[1:], 2):
             yield Possibility(nodes[child].span, f"{node.path}: alternative {index}", started(child))

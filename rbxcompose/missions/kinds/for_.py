@@ -24,7 +24,7 @@ from rbxcompose.missions.program.look import Look
 from rbxcompose.missions.program.moments import NO_EFFECTS, Effects
 from rbxcompose.missions.program.outcomes import ANY as ANYHOW
 from rbxcompose.missions.program.outcomes import Outcomes
-from rbxcompose.missions.program.program import NOTHING, Endings, Node, Program, Target
+from rbxcompose.missions.program.program import NOTHING, Endings, MissionNode, Program, Target
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.results import NodeFailed
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
@@ -194,7 +194,7 @@ class For(Loop):
             reader.flag("remove_done") if reader.has("remove_done") else False,
         )
 
-    def shows(self, node: Node, scope: StaticScope) -> Mapping[str, Type]:
+    def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
         """Return the item, with the type that all items have."""
         if not node.item:
             return {}
@@ -204,7 +204,7 @@ class For(Loop):
         found, _ = check(self.items, scope)
         return {node.item: TEXT if found.kind is TypeKind.MAP else found.entry}
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it fails with its body, and may fail to read its list."""
         if self.order == NEAREST or self.removes_done or not node.children or not self._is_read(endings.program):
             return ANYHOW
@@ -220,7 +220,7 @@ class For(Loop):
     def endless(self, ends: Outcomes) -> None:
         """Say nothing: every list has an end."""
 
-    def text(self, node: Node) -> str:
+    def text(self, node: MissionNode) -> str:
         """Return the item and what it goes through."""
         items = ", ".join(asked.scalar.text for asked in node.asked[: node.own])
         return f"{node.item} in {items}" if items else node.item

@@ -18,7 +18,7 @@ from rbxcompose.missions.program.look import Form, Look
 from rbxcompose.missions.program.machines import ENDS, FAILED, FINISHED, STATE, Next, States
 from rbxcompose.missions.program.outcomes import ANY, Outcomes
 from rbxcompose.missions.program.possible import Possibility, led
-from rbxcompose.missions.program.program import Endings, Node, RobotNames
+from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.results import NodeFailed
 from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SKIPPED, SUCCESS
@@ -120,7 +120,7 @@ class Machine(Loop):
         """Read the states and what stands beside them."""
         return cls(*read_machine(reader))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the ends that its states lead to."""
         leads = (endings.program.nodes[child].step.leads_to for child in node.children)
         reached = {to for one in leads if one for to in one.to.values()}
@@ -132,7 +132,9 @@ class Machine(Loop):
         advice = Advice("this machine never ends and never waits", "put a 'wait' into a state, or lead to an end")
         return None if ends.words else advice
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield the transitions."""
         for state in (nodes[child] for child in node.children):
             following = state.step.leads_to or Next()
@@ -180,6 +182,6 @@ class State(Straight):
         """Read the body and where it leads to."""
         return cls(read_state(reader))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return how the body may end."""
         return endings.of(node.children[0]) if node.children else ANY

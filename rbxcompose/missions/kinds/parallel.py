@@ -14,7 +14,7 @@ from rbxcompose.missions.program.branches import ALL, ANY, Branches, BranchScope
 from rbxcompose.missions.program.families import Straight
 from rbxcompose.missions.program.look import Form, Look
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes, either
-from rbxcompose.missions.program.program import Endings, Node, Target
+from rbxcompose.missions.program.program import Endings, MissionNode, Target
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.results import NodeFailed
 from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
@@ -186,7 +186,7 @@ class Parallel(Straight):
         conditions = (one.condition for one in self.branches.outcomes if one.condition)
         return frozenset(name.name for one in conditions for name in one.names).difference(self.branches.names)
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the outcomes by conditions, else those of the branch it ends with, else the plain ones."""
         branches = self.branches
         if branches.outcomes:

@@ -12,7 +12,7 @@ from rbxcompose.missions.program.families import Deed
 from rbxcompose.missions.program.messages import Message
 from rbxcompose.missions.program.moments import Effects
 from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SUCCESS
 
@@ -52,11 +52,11 @@ class Publish(Deed):
         """Read the topic and `message`."""
         return cls(reader.message(reader.key, "message"))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that a value may be missing or may not fit."""
         return ANY
 
-    def text(self, node: Node) -> str:
+    def text(self, node: MissionNode) -> str:
         """Return the topic."""
         return self.message.target.text
 

@@ -15,7 +15,7 @@ from rbxcompose.missions.program.answers import Advice, Counted, Flow
 from rbxcompose.missions.program.families import Loop
 from rbxcompose.missions.program.look import Look
 from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
 
@@ -116,14 +116,14 @@ class Repeat(Loop):
         until = reader.condition("until") if reader.has("until") else None
         return cls(rounds, until, reader.duration("every") if reader.has("every") else None)
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that a loop for ever ends with a failure only."""
         body = endings.of(node.children[0]).plain if node.children else ANY
         if self.rounds is None and self.until is None:
             return Outcomes(succeeds=False, fails=body.fails)
         return Outcomes(fails=body.fails) if self._is_counted(node) else ANY
 
-    def _is_counted(self, node: Node) -> bool:
+    def _is_counted(self, node: MissionNode) -> bool:
         """Tell whether the number of rounds and the time of one are written out, and `until` can always be asked."""
         if not any(asked.expression.names for asked in node.asked):
             return True

@@ -15,7 +15,7 @@ from rbxcompose.missions.program.answers import Flow, Skipped
 from rbxcompose.missions.program.families import Straight
 from rbxcompose.missions.program.look import PLAIN
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ANY, Outcomes, either
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.results import NodeFailed
 
@@ -78,6 +78,6 @@ class Run(Straight):
         reader.held(expression)
         return cls(expression)
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return what any of the nodes in the data may do; it fails where there is none."""
         return either([ALWAYS_FAILS, *map(endings.of, node.children)]) if node.children else ANY

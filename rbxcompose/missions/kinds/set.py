@@ -13,7 +13,7 @@ from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.families import Deed
 from rbxcompose.missions.program.moments import Effects
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SUCCESS
 
@@ -55,11 +55,11 @@ class Set(Deed):
         """Read the map from names to expressions."""
         return cls(reader.assignments(reader.key))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that only what it reads can fail."""
         return ALWAYS_SUCCEEDS if is_sure(node, endings.program) else ANY
 
-    def text(self, node: Node) -> str:
+    def text(self, node: MissionNode) -> str:
         """Return what is set."""
         return ", ".join(f"{one.name} = {one.asked.scalar.text}" for one in self.assignments)
 

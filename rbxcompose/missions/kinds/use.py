@@ -7,7 +7,7 @@ from typing import Self
 
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.values import NotArrivedError, Value
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.resume_points import LAST
 from rbxcompose.missions.engine.task import Site
 from rbxcompose.missions.language.asked import Argument
@@ -18,7 +18,7 @@ from rbxcompose.missions.program.families import Straight
 from rbxcompose.missions.program.history import HISTORY, WithHistory, read_history
 from rbxcompose.missions.program.look import Look
 from rbxcompose.missions.program.outcomes import Outcomes
-from rbxcompose.missions.program.program import Endings, Node, Target
+from rbxcompose.missions.program.program import Endings, MissionNode, Target
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING
 
@@ -119,7 +119,7 @@ class Use(Straight):
               rounds: 1
     """
 
-    uses: Scalar = field()
+    uses: ScalarNode = field()
     arguments: tuple[Argument, ...] = field()
     history: str = field()
 
@@ -131,16 +131,16 @@ class Use(Straight):
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
         """Read the name of the mission, `with` and `history`."""
-        name = reader.scalar(reader.key, "the name of a mission") or Scalar("", reader.span)
+        name = reader.scalar(reader.key, "the name of a mission") or ScalarNode("", reader.span)
         given = reader.map_of("with", "a map from inputs to values") if reader.has("with") else None
         entries = given.entries.items() if given else ()
         arguments = tuple(Argument(key, entry.value, entry.key.span) for key, entry in entries)
         return cls(name, arguments, read_history(reader))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return how the mission may end."""
         return endings.of_mission(self.uses.text)
 
-    def text(self, node: Node) -> str:
+    def text(self, node: MissionNode) -> str:
         """Return the mission."""
         return self.uses.text

@@ -14,7 +14,7 @@ from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.families import LeafStep
 from rbxcompose.missions.program.moments import NO_EFFECTS
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import IDLE, RUNNING, SUCCESS
 
@@ -70,6 +70,6 @@ class WaitFor(LeafStep):
         """Read the condition."""
         return cls(reader.condition(reader.key))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that only a condition which cannot be asked is a failure."""
         return ALWAYS_SUCCEEDS if is_simple(node) else ANY

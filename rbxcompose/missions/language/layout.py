@@ -7,8 +7,7 @@ from functools import cache
 
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.findings import Finding
-from rbxcompose.manifest.tree import Entry, Node
-from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode
 from rbxcompose.missions.language.grammar import BELOW, Slot, Takes, Words
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
@@ -18,7 +17,7 @@ from rbxcompose.missions.program.registry import Kind, kinds
 class Nobody:
     """Takes what a reader would hand on: there is nothing to be read."""
 
-    def child(self, node: Node, step: str, parent: int) -> int:
+    def child(self, node: TreeNode, step: str, parent: int) -> int:
         """Give every node the same number."""
         return 0
 
@@ -41,14 +40,14 @@ class _Asking(NodeReader):
     """A reader that has every key and no value, and keeps what each would take."""
 
     def __init__(self, key: str) -> None:
-        super().__init__(Tree(), key, 0, Nobody())
+        super().__init__(MappingNode(), key, 0, Nobody())
         self.slots: dict[str, Slot] = {}
 
     def has(self, key: str) -> bool:
         """Say yes, so that everything is asked for."""
         return True
 
-    def take(self, key: str, takes: Takes = Takes.OTHER, choices: tuple[str, ...] = ()) -> Node | None:
+    def take(self, key: str, takes: Takes = Takes.OTHER, choices: tuple[str, ...] = ()) -> TreeNode | None:
         """Note what a key takes; what it is asked for first says most of it."""
         self.slots.setdefault(key, Slot(takes, choices))
         return None

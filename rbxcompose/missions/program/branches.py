@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.values import NotArrived, Value
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.scopes import Inner, MissionScope
 from rbxcompose.missions.language.asked import Asked
@@ -102,7 +102,7 @@ def read_outcomes(reader: NodeReader, branches: tuple[str, ...]) -> tuple[Outcom
     read = []
     for index, (name, entry) in enumerate(value.entries.items()):
         is_last = index + 1 == len(value.entries)
-        is_otherwise = isinstance(entry.value, Scalar) and entry.value.text == OTHERWISE
+        is_otherwise = isinstance(entry.value, ScalarNode) and entry.value.text == OTHERWISE
         if is_otherwise != is_last:
             message = "'otherwise' comes last" if is_otherwise else f"the last outcome must be '{OTHERWISE}'"
             help_text = f"add a line such as 'lost: {OTHERWISE}'"

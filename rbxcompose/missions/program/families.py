@@ -13,7 +13,7 @@ from rbxcompose.missions.program.look import PLAIN, Form, Look
 from rbxcompose.missions.program.moments import NO_EFFECTS, Effects
 from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.possible import Possibility, skipped, started
-from rbxcompose.missions.program.program import Node, RobotNames, Step
+from rbxcompose.missions.program.program import MissionNode, RobotNames, Step
 
 
 class LeafStep(Step):
@@ -28,11 +28,13 @@ class LeafStep(Step):
     def endless(self, ends: Outcomes) -> None:
         """Say nothing: it is done once."""
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield nothing: whether it was started at all, the nodes around it tell."""
         yield from ()
 
-    def shows(self, node: Node, scope: StaticScope) -> Mapping[str, Type]:
+    def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
         """Return nothing: there is none inside."""
         return {}
 
@@ -62,7 +64,7 @@ class Group(Step):
         """Tell that it decides more than an answer."""
         return False
 
-    def shows(self, node: Node, scope: StaticScope) -> Mapping[str, Type]:
+    def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
         """Return nothing: those inside see what it sees."""
         return {}
 
@@ -95,7 +97,9 @@ class Straight(Group):
     def endless(self, ends: Outcomes) -> None:
         """Say nothing: it is done once."""
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield nothing: there is one way through it."""
         yield from ()
 
@@ -107,7 +111,9 @@ class Loop(Group):
     comes_again = True
     skipped = Skipped.PERHAPS
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield nothing: how often it comes back is a matter of data."""
         yield from ()
 
@@ -125,7 +131,9 @@ class Choosing(Straight):
     def ways(self) -> tuple[str, ...]:
         """Return its ways in words, in the order of its nodes; the last of them may be that nothing is done."""
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield each node, and that nothing fits."""
         for index, word in enumerate(self.ways):
             if index < len(node.children):

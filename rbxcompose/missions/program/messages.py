@@ -9,14 +9,14 @@ from typing import TypeAlias
 from rbxcompose.expressions.text import Template
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 
 
 @dataclass(frozen=True, slots=True)
 class Written:
     """One value as it was written: a text with slots, and an expression if it can be read as one."""
 
-    scalar: Scalar
+    scalar: ScalarNode
     template: Template
     expression: Expression | None
 
@@ -31,7 +31,7 @@ class Message:
     `keys` are the places of the names of fields, by the path to each.
     """
 
-    target: Scalar
+    target: ScalarNode
     body: Shape | None
     keys: Mapping[tuple[str, ...], Span] = field(default_factory=dict)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import ClassVar, Self
 
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.answers import Advice, Counted, Serves
 from rbxcompose.missions.program.moments import Moments
@@ -77,7 +77,7 @@ class Modifier(ABC):
         return False
 
     @property
-    def saved(self) -> Scalar | None:
+    def saved(self) -> ScalarNode | None:
         """Return the name under which the result is kept."""
         return None
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from rbxcompose.manifest.tree import Node
+from rbxcompose.manifest.tree import TreeNode
 from rbxcompose.missions.language.grammar import Place
 from rbxcompose.slips import Repair, Slips
 
-slip: Slips[Callable[[Place, Node], Repair[Node] | None]] = Slips(__name__)
+slip: Slips[Callable[[Place, TreeNode], Repair[TreeNode] | None]] = Slips(__name__)
