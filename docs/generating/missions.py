@@ -19,7 +19,7 @@ from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program.goals import skill_of, topic_skill
 from rbxcompose.missions.program.messages import Message
 from rbxcompose.missions.program.moments import Moments
-from rbxcompose.missions.program.registry import Kind, kinds
+from rbxcompose.missions.program.registry import StepType, kinds
 from rbxcompose.schema.mission import mission_schema
 from rbxcompose.schema.node_schema import Asking, first_line
 from rbxcompose.schema.scalars import Schema
@@ -164,7 +164,7 @@ def described(properties: Mapping[str, Schema], required: list[str]) -> str:
     return table(("key", "required", "what it is"), rows)
 
 
-def of_kind(kind: Kind) -> str:
+def of_kind(kind: StepType) -> str:
     """Return what is known of a kind: what it does, its keys, an example."""
     told = told_by(kind)
     rows = [(code(key), takes(told, key), kind.options.get(key, "")) for key in told.words]
@@ -177,7 +177,7 @@ def of_kind(kind: Kind) -> str:
     )
 
 
-def told_by(kind: Kind) -> Told:
+def told_by(kind: StepType) -> Told:
     """Return what each key of a kind takes."""
     told = Told(kind.name)
     kind.read(told)

@@ -17,7 +17,7 @@ from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.types import Action, Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
 from rbxcompose.qos import Qos
-from rbxcompose.scheduler import Event
+from rbxcompose.scheduler import ScheduledCallback
 
 STATUS_PERIOD = 0.1  # [s] between two publications of the states of goals in a flood of them
 LOG_PERIOD = 1.0  # [s] between two lines of the log on a flood of goals
@@ -84,9 +84,9 @@ class ActionServer(Generic[G, R, F]):
         self._goals: Goals[G, R] = Goals()
         self._asked: dict[bytes, list[Request[Any, Any]]] = {}  # for the results of goals that have not ended
         self._may_tell = Allowance(1 / STATUS_PERIOD, BURST)
-        self._will_tell: Event | None = None
+        self._will_tell: ScheduledCallback | None = None
         self._may_log, self._unlogged = Allowance(1 / LOG_PERIOD, LOG_BURST), 0
-        self._will_log: Event | None = None
+        self._will_log: ScheduledCallback | None = None
         self._feedback = Publisher(topics, node, names.feedback, action.FeedbackMessage, Qos.STATE)
         self._status = Publisher(topics, node, names.status, GoalStatusArray, Qos.LATCHED)
         self._servers: list[Server[Any, Any]] = [

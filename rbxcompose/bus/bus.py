@@ -13,7 +13,7 @@ from rbxcompose.bus.orders import OrderPublisher
 from rbxcompose.bus.services import Client, Request, Server, Services
 from rbxcompose.bus.tokens import publishers_pattern
 from rbxcompose.bus.topics import Publisher, Subscription, Topics
-from rbxcompose.bus.transport import Closable, Nowhere, Transport
+from rbxcompose.bus.transport import Closable, NoTransport, Transport
 from rbxcompose.bus.window import Window
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.bus.witness import Witness
@@ -51,7 +51,7 @@ class Bus:
         witness: Witness | None = None,
         log: Callable[[str, str], None],
     ) -> None:
-        self._transport = transport if transport is not None else Nowhere()
+        self._transport = transport if transport is not None else NoTransport()
         space = f"/{namespace.strip('/')}" if namespace else ""
         self._process = BusProcess(scheduler, clock, self._transport, WIRE_PROFILES[wire], domain, space, log)
         self._topics, self._services = Topics(), Services(witness=witness)

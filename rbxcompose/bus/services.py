@@ -15,12 +15,12 @@ from rbxcompose.bus.gate import REQUESTS, Gate
 from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.local import Participant, Registry
 from rbxcompose.bus.tokens import EntityKind, gid, session_of
-from rbxcompose.bus.transport import Answer, Closable, Question
-from rbxcompose.bus.witness import Call, Witness
+from rbxcompose.bus.transport import Closable, Question, TransportReply
+from rbxcompose.bus.witness import Witness, WitnessedCall
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.requests import Refused
-from rbxcompose.scheduler import Event
+from rbxcompose.scheduler import ScheduledCallback
 from rbxcompose.sdk.bound import Reply
 
 Q = TypeVar("Q", bound=Message)
@@ -169,7 +169,11 @@ class Server(Generic[Q, R]):
             return None
 
     def _tell(self, witness: Witness, request: Request[Q, R], reply: Reply[R]) -> None:
-        witness(Call(self._owner, self.route[0], self._service, request.client, request.sequence, True, reply.response))
+        witness(
+            WitnessedCall(
+                self._owner, self.route[0], self._service, request.client, request.sequence, True, reply.response
+            )
+        )
 
     def _answer(self, question: Question, asker: Attachment, reply: Reply[R]) -> None:
         if reply.response is None:
@@ -185,7 +189,7 @@ class _Waiting(Generic[R]):
 
     then: Answered[R]
     servers: frozenset[str] = frozenset()  # tokens of the servers in other processes that were asked
-    timer: Event | None = None
+    timer: ScheduledCallback | None = None
     remote: Closable | None = None
 
     def forget(self) -> None:
@@ -232,7 +236,9 @@ class Client(Generic[Q, R]):
             late = partial(self._end, sequence, Reply(None, f"no reply within {timeout:g} s"))
             waiting.timer = self._process.scheduler.at(self._process.scheduler.now + timeout, self._owner, late)
         if self._services.witness is not None:
-            self._services.witness(Call(self._owner, self.route[0], self._service, self.gid, sequence, False, request))
+            self._services.witness(
+                WitnessedCall(self._owner, self.route[0], self._service, self.gid, sequence, False, request)
+            )
         if local := self._services.servers.at(self.route):
             waiting.servers = frozenset()
             local[0].ask(Request(request, self.gid, sequence, partial(self._answered, sequence)))
@@ -262,7 +268,7 @@ class Client(Generic[Q, R]):
     def _answered(self, sequence: int, reply: Reply[R]) -> None:
         self._inbox.put(partial(self._end, sequence, reply), self._process.scheduler.post)
 
-    def _answered_from_afar(self, sequence: int, answer: Answer) -> None:
+    def _answered_from_afar(self, sequence: int, answer: TransportReply) -> None:
         self._inbox.put(partial(self._read, sequence, answer), self._process.transport.wake)
 
     def _server_changed(self, token: str, is_there: bool) -> None:
@@ -286,7 +292,7 @@ class Client(Generic[Q, R]):
             for watcher in self._watchers:
                 watcher(self._was_available)
 
-    def _read(self, sequence: int, answer: Answer) -> None:
+    def _read(self, sequence: int, answer: TransportReply) -> None:
         if answer.error:
             self._end(sequence, Reply(None, answer.error))
             return

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rbxcompose.check_runner import check
-from rbxcompose.findings import Finding, Kind, Related, Severity
+from rbxcompose.findings import Finding, FindingKind, Related, Severity
 from rbxcompose.model.flow import OTHER_TYPE, Drive, Flow, setting_span
 from rbxcompose.model.robot import Robot
 from rbxcompose.sdk.capabilities import Setting
@@ -74,7 +74,7 @@ class Excess:
             return f"make '{self.limit.field}' of '{self.drive.base.name}' at least {self.shown(self.wanted)}"
         return OTHER_TYPE
 
-    def finding(self, robot: Robot, kind: Kind, what: str) -> Finding:
+    def finding(self, robot: Robot, kind: FindingKind, what: str) -> Finding:
         """Return the finding; `what` the base does about it."""
         driver, base, name = self.drive.driver, self.drive.base, self.limit.field
         there = (base, name)

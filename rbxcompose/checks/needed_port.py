@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.robot import Robot, RobotComponent
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Serves, ServesAction
@@ -56,16 +56,16 @@ def needed_port(robot: Robot) -> Iterator[Finding]:
             yield _finding(robot, component, ends)
 
 
-def is_unheard(robot: Robot, end: End) -> bool:
+def is_unheard(robot: Robot, end: PortEnd) -> bool:
     """Tell whether commands leave at this end and nobody hears them."""
     return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND and end.topic not in robot.readers
 
 
-def _is_command(end: End) -> bool:
+def _is_command(end: PortEnd) -> bool:
     return isinstance(end.port, In) and end.port.qos is Qos.COMMAND
 
 
-def _finding(robot: Robot, component: RobotComponent, ends: list[End]) -> Finding:
+def _finding(robot: Robot, component: RobotComponent, ends: list[PortEnd]) -> Finding:
     names = " and ".join(f"'{end.topic}'" for end in ends)
     near = [(end, other) for end in ends for other in robot.ends if _fits(end, other)]
     fix = ", ".join(f"{end.name}: {other.topic.strip('/')}" for end, other in near)
@@ -77,5 +77,5 @@ def _finding(robot: Robot, component: RobotComponent, ends: list[End]) -> Findin
     )
 
 
-def _fits(end: End, other: End) -> bool:
+def _fits(end: PortEnd, other: PortEnd) -> bool:
     return type(other.port) is SERVED_BY[type(end.port)] and other.type_name == end.type_name

@@ -9,7 +9,7 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity, Span
 from rbxcompose.model.flow import is_written, setting_span
 from rbxcompose.model.robot import Robot, RobotComponent
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.sdk.capabilities import WritesFrame
 
 STATIC = "_static"  # ends the topic of transforms that never change; both topics tell one tree
@@ -73,7 +73,7 @@ class Writer:
 
     component: RobotComponent
     frame: WritesFrame
-    end: End
+    end: PortEnd
 
     def span(self, robot: Robot) -> Span:
         """Return the place of the frame's name if it is written down, else that of what brings the component."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import In
@@ -48,7 +48,7 @@ def past_the_mux(robot: Robot) -> Iterator[Finding]:
                 )
 
 
-def _output(robot: Robot, end: End) -> str:
+def _output(robot: Robot, end: PortEnd) -> str:
     """Return the topic to which a mux forwards what comes in at this end; nothing if it is no input of a mux."""
     mux = robot.components[end.instance]
     muxed = (mux.end(one.output) for one in mux.declared(Forwards) if end.name in one.inputs)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 
 
@@ -56,6 +56,6 @@ def two_servers(robot: Robot) -> Iterator[Finding]:
             )
 
 
-def _answers(end: End) -> bool:
+def _answers(end: PortEnd) -> bool:
     """Tell whether who asks there waits for an answer; an order of which nobody tells the end may go to several."""
     return isinstance(end.port, Serves | ServesAction) or (isinstance(end.port, ServesTopic) and bool(end.port.ends))

@@ -9,13 +9,13 @@ from rbxcompose.check_runner import check
 from rbxcompose.checks.mux_source import missing
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import Out
 
 
-def is_command(end: End) -> bool:
+def is_command(end: PortEnd) -> bool:
     """Tell whether commands leave at this end."""
     return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND
 
@@ -76,7 +76,7 @@ def two_writers(robot: Robot) -> Iterator[Finding]:
             )
 
 
-def _remedy(robot: Robot, topic: str, writers: Iterable[End], both: tuple[str, str]) -> str:
+def _remedy(robot: Robot, topic: str, writers: Iterable[PortEnd], both: tuple[str, str]) -> str:
     """Return how two of the writers get along: in the mux that is a writer too, or else in a new one."""
     mux = next((one.instance for one in writers if robot.components[one.instance].declared(Forwards)), None)
     if mux is None:

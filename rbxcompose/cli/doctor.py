@@ -20,8 +20,8 @@ from rbxcompose.cli.output.console import FINDINGS, has_colour, refuse, tell, te
 from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, find_robot, robots_up
 from rbxcompose.compiler import compile_robot
 from rbxcompose.doctor import machine
-from rbxcompose.doctor.facts import Bus, Facts, Running
-from rbxcompose.doctor.registry import Answer, examine_all, has_errors
+from rbxcompose.doctor.facts import BusFacts, Facts, Running
+from rbxcompose.doctor.registry import ExaminationResult, examine_all, has_errors
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.model.robot import Robot
@@ -101,7 +101,7 @@ def _running(folder: RobotFolder) -> Running:
     return Running(folder, state, "", robot, _bus(folder))
 
 
-def _bus(folder: RobotFolder) -> Bus | None:
+def _bus(folder: RobotFolder) -> BusFacts | None:
     """Listen for a moment; None if there is no bus to be reached, which others tell."""
     try:
         with Guest(place_of(folder)) as guest:
@@ -119,12 +119,12 @@ def _bus(folder: RobotFolder) -> Bus | None:
                 if all(end.qos is not None and not end.qos.is_transient_local for end in topic.givers):
                     guest.listen(topic, heard)
             guest.run(lambda: False, _LISTENING)
-            return Bus(graph, ages)
+            return BusFacts(graph, ages)
     except NotDoneError:
         return None
 
 
-def _text(answers: list[Answer]) -> str:
+def _text(answers: list[ExaminationResult]) -> str:
     """Return what is fine, then the findings."""
     width = max(len(one.examination) for one in answers)
     lines = [f"ok  {one.examination:<{width}}  {one.told}" for one in answers if isinstance(one.told, str)]

@@ -14,7 +14,7 @@ from rbxcompose.findings import Span
 from rbxcompose.manifest.section import Contents
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.sections.body import Description, body
-from rbxcompose.sections.bus import Bus, bus
+from rbxcompose.sections.bus import BusModel, bus
 from rbxcompose.sections.components import ComponentEntry, components
 from rbxcompose.sections.diagnostics import Diagnostics, diagnostics
 from rbxcompose.sections.missions import MissionEntry, missions
@@ -108,7 +108,7 @@ class RobotManifest:
         return self.contents.of(diagnostics)
 
     @property
-    def bus(self) -> Bus:
+    def bus(self) -> BusModel:
         """Return how messages travel."""
         return self.contents.of(bus)
 

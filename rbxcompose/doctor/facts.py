@@ -13,7 +13,7 @@ from rbxcompose.runtime.processes import Process
 
 
 @dataclass(frozen=True, slots=True)
-class Bus:
+class BusFacts:
     """Who is on a robot's bus, and by how much its nodes' stamps lie in the past [s], at the least, by node."""
 
     graph: Graph
@@ -32,7 +32,7 @@ class Running:
     state: RobotState | None
     problem: str = ""
     robot: Robot | None = None
-    bus: Bus | None = None
+    bus: BusFacts | None = None
 
     @property
     def name(self) -> str:

@@ -19,7 +19,7 @@ FINE = "ok"
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class ExaminationResult:
     """What one examination tells: words on what is fine, or a finding."""
 
     examination: str
@@ -50,13 +50,13 @@ def examination(examine: Examine) -> Examine:
     return examine
 
 
-def examine_all(facts: Facts) -> list[Answer]:
+def examine_all(facts: Facts) -> list[ExaminationResult]:
     """Run every examination, by name."""
     for name in PLUGINS.names():
         PLUGINS.load(name)
-    return [Answer(name, told) for name in sorted(EXAMINATIONS) for told in EXAMINATIONS[name](facts)]
+    return [ExaminationResult(name, told) for name in sorted(EXAMINATIONS) for told in EXAMINATIONS[name](facts)]
 
 
-def has_errors(answers: Sequence[Answer]) -> bool:
+def has_errors(answers: Sequence[ExaminationResult]) -> bool:
     """Tell whether anything keeps a robot from running."""
     return any(one.level == Severity.ERROR.value for one in answers)

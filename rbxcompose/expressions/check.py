@@ -9,12 +9,12 @@ from typing import Protocol
 from rbxcompose.expressions.functions import FUNCTIONS
 from rbxcompose.expressions.tree import (
     Arithmetic,
-    Call,
     Comparison,
     Expression,
     ExpressionNode,
     Field,
     Flag,
+    FunctionCall,
     Index,
     Items,
     Junction,
@@ -129,7 +129,7 @@ class _Checker:
                 return list_of(types.pop() if len(types) == 1 else UNKNOWN)
             case Field() | Index():
                 return self.part(node)
-            case Call():
+            case FunctionCall():
                 return self.call(node)
             case Minus(operand=operand):
                 return self.measured(operand)
@@ -297,7 +297,7 @@ class _Checker:
             return self.joined(node, left, right, _SUMS[node.operator])
         return _product(node.operator, left.type, right.type)
 
-    def call(self, node: Call) -> Type:
+    def call(self, node: FunctionCall) -> Type:
         name, arguments = node.function, node.arguments
         if wrong := FUNCTIONS[name].wrong_count(len(arguments)):
             self.wrong(node, f"{name}() {wrong}")
@@ -326,7 +326,7 @@ class _Checker:
                 return self.extreme(node)
         return _RESULTS[name]
 
-    def extreme(self, node: Call) -> Type:
+    def extreme(self, node: FunctionCall) -> Type:
         """Return the type of the least or the greatest of several values, or of the items of one list."""
         first, *others = node.arguments
         if others:

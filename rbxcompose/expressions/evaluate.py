@@ -12,12 +12,12 @@ from typing import TypeAlias
 from rbxcompose.expressions.functions import FUNCTIONS, items
 from rbxcompose.expressions.tree import (
     Arithmetic,
-    Call,
     Comparison,
     Expression,
     ExpressionNode,
     Field,
     Flag,
+    FunctionCall,
     Index,
     Items,
     Junction,
@@ -36,8 +36,8 @@ from rbxcompose.expressions.values import (
     MOST_LEVELS,
     NOT_ARRIVED,
     EvaluationError,
+    NamedPose,
     NotArrivedError,
-    Place,
     Scope,
     Value,
     is_number,
@@ -100,7 +100,7 @@ def _run(node: ExpressionNode) -> Run:
             return lambda scope: _known(scope.word, name, name, node)
         case Field() | Index():
             return _part(node)
-        case Call():
+        case FunctionCall():
             return _called(node)
         case Arithmetic():
             return _computed(node)
@@ -273,7 +273,7 @@ def _part(node: Field | Index) -> Run:
 
 
 def _entry(whole: Value, key: Value, node: Field | Index) -> Value:
-    if not isinstance(key, str) and isinstance(key, Place):
+    if not isinstance(key, str) and isinstance(key, NamedPose):
         key = key.name
     if isinstance(whole, Mapping):
         if isinstance(key, str) and key in whole:
@@ -288,7 +288,7 @@ def _entry(whole: Value, key: Value, node: Field | Index) -> Value:
     return whole[int(position)]
 
 
-def _called(node: Call) -> Run:
+def _called(node: FunctionCall) -> Run:
     function, name = FUNCTIONS[node.function], node.function
     compute, wrong = function.compute, function.wrong_count(len(node.arguments))
     if compute is None or wrong:
@@ -310,7 +310,7 @@ def _called(node: Call) -> Run:
     return run
 
 
-def _asked(node: Call, scope: Scope, wrong: str) -> Value:
+def _asked(node: FunctionCall, scope: Scope, wrong: str) -> Value:
     """Return what only the scope knows of a `$name`."""
     if wrong:
         raise EvaluationError(f"{node.function}() {wrong}", node.start, node.end)

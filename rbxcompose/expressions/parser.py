@@ -10,13 +10,13 @@ from rbxcompose.expressions.operators import OPERATORS
 from rbxcompose.expressions.tokens import KEYWORDS, Token, TokenKind, tokens
 from rbxcompose.expressions.tree import (
     Arithmetic,
-    Call,
     Comparison,
     Expression,
     ExpressionError,
     ExpressionNode,
     Field,
     Flag,
+    FunctionCall,
     Index,
     Items,
     Junction,
@@ -217,12 +217,12 @@ class _Parser:
             raise ExpressionError(message, token.start, token.end, _FOREIGN[token.text])
         return Word(token.start, token.end, token.text)
 
-    def call(self, name: Token) -> Call:
+    def call(self, name: Token) -> FunctionCall:
         if name.text not in FUNCTIONS:
             help_text = suggest(name.text, FUNCTIONS, "the functions are")
             raise ExpressionError(f"unknown function '{name.text}'", name.start, name.end, help_text)
         arguments, end = self.items(")", self.take())
-        return Call(name.start, end, name.text, arguments)
+        return FunctionCall(name.start, end, name.text, arguments)
 
     def items(self, closing: str, opened: Token) -> tuple[tuple[ExpressionNode, ...], int]:
         """Read values between commas up to the closing bracket; return them and where it ends."""

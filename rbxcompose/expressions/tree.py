@@ -88,7 +88,7 @@ class Index(_Placed):
 
 
 @dataclass(frozen=True, slots=True)
-class Call(_Placed):
+class FunctionCall(_Placed):
     """`function(arguments)`, one of the few functions that exist."""
 
     function: str
@@ -152,7 +152,7 @@ ExpressionNode: TypeAlias = (
     | Items
     | Field
     | Index
-    | Call
+    | FunctionCall
     | Minus
     | Not
     | Arithmetic
@@ -165,7 +165,7 @@ ExpressionNode: TypeAlias = (
 def children(node: ExpressionNode) -> tuple[ExpressionNode, ...]:
     """Return the nodes right below this one, in the order of the text."""
     match node:
-        case Items(items=nodes) | Call(arguments=nodes) | Junction(operands=nodes):
+        case Items(items=nodes) | FunctionCall(arguments=nodes) | Junction(operands=nodes):
             return nodes
         case Field(of=of):
             return (of,)
@@ -220,7 +220,7 @@ class Expression:
             "calls": [
                 Reference(node.function, node.start, node.start + len(node.function))
                 for node in nodes
-                if isinstance(node, Call)
+                if isinstance(node, FunctionCall)
             ],
         }.items():
             object.__setattr__(self, name, tuple(found))

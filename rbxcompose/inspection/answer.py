@@ -32,7 +32,7 @@ class Layer:
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class ArgumentSource:
     """An argument that a value was filled in from; `below` are the layers whose values it took the place of."""
 
     name: str
@@ -42,7 +42,7 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class PathAnswer:
     """All that is known of one path; the last of `layers` holds."""
 
     path: str
@@ -51,7 +51,7 @@ class Answer:
     dimension: Dimension | None = None
     si: float | None = None
     layers: tuple[Layer, ...] = ()
-    sources: tuple[Source, ...] = ()
+    sources: tuple[ArgumentSource, ...] = ()
     is_default: bool = False
     hints: tuple[tuple[str, str], ...] = ()  # a label and a text
     place: str = ""

@@ -12,7 +12,7 @@ from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.program.sources import Way
 from rbxcompose.model.robot import Robot, RobotComponent, RobotMission
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction
 
@@ -168,7 +168,7 @@ def _wires(robot: Robot) -> Iterator[Wire]:
         yield Wire(topic, kind, wire.type, wire.qos, tuple(wire.sources), tuple(wire.targets), about)
 
 
-def _add(robot: Robot, component: RobotComponent, end: End, found: dict[tuple[Line, str], _Open]) -> None:
+def _add(robot: Robot, component: RobotComponent, end: PortEnd, found: dict[tuple[Line, str], _Open]) -> None:
     kind = _kind(end)
     if kind is None:
         return
@@ -178,7 +178,7 @@ def _add(robot: Robot, component: RobotComponent, end: End, found: dict[tuple[Li
     tips.append(Tip(component.name, _note(robot, component, end)))
 
 
-def _kind(end: End) -> Line | None:
+def _kind(end: PortEnd) -> Line | None:
     match end.port:
         case Out() | In():
             return Line.TOPIC
@@ -189,7 +189,7 @@ def _kind(end: End) -> Line | None:
     return None
 
 
-def _note(robot: Robot, component: RobotComponent, end: End) -> str:
+def _note(robot: Robot, component: RobotComponent, end: PortEnd) -> str:
     """Return the priority of an input or a lock of a mux."""
     mux = robot.manifest.muxes.get(component.name)
     if mux is None or not isinstance(end.port, In):

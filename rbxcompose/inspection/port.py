@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from rbxcompose.inspection.answer import Answer
+from rbxcompose.inspection.answer import PathAnswer
 from rbxcompose.inspection.wire_keys import does, keys_of, qos_of
 from rbxcompose.manifest.tree import Path, at
 from rbxcompose.model.robot import Robot, RobotComponent
-from rbxcompose.model.wires import End, resolve
+from rbxcompose.model.wires import PortEnd, resolve
 from rbxcompose.plan.model import BusPlan
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction, ServesTopic
 
@@ -21,7 +21,7 @@ _OTHER = {  # the first that a port is an instance of counts
 }
 
 
-def why_port(robot: Robot, path: Path) -> Answer | None:
+def why_port(robot: Robot, path: Path) -> PathAnswer | None:
     """Return what is known of a component (`transforms`) or of one of its ports (`go_to.cmd_vel`), None if none is."""
     name, *rest = [str(key) for key in (path[1:] if path[0] in ("components", "muxes") else path)] or [""]
     component = robot.components.get(name)
@@ -31,24 +31,24 @@ def why_port(robot: Robot, path: Path) -> Answer | None:
         about = (component.cls.__doc__ or "").strip().partition("\n")[0]
         is_written = at(robot.manifest.root, component.path) is not None
         place = str(robot.component_span(name)) if is_written else "every robot runs it"
-        return Answer(name, f"type {component.type_name}", about, hints=(("where", place),))
+        return PathAnswer(name, f"type {component.type_name}", about, hints=(("where", place),))
     end = component.end(rest[0])
     return _port(robot, component, end) if end else None
 
 
-def _port(robot: Robot, component: RobotComponent, end: End) -> Answer:
+def _port(robot: Robot, component: RobotComponent, end: PortEnd) -> PathAnswer:
     path = f"{end.instance}.{end.name}"
     if isinstance(end.port, Looks):
-        return Answer(path, f"looks up '{end.port.source}' in '{end.port.target}'")
+        return PathAnswer(path, f"looks up '{end.port.source}' in '{end.port.target}'")
     qos = qos_of(end.port)
     value = f"{does(end.port)} {end.type_name} at {end.topic}" + (f", as {qos}" if qos else "")
     bus = robot.manifest.bus
     keys = keys_of(end.port, end.topic, BusPlan(bus.domain, bus.namespace or "", bus.port, bus.wire, bus.router))
     hints = [("because", _reason(robot, component, end)), _others(robot, end)]
-    return Answer(path, value, hints=(*hints, *((label if len(keys) > 1 else "key", key) for label, key in keys)))
+    return PathAnswer(path, value, hints=(*hints, *((label if len(keys) > 1 else "key", key) for label, key in keys)))
 
 
-def _reason(robot: Robot, component: RobotComponent, end: End) -> str:
+def _reason(robot: Robot, component: RobotComponent, end: PortEnd) -> str:
     namespace = robot.manifest.bus.namespace or ""
     for mux, entry in robot.manifest.muxes.items():
         for name, source in entry.inputs.items():
@@ -66,7 +66,7 @@ def _reason(robot: Robot, component: RobotComponent, end: End) -> str:
     return f"that is its own name; 'connect: {{{end.name}: ...}}' gives it another one"
 
 
-def _others(robot: Robot, end: End) -> tuple[str, str]:
+def _others(robot: Robot, end: PortEnd) -> tuple[str, str]:
     other, words = next(pair for kind, pair in _OTHER.items() if isinstance(end.port, kind))
     names = [
         f"{one.instance}.{one.name}" for one in robot.ends if one.topic == end.topic and isinstance(one.port, other)

@@ -10,7 +10,7 @@ from rbxcompose.composition.history import Step
 from rbxcompose.composition.overlay import SET
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.findings import Finding
-from rbxcompose.inspection.answer import Answer, Layer, Source
+from rbxcompose.inspection.answer import ArgumentSource, Layer, PathAnswer
 from rbxcompose.inspection.expand import expand_below
 from rbxcompose.inspection.origin import origin_of, shown
 from rbxcompose.inspection.paths import found_at, is_known, no_such_path, path_of, short, tree_of
@@ -28,7 +28,7 @@ _ARGUMENT = re.compile(r"\bargs\.([a-z][a-z0-9_]*)")
 _MEASURED = ("args", "missions", "include")  # sections in which only the value itself says what it measures
 
 
-def why(robot: Robot, text: str) -> Answer | Finding:
+def why(robot: Robot, text: str) -> PathAnswer | Finding:
     """Return all that is known of a path of the robot, written as for `--set`, or of a port: `go_to.cmd_vel`."""
     path = path_of(robot, text)
     node = found_at(robot.manifest, path)
@@ -38,7 +38,7 @@ def why(robot: Robot, text: str) -> Answer | Finding:
     if node is not None:
         return _written(robot, guide, path, node)
     if removed := _removed(robot.manifest, path):
-        return Answer(short(path), "nothing", _about(robot, guide, path), layers=removed)
+        return PathAnswer(short(path), "nothing", _about(robot, guide, path), layers=removed)
     if path[0] != "profiles" and (answer := _unwritten(robot, guide, path)):
         return answer
     return why_port(robot, path) or no_such_path(robot, path, guide)
@@ -49,14 +49,14 @@ def _guide(manifest: RobotManifest, path: Path) -> Guide:
     return Guide(installed_schema("Robot"), tree_of(manifest, path), types)
 
 
-def _written(robot: Robot, guide: Guide, path: Path, node: TreeNode) -> Answer:
+def _written(robot: Robot, guide: Guide, path: Path, node: TreeNode) -> PathAnswer:
     about, place = _about(robot, guide, path), origin_of(robot.manifest, path, node)
     if isinstance(node, MappingNode) and node.entries:
         body = expand_below(robot.manifest, path, node, dict(_defaults(guide, path, node)))
         where = key_span(tree_of(robot.manifest, path), path)
-        return Answer(short(path), _kind(path, node), about, place=str(where), body=body, node=node)
+        return PathAnswer(short(path), _kind(path, node), about, place=str(where), body=body, node=node)
     dimension = _dimension(guide, path, node)
-    return Answer(
+    return PathAnswer(
         short(path),
         shown(node),
         about,
@@ -68,7 +68,7 @@ def _written(robot: Robot, guide: Guide, path: Path, node: TreeNode) -> Answer:
     )
 
 
-def _argument_in_effect(robot: Robot, guide: Guide, path: Path, declared: MappingNode) -> Answer:
+def _argument_in_effect(robot: Robot, guide: Guide, path: Path, declared: MappingNode) -> PathAnswer:
     """Return the value that an argument has: its default, or what a layer above has put in the place of that."""
     written = {name: shown(entry.value) for name, entry in declared.entries.items()}
     limits = [f"{words} {written[key]}" for key, words in (("min", "at least"), ("max", "at most")) if key in written]
@@ -77,7 +77,7 @@ def _argument_in_effect(robot: Robot, guide: Guide, path: Path, declared: Mappin
     value = declared.get("default")
     if value is None:
         place = key_span(robot.manifest.root, path)
-        return Answer(short(path), "nothing", written.get("about", ""), place=str(place), hints=hints)
+        return PathAnswer(short(path), "nothing", written.get("about", ""), place=str(place), hints=hints)
     answer = _written(robot, guide, (*path, "default"), value)
     return replace(answer, path=short(path), about=written.get("about", ""), hints=hints)
 
@@ -129,7 +129,7 @@ def _si(node: TreeNode, dimension: Dimension | None) -> float | None:
         return None
 
 
-def _sources(manifest: RobotManifest, path: Path) -> Iterator[Source]:
+def _sources(manifest: RobotManifest, path: Path) -> Iterator[ArgumentSource]:
     """Yield the arguments that a value was filled in from, each followed by those that it was given."""
     steps = manifest.history.of(path)
     written = steps[-1].node if steps else None
@@ -139,20 +139,20 @@ def _sources(manifest: RobotManifest, path: Path) -> Iterator[Source]:
         yield from _argument(manifest, name, written.scope)
 
 
-def _argument(manifest: RobotManifest, name: str, scope: str) -> Iterator[Source]:
+def _argument(manifest: RobotManifest, name: str, scope: str) -> Iterator[ArgumentSource]:
     path: Path = ("include", scope, "with", name) if scope else ("args", name, "default")
     label = f"args.{name}" + (f" of part '{scope}'" if scope else "")
     node = found_at(manifest, path)
     if node is not None:
         below = tuple(map(_layer, manifest.history.of(path)[:-1]))
-        yield Source(label, shown(node), origin_of(manifest, path, node), below)
+        yield ArgumentSource(label, shown(node), origin_of(manifest, path, node), below)
         yield from _sources(manifest, path)
     elif scope in manifest.parts:
         given = "given by the part that includes it, else " if "." in scope else ""
-        yield Source(label, f"{given}the default in {manifest.parts[scope].file}", None)
+        yield ArgumentSource(label, f"{given}the default in {manifest.parts[scope].file}", None)
 
 
-def _unwritten(robot: Robot, guide: Guide, path: Path) -> Answer | None:
+def _unwritten(robot: Robot, guide: Guide, path: Path) -> PathAnswer | None:
     """Return what holds for a key that exists and that nobody wrote."""
     if given := _input(robot, path):
         return _unwritten_input(path, given)
@@ -160,7 +160,9 @@ def _unwritten(robot: Robot, guide: Guide, path: Path) -> Answer | None:
         return None
     if guide.keys(path):
         body = expand_below(robot.manifest, path, MappingNode(), dict(_defaults(guide, path, MappingNode())))
-        return Answer(short(path), "the defaults, no file writes it", guide.describe(path), is_default=True, body=body)
+        return PathAnswer(
+            short(path), "the defaults, no file writes it", guide.describe(path), is_default=True, body=body
+        )
     value, default = guide.value(path), _default(guide.value(path).default)
     component = robot.components.get(str(path[1])) if len(path) == 3 and path[0] == "components" else None
     of = f" of type '{component.type_name}'" if component else ""
@@ -170,17 +172,19 @@ def _unwritten(robot: Robot, guide: Guide, path: Path) -> Answer | None:
     dimension = value.dimension
     si = _si(ScalarNode(default, robot.manifest.root.span), dimension) if default else None
     hints = (("where", said), ("to set it", below + _to_set(path)))
-    return Answer(short(path), default or "nothing", guide.describe(path), dimension, si, is_default=True, hints=hints)
+    return PathAnswer(
+        short(path), default or "nothing", guide.describe(path), dimension, si, is_default=True, hints=hints
+    )
 
 
-def _unwritten_input(path: Path, given: Input) -> Answer:
+def _unwritten_input(path: Path, given: Input) -> PathAnswer:
     default = given.default
     value = "nothing" if default is None else show_value(given.type, default.value)
     said = f"no file writes it: this is the default of the mission ({given.span})" if default else f"see {given.span}"
     hints = (("where", said), ("to set it", _to_set(path)))
     dimension, si = given.type.dimension, default.value if default else None
     is_measured = dimension is not None and isinstance(si, float)
-    return Answer(
+    return PathAnswer(
         short(path),
         value,
         "An input of the mission.",

@@ -42,7 +42,7 @@ class TrialFile(Header):
     """What must have happened in the end."""
 
 
-class Mock(Config):
+class MockModel(Config):
     """How the test answers in the place of a skill or a service."""
 
     takes: Time = Field(0.0, ge=0)
@@ -61,7 +61,7 @@ class Mock(Config):
     """Outcome by number of the call, where it differs from `result`."""
 
 
-class Sent(Config):
+class SentModel(Config):
     """A message."""
 
     topic: TopicName
@@ -70,14 +70,14 @@ class Sent(Config):
     """Its fields; a single value stands for the only one."""
 
 
-class Event(Config):
+class EventModel(Config):
     """Something that happens to the robot; several things of one instant happen in the order of the text."""
 
     at: Time = Field(ge=0)
     """When, counted from the start of the test."""
     set_: dict[Name, Any] = Field({}, alias="set")
     """Values that get this value now, and keep it until the test sets them again."""
-    publish: Sent | None = None
+    publish: SentModel | None = None
     """A message that comes from outside."""
     stop: Order = False
     """The robot is stopped, and its mission paused."""
@@ -89,7 +89,7 @@ class Event(Config):
     """The mission goes on."""
 
 
-class Expect(Config):
+class ExpectModel(Config):
     """What must have happened."""
 
     outcome: Name | None = None
@@ -104,7 +104,7 @@ class Expect(Config):
     """How often a step is begun, by its name."""
     data: dict[Name, Any] = {}
     """Values of the mission's data at the end."""
-    published: tuple[Sent, ...] = ()
+    published: tuple[SentModel, ...] = ()
     """Messages that it publishes, in this order; only the fields that are written count."""
     reports: tuple[str, ...] = ()
     """Texts that stand in what it logs or reports."""
@@ -116,9 +116,9 @@ def _in_full(value: object) -> object:
     return {"result": value} if isinstance(value, str) else value
 
 
-MockModel = Annotated[Mock, BeforeValidator(_in_full, json_schema_input_type=Mock | Name | None)]
+ShortMock = Annotated[MockModel, BeforeValidator(_in_full, json_schema_input_type=MockModel | Name | None)]
 """A mock, or the word for its result, or nothing: it succeeds at once."""
 
-SECTIONS = {"mocks": dict[Name, MockModel], "events": tuple[Event, ...], "expect": Expect}
+SECTIONS = {"mocks": dict[Name, ShortMock], "events": tuple[EventModel, ...], "expect": ExpectModel}
 """What stands in each section."""
 STEP_KEYS = ("ended", "at")  # beside the name of a step

@@ -10,7 +10,7 @@ from rbxcompose.manifest import test_file as trials
 from rbxcompose.manifest.tree import Path, SequenceNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.mission_tests import codes
-from rbxcompose.mission_tests.model import Deed, Event
+from rbxcompose.mission_tests.model import EventDeed, TrialEvent
 from rbxcompose.mission_tests.sections import Context, entries_of
 from rbxcompose.model.wires import resolve
 from rbxcompose.msgs import registry
@@ -19,29 +19,29 @@ from rbxcompose.msgs.plain import from_plain
 AT, SET, PUBLISH = "at", "set", "publish"
 
 
-def read_events(context: Context, node: TreeNode | None, models: Sequence[trials.Event]) -> tuple[Event, ...]:
+def read_events(context: Context, node: TreeNode | None, models: Sequence[trials.EventModel]) -> tuple[TrialEvent, ...]:
     """Return the events in the order of the text."""
     items = node.items if isinstance(node, SequenceNode) else ()
     return tuple(_event(context, item, model) for item, model in zip(items, models, strict=False))
 
 
-def _event(context: Context, node: TreeNode, model: trials.Event) -> Event:
+def _event(context: Context, node: TreeNode, model: trials.EventModel) -> TrialEvent:
     words = [word for word, _ in entries_of(node) if word != AT]
     if not words:
         context.report.add(codes.NEVER.at(node.span, "nothing happens here", help="give 'set', 'publish', 'stop', ..."))
     deeds = (_deed(context, word, node, model) for word in words)
-    return Event(model.at, tuple(deed for deed in deeds if deed), value_span(node, (AT,)))
+    return TrialEvent(model.at, tuple(deed for deed in deeds if deed), value_span(node, (AT,)))
 
 
-def _deed(context: Context, word: str, node: TreeNode, model: trials.Event) -> Deed | None:
+def _deed(context: Context, word: str, node: TreeNode, model: trials.EventModel) -> EventDeed | None:
     if word == SET:
-        return Deed(SET, context.settings(at(node, (SET,)), {}))
+        return EventDeed(SET, context.settings(at(node, (SET,)), {}))
     if word == PUBLISH and model.publish:
         return _published(context, node, model.publish)
-    return Deed(word)
+    return EventDeed(word)
 
 
-def _published(context: Context, node: TreeNode, sent: trials.Sent) -> Deed | None:
+def _published(context: Context, node: TreeNode, sent: trials.SentModel) -> EventDeed | None:
     """Return a message for a topic that somebody reads or writes."""
     topics, topic = _topics(context), resolve(sent.topic, context.robot.manifest.bus.namespace or "")
     if topic not in topics:
@@ -54,9 +54,9 @@ def _published(context: Context, node: TreeNode, sent: trials.Sent) -> Deed | No
     data = {} if written is None else to_plain(written)
     if not isinstance(data, dict):
         data = {next(iter(cls.FIELDS)): data}
-    made, findings = from_plain(cls, data, Places(node, place))
+    made, findings = from_plain(cls, data, MessagePlaces(node, place))
     context.report.extend(findings)
-    return Deed(PUBLISH, topic=topic, message=made) if made is not None else None
+    return EventDeed(PUBLISH, topic=topic, message=made) if made is not None else None
 
 
 def _topics(context: Context) -> dict[str, str]:
@@ -67,7 +67,7 @@ def _topics(context: Context) -> dict[str, str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Places:
+class MessagePlaces:
     """Where the parts of a message stand."""
 
     node: TreeNode

@@ -13,7 +13,17 @@ from rbxcompose.manifest.test_file import STEP_KEYS
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import validate
 from rbxcompose.mission_tests import codes
-from rbxcompose.mission_tests.model import FAILS, HALTED, RUNS, SKIPPED, SUCCEEDS, Expect, Named, Sent, Step
+from rbxcompose.mission_tests.model import (
+    FAILS,
+    HALTED,
+    RUNS,
+    SKIPPED,
+    SUCCEEDS,
+    Expectations,
+    ExpectedMessage,
+    ExpectedStep,
+    ExpectedValue,
+)
 from rbxcompose.mission_tests.scope import read_value
 from rbxcompose.mission_tests.sections import Context, entries_of
 from rbxcompose.missions.analysis.held_nodes import brief
@@ -24,11 +34,11 @@ STEP_HELP = "write the name of a skill, a node or a state, such as '- go_to: cor
 ENDS = {one: one for one in (SUCCEEDS, FAILS, HALTED, SKIPPED)}
 
 
-def read_expect(context: Context, node: TreeNode | None, model: trials.Expect) -> Expect:
+def read_expect(context: Context, node: TreeNode | None, model: trials.ExpectModel) -> Expectations:
     """Return what is expected."""
     root = node or MappingNode()
     _look_at_outcome(context, root, model)
-    expect = Expect(
+    expect = Expectations(
         model.outcome or "",
         value_span(root, ("outcome",)),
         model.for_,
@@ -37,7 +47,7 @@ def read_expect(context: Context, node: TreeNode | None, model: trials.Expect) -
         tuple(_counts(context, at(root, ("count",)), model.count)),
         tuple(_data(context, at(root, ("data",)))),
         tuple(_published(context, at(root, ("published",)), model.published)),
-        tuple(Named(text, text, value_span(root, ("reports", i))) for i, text in enumerate(model.reports)),
+        tuple(ExpectedValue(text, text, value_span(root, ("reports", i))) for i, text in enumerate(model.reports)),
     )
     for step in expect.steps:
         if model.for_ is not None and step.at is not None and step.at > model.for_:
@@ -45,7 +55,7 @@ def read_expect(context: Context, node: TreeNode | None, model: trials.Expect) -
     return expect
 
 
-def _look_at_outcome(context: Context, root: TreeNode, model: trials.Expect) -> None:
+def _look_at_outcome(context: Context, root: TreeNode, model: trials.ExpectModel) -> None:
     report, ends = context.report, {**context.facts.ends, RUNS: RUNS}
     if model.outcome is not None and model.outcome not in ends:
         message = f"the mission '{context.program.name}' has no outcome '{model.outcome}'"
@@ -56,12 +66,12 @@ def _look_at_outcome(context: Context, root: TreeNode, model: trials.Expect) -> 
         report.add(codes.NEVER.at(key_span(root, ("outcome",)), "every test of a mission ends", help=help_text))
 
 
-def _steps(context: Context, node: TreeNode | None) -> list[Step]:
+def _steps(context: Context, node: TreeNode | None) -> list[ExpectedStep]:
     items = node.items if isinstance(node, SequenceNode) else ()
     return [step for item in items if (step := _step(context, item))]
 
 
-def _step(context: Context, node: TreeNode) -> Step | None:
+def _step(context: Context, node: TreeNode) -> ExpectedStep | None:
     """Read one step: a word, or a map with one name beside `ended` and `at`."""
     entries = dict(entries_of(node))
     if isinstance(node, ScalarNode):
@@ -82,7 +92,7 @@ def _step(context: Context, node: TreeNode) -> Step | None:
     text = name if isinstance(entry.value, ScalarNode) and not entry.value.text else f"{name} {brief(entry.value)}"
     if isinstance(entry.value, MappingNode):
         text = " ".join([name, *(f"{key} {brief(one.value)}" for key, one in entry.value.entries.items())])
-    return Step(name, entry.key.span, arguments, _ended(context, name, entries), when, text, steps[name])
+    return ExpectedStep(name, entry.key.span, arguments, _ended(context, name, entries), when, text, steps[name])
 
 
 def _ended(context: Context, name: str, entries: Mapping[str, Entry]) -> str:
@@ -118,7 +128,7 @@ def _arguments(context: Context, name: str, node: TreeNode) -> dict[str, Value]:
     return found
 
 
-def _counts(context: Context, node: TreeNode | None, counts: Mapping[str, int]) -> list[Named]:
+def _counts(context: Context, node: TreeNode | None, counts: Mapping[str, int]) -> list[ExpectedValue]:
     found = []
     for name, entry in entries_of(node):
         if name not in context.facts.steps:
@@ -127,11 +137,11 @@ def _counts(context: Context, node: TreeNode | None, counts: Mapping[str, int]) 
         elif counts.get(name, -1) < 0:
             context.report.add(codes.NEVER.at(entry.value.span, "nothing is done less often than never"))
         else:
-            found.append(Named(name, counts[name], entry.key.span))
+            found.append(ExpectedValue(name, counts[name], entry.key.span))
     return found
 
 
-def _data(context: Context, node: TreeNode | None) -> list[Named]:
+def _data(context: Context, node: TreeNode | None) -> list[ExpectedValue]:
     found = []
     for name, entry in entries_of(node):
         wanted = context.type_of_datum(name)
@@ -141,11 +151,11 @@ def _data(context: Context, node: TreeNode | None) -> list[Named]:
             continue
         value, findings = read_value(entry.value, wanted or UNKNOWN, context.names, f"the datum '{name}'")
         context.report.extend(findings)
-        found.append(Named(name, value, entry.key.span))
+        found.append(ExpectedValue(name, value, entry.key.span))
     return found
 
 
-def _published(context: Context, node: TreeNode | None, models: Sequence[trials.Sent]) -> list[Sent]:
+def _published(context: Context, node: TreeNode | None, models: Sequence[trials.SentModel]) -> list[ExpectedMessage]:
     found = []
     for index, model in enumerate(models):
         span: Span = value_span(node or MappingNode(), (index, "topic"))
@@ -155,7 +165,9 @@ def _published(context: Context, node: TreeNode | None, models: Sequence[trials.
             context.report.add(codes.UNKNOWN.misspelt(span, message, model.topic, known, "its topics"))
             continue
         topic = known[model.topic.strip("/")]
-        found.append(Sent(topic, _fields(context, topic, at(node or MappingNode(), (index, "message"))), span))
+        found.append(
+            ExpectedMessage(topic, _fields(context, topic, at(node or MappingNode(), (index, "message"))), span)
+        )
     return found
 
 

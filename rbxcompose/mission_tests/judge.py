@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rbxcompose.expressions.types import Type
 from rbxcompose.expressions.values import NOT_ARRIVED
 from rbxcompose.findings import Span
-from rbxcompose.mission_tests.model import RUNS, Expect, Step
+from rbxcompose.mission_tests.model import RUNS, Expectations, ExpectedStep
 from rbxcompose.mission_tests.record import Done, Record
 from rbxcompose.mission_tests.scope import agrees
 from rbxcompose.missions.engine.value_text import show
@@ -26,7 +26,7 @@ class Problem:
     line: int | None = None
 
 
-def judge(expect: Expect, record: Record, types: Mapping[str, Type]) -> list[Problem]:
+def judge(expect: Expectations, record: Record, types: Mapping[str, Type]) -> list[Problem]:
     """Return what is not as it was expected, nothing for a test that passed; `types` are those of the data."""
     return [
         *_ending(expect, record),
@@ -39,7 +39,7 @@ def judge(expect: Expect, record: Record, types: Mapping[str, Type]) -> list[Pro
     ]
 
 
-def _ending(expect: Expect, record: Record) -> Iterator[Problem]:
+def _ending(expect: Expectations, record: Record) -> Iterator[Problem]:
     last = len(record.lines) - 1
     if record.trouble:
         yield Problem(record.trouble, expect.outcome_span, last)
@@ -60,7 +60,7 @@ def _how(outcome: str) -> str:
     return "is still running" if outcome == RUNS else f"ended with {outcome}"
 
 
-def _steps(expected: Sequence[Step], record: Record) -> Iterator[Problem]:
+def _steps(expected: Sequence[ExpectedStep], record: Record) -> Iterator[Problem]:
     """Look for each step behind the one before it, also after one that is missing."""
     behind = 0
     for step in expected:
@@ -72,12 +72,12 @@ def _steps(expected: Sequence[Step], record: Record) -> Iterator[Problem]:
             behind = found + 1
 
 
-def is_it(step: Step, done: Done) -> bool:
+def is_it(step: ExpectedStep, done: Done) -> bool:
     """Tell whether a step that was done is the one that is looked for."""
     return done.name == step.name and not _differences(step, done)
 
 
-def _differences(step: Step, done: Done) -> list[str]:
+def _differences(step: ExpectedStep, done: Done) -> list[str]:
     """Return in which ways a step of the same name is another one; empty words for other arguments."""
     found = []
     arguments = step.arguments.items()
@@ -90,7 +90,7 @@ def _differences(step: Step, done: Done) -> list[str]:
     return found
 
 
-def _nearest(step: Step, done: Sequence[Done], behind: int) -> str:
+def _nearest(step: ExpectedStep, done: Sequence[Done], behind: int) -> str:
     """Return what comes nearest to a step that is missing, in words: the same call first, then one that is alike.
 
     What was done before what was looked for counts more than a call with other arguments behind it.
@@ -106,19 +106,19 @@ def _nearest(step: Step, done: Sequence[Done], behind: int) -> str:
     return "it was never begun" if not behind else f"it was not begun after {done[behind - 1].text}"
 
 
-def _written(step: Step) -> str:
+def _written(step: ExpectedStep) -> str:
     ended = f", ended {step.ended}" if step.ended else ""
     return f"{step.text}{ended}" + (f", at {at(step.at)}" if step.at is not None else "")
 
 
-def _never(never: Sequence[Step], record: Record) -> Iterator[Problem]:
+def _never(never: Sequence[ExpectedStep], record: Record) -> Iterator[Problem]:
     for step in never:
         done = next((one for one in record.steps if is_it(step, one)), None)
         if done:
             yield Problem(f"{_written(step)} must never be done, and was at {at(done.began)}", step.span, done.line)
 
 
-def _counts(expect: Expect, record: Record) -> Iterator[Problem]:
+def _counts(expect: Expectations, record: Record) -> Iterator[Problem]:
     for one in expect.count:
         count = sum(step.name == one.name for step in record.steps)
         if count != one.value:
@@ -129,7 +129,7 @@ def _times(name: str, count: object) -> str:
     return f"{name} {'once' if count == 1 else f'{count} times'}"
 
 
-def _data(expect: Expect, record: Record, types: Mapping[str, Type]) -> Iterator[Problem]:
+def _data(expect: Expectations, record: Record, types: Mapping[str, Type]) -> Iterator[Problem]:
     for one in expect.data:
         happened, kind = record.data.get(one.name, NOT_ARRIVED), types.get(one.name)
         if not agrees(one.value, happened):
@@ -137,7 +137,7 @@ def _data(expect: Expect, record: Record, types: Mapping[str, Type]) -> Iterator
             yield Problem(f"expected {one.name} to be {show(kind, one.value)}, {told}", one.span)
 
 
-def _published(expect: Expect, record: Record) -> Iterator[Problem]:
+def _published(expect: Expectations, record: Record) -> Iterator[Problem]:
     behind = 0
     for sent in expect.published:
         rest = enumerate(record.published[behind:], behind)
@@ -151,7 +151,7 @@ def _published(expect: Expect, record: Record) -> Iterator[Problem]:
             behind = found + 1
 
 
-def _reports(expect: Expect, record: Record) -> Iterator[Problem]:
+def _reports(expect: Expectations, record: Record) -> Iterator[Problem]:
     for one in expect.reports:
         if not any(one.name in text for text in record.reports):
             yield Problem(f"nothing that was logged or reported has '{one.name}' in it", one.span)

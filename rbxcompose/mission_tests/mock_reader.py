@@ -16,12 +16,12 @@ from rbxcompose.mission_tests.sections import Context, entries_of
 from rbxcompose.missions.program.program import Skill
 
 
-def read_mocks(context: Context, node: TreeNode | None, models: Mapping[str, trials.Mock]) -> dict[str, Mock]:
+def read_mocks(context: Context, node: TreeNode | None, models: Mapping[str, trials.MockModel]) -> dict[str, Mock]:
     """Return the mocks by the name of what they stand for."""
     return {name: _mock(context, name, entry, models[name]) for name, entry in entries_of(node) if name in models}
 
 
-def _mock(context: Context, name: str, entry: Entry, model: trials.Mock) -> Mock:
+def _mock(context: Context, name: str, entry: Entry, model: trials.MockModel) -> Mock:
     report, names, value = context.report, context.names, entry.value
     if name not in names.skills and name not in names.services:
         message, valid = f"the robot has no skill or service '{name}'", {**names.skills, **names.services}
@@ -47,7 +47,7 @@ def _mock(context: Context, name: str, entry: Entry, model: trials.Mock) -> Mock
     )
 
 
-def _outcomes(value: TreeNode, model: trials.Mock, outcomes: Mapping[str, str]) -> Iterator[Finding]:
+def _outcomes(value: TreeNode, model: trials.MockModel, outcomes: Mapping[str, str]) -> Iterator[Finding]:
     """Yield what is wrong with the outcomes."""
     written: dict[Path, str] = {("result",): model.result}
     written |= {("outcome_at", call): outcome for call, outcome in model.outcome_at.items()}

@@ -21,7 +21,7 @@ from rbxcompose.mission_tests.event_reader import PUBLISH, read_events
 from rbxcompose.mission_tests.expectation_reader import read_expect
 from rbxcompose.mission_tests.mission_facts import Facts
 from rbxcompose.mission_tests.mock_reader import read_mocks
-from rbxcompose.mission_tests.model import Event, Mock, Trial
+from rbxcompose.mission_tests.model import Mock, Trial, TrialEvent
 from rbxcompose.mission_tests.sections import Context
 from rbxcompose.missions.engine.inputs import bind_inputs
 from rbxcompose.missions.program.linker import link
@@ -175,7 +175,7 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
     )
 
 
-def _is_complete(facts: Facts, mocks: Mapping[str, Mock], events: tuple[Event, ...]) -> bool:
+def _is_complete(facts: Facts, mocks: Mapping[str, Mock], events: tuple[TrialEvent, ...]) -> bool:
     """Tell whether the mission asks for nothing but what the test gives, and nothing goes over the bus."""
     deeds = [deed for event in events for deed in event.deeds]
     values = {name for deed in deeds for name in deed.settings} | {name for one in mocks.values() for name in one.sets}
@@ -208,7 +208,7 @@ def _inputs(
     return bound
 
 
-def _look_at_times(events: tuple[Event, ...], until: float | None, report: Report) -> None:
+def _look_at_times(events: tuple[TrialEvent, ...], until: float | None, report: Report) -> None:
     """Add what can never happen: an event after the end, an order that the robot refuses."""
     is_stopped = is_paused = False
     latest = 0.0

@@ -21,7 +21,7 @@ _RESET = "\x1b[0m"
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class FileOutcome:
     """What became of one file: a verdict, or the findings that kept it from running; `took` is real time [s]."""
 
     file: str
@@ -51,7 +51,7 @@ class Teller:
         """Return a text in a colour."""
         return f"{_COLOURS[style]}{text}{_RESET}" if self.colour else text
 
-    def line(self, one: Outcome) -> str:
+    def line(self, one: FileOutcome) -> str:
         """Return the one line on a test."""
         word = self.paint("pass", "passed") if one.passed else self.paint("fail", "FAILED")
         times = f"{one.took * 1e3:.0f} ms" + (f", {one.robot_time:.1f} s of robot time" if one.verdict else "")
@@ -85,7 +85,7 @@ class Teller:
         where = f"  [{problem.span.file}:{problem.span.line}]" if problem.span else ""
         return f"  {self.paint('fail', f'{MARK:>9}  {plain(problem.message)}')}{where}"
 
-    def summary(self, outcomes: Sequence[Outcome], coverage: Coverage) -> str:
+    def summary(self, outcomes: Sequence[FileOutcome], coverage: Coverage) -> str:
         """Return how many passed, and how much of the missions was tried."""
         failed = sum(not one.passed for one in outcomes)
         took = sum(one.took for one in outcomes)
@@ -117,7 +117,7 @@ def coverage_text(coverage: Coverage) -> str:
     return "\n".join(lines)
 
 
-def as_json(outcomes: Sequence[Outcome], coverage: Coverage) -> dict[str, Any]:
+def as_json(outcomes: Sequence[FileOutcome], coverage: Coverage) -> dict[str, Any]:
     """Return all as data for programs."""
     return {
         "tests": [_test(one) for one in outcomes],
@@ -132,7 +132,7 @@ def as_json(outcomes: Sequence[Outcome], coverage: Coverage) -> dict[str, Any]:
     }
 
 
-def _test(one: Outcome) -> dict[str, Any]:
+def _test(one: FileOutcome) -> dict[str, Any]:
     problems = one.verdict.problems if one.verdict else []
     findings = [finding for finding in one.findings if finding.severity is Severity.ERROR]
     lines = one.verdict.record.lines if one.verdict else []

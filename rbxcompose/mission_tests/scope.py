@@ -8,12 +8,11 @@ from rbxcompose.config import Place
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.text import fill, parse_template
 from rbxcompose.expressions.types import POSE, UNKNOWN, Type, TypeKind
-from rbxcompose.expressions.values import NotArrived, Value, is_number, is_same
-from rbxcompose.expressions.values import Place as Placed
+from rbxcompose.expressions.values import NamedPose, NotArrived, Value, is_number, is_same
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.mission_tests import codes
-from rbxcompose.mission_tests.model import Setting
+from rbxcompose.mission_tests.model import ValueSetting
 from rbxcompose.missions.analysis.scope_types import NodeScope, View
 from rbxcompose.missions.engine import value_text
 from rbxcompose.missions.engine.condition_watches import POSE as POSE_NAME
@@ -70,7 +69,7 @@ def check_setting(
     yield from check_written(View(program, robot, program.nodes[program.main], scope), node, wanted, codes.WRONG_VALUE)
 
 
-def setting_of(node: TreeNode, wanted: Type, robot: RobotNames) -> Setting:
+def setting_of(node: TreeNode, wanted: Type, robot: RobotNames) -> ValueSetting:
     """Return what computes a value that is written down; only for one without findings."""
     if not isinstance(node, ScalarNode):
         constant = literal(node).value
@@ -91,7 +90,7 @@ def _placed(value: Value, robot: RobotNames) -> Value:
 
 
 def _word(value: Value) -> Value:
-    return value.name if isinstance(value, Placed) else value
+    return value.name if isinstance(value, NamedPose) else value
 
 
 def read_value(node: TreeNode, wanted: Type, robot: RobotNames, what: str) -> tuple[Value, list[Finding]]:

@@ -10,7 +10,7 @@ from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode
 from rbxcompose.mission_tests import codes
 from rbxcompose.mission_tests.mission_facts import Facts
-from rbxcompose.mission_tests.model import Setting
+from rbxcompose.mission_tests.model import ValueSetting
 from rbxcompose.mission_tests.scope import check_setting, names_of, setting_of
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.model.robot import Robot
@@ -26,9 +26,9 @@ class Context:
     facts: Facts
     report: Report
 
-    def settings(self, node: TreeNode | None, known: Mapping[str, Type]) -> dict[str, Setting]:
+    def settings(self, node: TreeNode | None, known: Mapping[str, Type]) -> dict[str, ValueSetting]:
         """Return what is set by name; expressions also see what is `known` beside the robot's values."""
-        found: dict[str, Setting] = {}
+        found: dict[str, ValueSetting] = {}
         valid = names_of(self.names)
         for name, entry in entries_of(node):
             if name not in valid:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from rbxcompose.expressions.values import NotArrived, Value
 from rbxcompose.manifest.test_file import LONGEST_TEST
 from rbxcompose.mission_tests.mocked import ROUNDING, Mocked, SetValues
-from rbxcompose.mission_tests.model import Deed, Trial
+from rbxcompose.mission_tests.model import EventDeed, Trial
 from rbxcompose.mission_tests.record import Record
 from rbxcompose.mission_tests.watched_run import Setter, Watcher
 from rbxcompose.missions.engine.engine import Engine
@@ -119,7 +119,7 @@ class Stage:
         if not self.is_paused:
             self.engine.tick(self.now)
 
-    def _do(self, deed: Deed) -> None:
+    def _do(self, deed: EventDeed) -> None:
         match deed.word:
             case "set":
                 self.setter.set(deed.settings, {}, self.now)

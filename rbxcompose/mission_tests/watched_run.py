@@ -7,7 +7,7 @@ from typing import Protocol
 
 from rbxcompose.expressions.values import EvaluationError, NotArrivedError, Value
 from rbxcompose.mission_tests.mocked import SetValues
-from rbxcompose.mission_tests.model import Setting, Trial
+from rbxcompose.mission_tests.model import Trial, ValueSetting
 from rbxcompose.mission_tests.record import Record
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.value_text import show_briefly
@@ -30,7 +30,7 @@ class Setter:
         self.record = record
         self.values = values
 
-    def set(self, settings: Mapping[str, Setting], known: Mapping[str, Value], now: float) -> set[str]:
+    def set(self, settings: Mapping[str, ValueSetting], known: Mapping[str, Value], now: float) -> set[str]:
         """Set values; return their names."""
         try:
             computed = self.values.set(settings, known, now)

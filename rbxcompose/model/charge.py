@@ -16,7 +16,7 @@ from rbxcompose.sdk.capabilities import Charges, CommandsMotion, Drains, Navigat
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class ChargeInterrupt:
     """An interrupt that charges the battery when its level is below `level` (a ratio)."""
 
     interrupt: Interrupt
@@ -39,7 +39,7 @@ def batteries(robot: Robot) -> dict[str, tuple[RobotComponent, Drains]]:
     return {name: levels[entry.port] for name, entry in entries if entry.port in levels}
 
 
-def calls(robot: Robot, mission: RobotMission) -> Iterator[Call]:
+def calls(robot: Robot, mission: RobotMission) -> Iterator[ChargeInterrupt]:
     """Yield the interrupts that charge when the battery is low."""
     known, constant = batteries(robot), constants(mission)
     for interrupt in mission.program.interrupts:
@@ -49,7 +49,7 @@ def calls(robot: Robot, mission: RobotMission) -> Iterator[Call]:
                 reaction = () if interrupt.root is None else mission.program.below(interrupt.root)
                 found = [charger for node in reaction if (charger := charger_of(robot, node.skill))]
                 if level is not None and found:
-                    yield Call(interrupt, reaction, *known[name], found[0][1], level)
+                    yield ChargeInterrupt(interrupt, reaction, *known[name], found[0][1], level)
 
 
 def charger_of(robot: Robot, skill: str) -> tuple[RobotComponent, Charges] | None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import at
 from rbxcompose.model.robot import Robot, RobotComponent
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.sdk.capabilities import CommandsMotion, Drives, Forwards
 from rbxcompose.sdk.ports import In
 
@@ -31,7 +31,7 @@ class Flow:
 
     robot: Robot
 
-    def sources(self, end: End, passed: tuple[End, ...] = ()) -> Iterator[End]:
+    def sources(self, end: PortEnd, passed: tuple[PortEnd, ...] = ()) -> Iterator[PortEnd]:
         """Yield the outputs whose messages reach an input; of a mux, those that it may let through."""
         for writer in self.robot.writers.get(end.topic, ()):
             if writer in passed or writer.type_name != end.type_name:
@@ -42,13 +42,13 @@ class Flow:
             for one in inputs or ():
                 yield from self.sources(one, (*passed, writer))
 
-    def _let_through(self, output: End) -> list[End] | None:
+    def _let_through(self, output: PortEnd) -> list[PortEnd] | None:
         """Return the inputs that a mux lets through to an output; None if it is no output of a mux."""
         component = self.robot.components[output.instance]
         muxed = [one.inputs for one in component.declared(Forwards) if one.output == output.name]
         return [end for end in component.ends if any(end.name in names for names in muxed)] if muxed else None
 
-    def fed_by(self, component: RobotComponent, port: str) -> Iterator[End]:
+    def fed_by(self, component: RobotComponent, port: str) -> Iterator[PortEnd]:
         """Yield the outputs whose messages reach an input of a component, through muxes."""
         end = component.end(port)
         yield from self.sources(end) if end else ()

@@ -16,7 +16,7 @@ from rbxcompose.manifest.registry import naming
 from rbxcompose.manifest.tree import Path, at, key_span, value_span
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.references import COMPONENT
 from rbxcompose.restarts import DEFAULT, Restart
 from rbxcompose.sdk.capabilities import Capability
@@ -36,13 +36,13 @@ class RobotComponent:
     config: Config
     process: str
     starts_after: tuple[str, ...]
-    ends: tuple[End, ...]
+    ends: tuple[PortEnd, ...]
     path: Path = ()
     restart: Restart = DEFAULT
     log: Level = Level.OK  # the least of what goes to the log
     capabilities: tuple[Capability, ...] = ()
 
-    def end(self, port: str) -> End | None:
+    def end(self, port: str) -> PortEnd | None:
         """Return the end of a port, or None."""
         return next((end for end in self.ends if end.name == port), None)
 
@@ -94,17 +94,17 @@ class Robot:
         return frozenset(name for one in naming(COMPONENT) for name in one.names_in(self.manifest.root))
 
     @cached_property
-    def writers(self) -> Mapping[str, list[End]]:
+    def writers(self) -> Mapping[str, list[PortEnd]]:
         """Return who publishes, by topic."""
         return _by_topic(end for end in self.ends if isinstance(end.port, Out))
 
     @cached_property
-    def readers(self) -> Mapping[str, list[End]]:
+    def readers(self) -> Mapping[str, list[PortEnd]]:
         """Return who subscribes, by topic."""
         return _by_topic(end for end in self.ends if isinstance(end.port, In))
 
     @property
-    def ends(self) -> Iterator[End]:
+    def ends(self) -> Iterator[PortEnd]:
         """Yield the ends of all components."""
         for component in self.components.values():
             yield from component.ends
@@ -121,7 +121,7 @@ class Robot:
         """Return the place of a value of the composed manifest, or of the nearest one above it."""
         return value_span(self.manifest.root, path)
 
-    def end_span(self, end: End) -> Span:
+    def end_span(self, end: PortEnd) -> Span:
         """Return the place where a port is connected, else that of the name of its component."""
         path = (*self.components[end.instance].path, "connect", end.name)
         return self.key(*path) if at(self.manifest.root, path) is not None else self.component_span(end.instance)
@@ -136,8 +136,8 @@ class Robot:
         return next(brought, None) or self.component_span(name)
 
 
-def _by_topic(ends: Iterable[End]) -> Mapping[str, list[End]]:
-    found: dict[str, list[End]] = {}
+def _by_topic(ends: Iterable[PortEnd]) -> Mapping[str, list[PortEnd]]:
+    found: dict[str, list[PortEnd]] = {}
     for end in ends:
         found.setdefault(end.topic, []).append(end)
     return found

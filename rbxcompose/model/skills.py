@@ -10,7 +10,7 @@ from rbxcompose.missions.program.goals import service_skill, skill_of, topic_ski
 from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.program.sources import Orders, OrderTopic, SkillSource, TopicSource, Way
 from rbxcompose.model.robot import RobotComponent
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.plugins import BrokenPluginError
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.ports import In, Out, Serves, ServesAction, ServesTopic
@@ -70,7 +70,7 @@ def _topics(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
         yield SkillSource(skill, end.type_name, end.topic, Way.TOPIC, _orders(components, end, port))
 
 
-def _orders(components: Mapping[str, RobotComponent], end: End, port: ServesTopic[Any]) -> Orders:
+def _orders(components: Mapping[str, RobotComponent], end: PortEnd, port: ServesTopic[Any]) -> Orders:
     """Return who carries orders out, and where the ports stand that belong to them."""
     servers = [one for one in _ends(components) if isinstance(one.port, ServesTopic) and one.topic == end.topic]
     own = components[end.instance].ends
@@ -82,7 +82,7 @@ def _orders(components: Mapping[str, RobotComponent], end: End, port: ServesTopi
     )
 
 
-def _beside(own: Iterable[End], port: In[Any] | Out[Any]) -> OrderTopic:
+def _beside(own: Iterable[PortEnd], port: In[Any] | Out[Any]) -> OrderTopic:
     found = next((one for one in own if one.port is port), None)
     if found is None:
         raise ValueError(f"the port '{port.name}' of '{port.topic}' belongs to orders of a component that lacks it")
@@ -132,7 +132,7 @@ def services_of(manifest: RobotManifest, components: Mapping[str, RobotComponent
     return {name: end.type_name for end in ends for name in _written(end.topic, manifest)}
 
 
-def _ends(components: Mapping[str, RobotComponent]) -> Iterable[End]:
+def _ends(components: Mapping[str, RobotComponent]) -> Iterable[PortEnd]:
     return (end for component in components.values() for end in component.ends)
 
 

@@ -8,7 +8,7 @@ from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, choice_of, quanti
 from rbxcompose.levels import Level
 from rbxcompose.missions.program.sources import ValueSource
 from rbxcompose.model.robot import RobotComponent
-from rbxcompose.model.wires import End, resolve
+from rbxcompose.model.wires import PortEnd, resolve
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.ports import In, Out
 from rbxcompose.sections.values import Value as ValueEntry
@@ -26,7 +26,7 @@ DATA = "data"  # the field of the standard messages
 def value_of(
     entry: ValueEntry,
     components: Mapping[str, RobotComponent],
-    ends: Iterable[End],
+    ends: Iterable[PortEnd],
     namespace: str,
     groups: Collection[str] = (),
 ) -> ValueSource | None:
@@ -48,7 +48,7 @@ def value_of(
     return _value(topic, message, entry.field or DATA, entry.unit or "", TYPES.get(entry.type or ""))
 
 
-def _of_port(end: End, unit: str | None) -> ValueSource | None:
+def _of_port(end: PortEnd, unit: str | None) -> ValueSource | None:
     port = end.port
     if not isinstance(port, Out | In):
         return None

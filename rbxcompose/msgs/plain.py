@@ -50,7 +50,7 @@ _FLOAT32 = struct.Struct("<f")
 _DIGITS = range(6, 9)  # significant ones, of which a float32 never needs more than nine
 
 
-class Places(Protocol):
+class TextPlaces(Protocol):
     """Where in a text the parts of plain data stand."""
 
     def key(self, path: Path) -> Span | None:
@@ -62,7 +62,7 @@ class Places(Protocol):
         ...
 
 
-class Nowhere:
+class NoPlaces:
     """The places of data that have no text."""
 
     def key(self, path: Path) -> None:
@@ -107,7 +107,7 @@ def _is_same(short: float, value: float) -> bool:
 class _Reading(Generic[M]):
     """One reading of plain data: where it stands, and the mistakes so far."""
 
-    places: Places
+    places: TextPlaces
     findings: list[Finding] = field(default_factory=list)
 
     def message(self, message: type[M], data: object, path: Path) -> M | None:
@@ -181,8 +181,8 @@ class _Reading(Generic[M]):
         self.findings.append(WRONG_VALUE.at(self.places.value(path), f"{where}: {message}" if where else message))
 
 
-def from_plain(message: type[M], data: object, places: Places | None = None) -> tuple[M | None, list[Finding]]:
+def from_plain(message: type[M], data: object, places: TextPlaces | None = None) -> tuple[M | None, list[Finding]]:
     """Return the message that plain data stand for, or None and what is wrong with them."""
-    reading: _Reading[M] = _Reading(places or Nowhere())
+    reading: _Reading[M] = _Reading(places or NoPlaces())
     made = reading.message(message, data, ())
     return (None if reading.findings else made), reading.findings

@@ -13,8 +13,16 @@ from dataclasses import replace
 from rbxcompose.bus.attachment import decode_attachment
 from rbxcompose.bus.names import ADMIN
 from rbxcompose.bus.tokens import EndpointToken, gid, parse_token
-from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Arrival, Closable, Question, RemotePublisher, Transport
-from rbxcompose.bus.witness import Call
+from rbxcompose.bus.transport import (
+    LONGEST_WAIT,
+    Arrival,
+    Closable,
+    Question,
+    RemotePublisher,
+    Transport,
+    TransportReply,
+)
+from rbxcompose.bus.witness import WitnessedCall
 from rbxcompose.clock import NANOSECONDS, Clock
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.events import TOPIC, event_of
@@ -44,7 +52,7 @@ class Tape:
         """Return a transport that does what this one does, and is recorded."""
         return _Taped(self, transport)
 
-    def witness(self, call: Call) -> None:
+    def witness(self, call: WitnessedCall) -> None:
         """Record a request or a reply."""
         event = event_of(call.service)
         kind = ServiceEventInfo.RESPONSE_SENT if call.is_reply else ServiceEventInfo.REQUEST_SENT
@@ -111,7 +119,7 @@ class _Taped:
         key: str,
         payload: bytes,
         attachment: bytes,
-        answered: Callable[[Answer], None],
+        answered: Callable[[TransportReply], None],
         *,
         of_all: bool = True,
         within: float = LONGEST_WAIT,

@@ -13,7 +13,7 @@ from typing import Any
 
 from rbxcompose.bus.attachment import Attachment
 from rbxcompose.bus.names import data_key
-from rbxcompose.bus.transport import Answer
+from rbxcompose.bus.transport import TransportReply
 from rbxcompose.clock import NANOSECONDS
 from rbxcompose.levels import Level
 from rbxcompose.msgs.cdr import decode, encode
@@ -165,8 +165,8 @@ class Feed:
         elif info.event_type == ServiceEventInfo.RESPONSE_SENT:
             answered = self._stage.waiting.pop((key, info.client_gid, info.sequence_number), None)
             if answered is not None:
-                failed = Answer(error="the recorded request failed")
-                answered(Answer(encode(event.response[0])) if event.response else failed)
+                failed = TransportReply(error="the recorded request failed")
+                answered(TransportReply(encode(event.response[0])) if event.response else failed)
 
 
 def _belong_together(first: Recorded, record: Recorded) -> bool:

@@ -17,7 +17,7 @@ from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program.messages import Message
 from rbxcompose.missions.program.modifier import Modifier
 from rbxcompose.missions.program.moments import Moments
-from rbxcompose.missions.program.registry import Kind
+from rbxcompose.missions.program.registry import StepType
 from rbxcompose.schema.scalars import DEFINITIONS, Schema, computed
 
 NODE: Schema = {"$ref": f"{DEFINITIONS}node"}
@@ -151,7 +151,7 @@ class Asking(NodeReader):
         return ()
 
 
-def kind_schema(kind: Kind) -> tuple[dict[str, Schema], list[str]]:
+def kind_schema(kind: StepType) -> tuple[dict[str, Schema], list[str]]:
     """Return the schemas of the keys of a kind, described, and those that must be there."""
     asking = Asking(kind.name)
     kind.read(asking)

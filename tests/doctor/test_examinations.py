@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.bus.graph import End, Graph, Kind, Name
+from rbxcompose.bus.graph import Graph, GraphEnd, Name, WireType
 from rbxcompose.bus.wire import RosQos
 from rbxcompose.compiler import compile_robot
 from rbxcompose.doctor import machine
-from rbxcompose.doctor.facts import Bus, Clocks, Facts, Limits, Listener, Running, Version
-from rbxcompose.doctor.registry import EXAMINATIONS, PLUGINS, Answer, examination, examine_all, has_errors
+from rbxcompose.doctor.facts import BusFacts, Clocks, Facts, Limits, Listener, Running, Version
+from rbxcompose.doctor.registry import EXAMINATIONS, PLUGINS, ExaminationResult, examination, examine_all, has_errors
 from rbxcompose.findings import Finding
 from rbxcompose.model.robot import Robot
 from rbxcompose.runtime.folder import RobotFolder, RobotState
@@ -68,14 +68,14 @@ def state(supervisor: Process = HERE, processes: Mapping[str, Process] | None = 
 
 def name_of(topic: str, giver: str = "", taker: str = "", types: tuple[str, str] = ("a/msg/A", "a/msg/A")) -> Name:
     ends = [
-        (End(node, Kind(type_, "RIHS01_1"), node.encode(), RosQos(depth=1)),) if node else ()
+        (GraphEnd(node, WireType(type_, "RIHS01_1"), node.encode(), RosQos(depth=1)),) if node else ()
         for node, type_ in zip((giver, taker), types, strict=True)
     ]
     return Name(topic, *ends)
 
 
 def on_bus(*topics: Name, ages: Mapping[str, float] | None = None) -> Facts:
-    return replace(FINE, running=(running(state(), bus=Bus(Graph((), topics, (), ()), ages or {})),))
+    return replace(FINE, running=(running(state(), bus=BusFacts(Graph((), topics, (), ()), ages or {})),))
 
 
 def test_on_a_machine_that_is_well_nothing_is_wrong() -> None:
@@ -235,7 +235,7 @@ def test_a_device_must_be_there_and_open(tmp_path: Path) -> None:
 
 
 def test_an_answer_is_plain_data() -> None:
-    fine, wrong = (Answer("ports", one) for one in ("fine", next(iter(_taken()))))
+    fine, wrong = (ExaminationResult("ports", one) for one in ("fine", next(iter(_taken()))))
     assert fine.to_data() == {"examination": "ports", "level": "ok", "message": "fine"}
     assert {key: wrong.to_data()[key] for key in ("level", "code")} == {"level": "warning", "code": "RBX9402"}
 

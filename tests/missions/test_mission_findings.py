@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from rbxcompose.findings import KINDS, Finding, Kind, Report
+from rbxcompose.findings import KINDS, Finding, FindingKind, Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions import codes
@@ -235,7 +235,9 @@ def test_nodes_may_not_be_nested_too_deeply() -> None:
     assert codes.TOO_DEEP.code in codes_found
 
 
-MISSION_KINDS = sorted(kind.code for kind in vars(codes).values() if isinstance(kind, Kind))  # checks have their own
+MISSION_KINDS = sorted(
+    kind.code for kind in vars(codes).values() if isinstance(kind, FindingKind)
+)  # checks have their own
 
 
 @pytest.mark.parametrize("code", MISSION_KINDS)

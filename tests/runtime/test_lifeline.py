@@ -15,7 +15,7 @@ import pytest
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.probe import MISSES, Heard, Probe, probe_key
 from rbxcompose.bus.renewal import RenewableTransport
-from rbxcompose.bus.transport import Answer
+from rbxcompose.bus.transport import TransportReply
 from rbxcompose.bus.zenoh_session import open_client, open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import MonotonicClock
@@ -203,7 +203,7 @@ def until(holds: Callable[[], object], *processes: Probed | Visitor) -> None:
 
 def test_a_session_that_is_sound_is_left_alone(port: int) -> None:
     robot = Probed(port)
-    answers: list[Answer] = []
+    answers: list[TransportReply] = []
     take = lambda one: None if one.error else answers.append(one)  # noqa: E731
     until(lambda: robot.transport.ask(probe_key(ROBOT), b"", b"", take) and answers, robot)  # there is a link now
     for _ in range(2 * MISSES):

@@ -22,7 +22,7 @@ from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.scheduler import Scheduler
-from rbxcompose.testing.invariants import ROBOT, Event, Ordered
+from rbxcompose.testing.invariants import ROBOT, ObservedEvent, Ordered
 from rbxcompose.testing.stories import events_of, laws_of
 from rbxcompose.typed_json import to_data
 from tests.simulated_faults.network import Network, Weather
@@ -202,7 +202,7 @@ class WholeRobot:
         return [*self.processes.values(), *self.guests]
 
     @property
-    def story(self) -> list[Event]:
+    def story(self) -> list[ObservedEvent]:
         """Return what the run has told."""
         return list(events_of(laws_of(self.plan), self.told))
 

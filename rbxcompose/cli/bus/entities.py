@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from rbxcompose.bus.graph import End, Name, find
+from rbxcompose.bus.graph import GraphEnd, Name, find
 from rbxcompose.cli.bus.guest import Guest
 from rbxcompose.cli.bus.place import add_bus_options, find_place
 from rbxcompose.cli.output.console import refuse, tell
@@ -191,6 +191,6 @@ def _short(one: Name, ends: tuple[str, str]) -> dict[str, Any]:
     return {"name": one.name, "types": one.types, "clash": one.clash, **counts}
 
 
-def _end(end: End) -> dict[str, Any]:
+def _end(end: GraphEnd) -> dict[str, Any]:
     qos = None if end.qos is None else asdict(end.qos)
     return {"node": end.node, "type": end.kind.type, "hash": end.kind.hash, "gid": end.gid.hex(), "qos": qos}

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Self
 import zenoh
 
 from rbxcompose.bus.attachment import Attachment, decode_attachment
-from rbxcompose.bus.graph import Graph, Kind, Name
+from rbxcompose.bus.graph import Graph, Name, WireType
 from rbxcompose.bus.inbox import Inbox as Queue
 from rbxcompose.bus.names import data_key
 from rbxcompose.bus.tokens import SPACE
@@ -58,7 +58,7 @@ class Heard:
     """A message as it came: when [s of the guest's clock], of which type, and its bytes."""
 
     time: float
-    kind: Kind
+    kind: WireType
     arrival: Arrival
 
     @property
@@ -118,7 +118,7 @@ class Guest:
         )
         return Graph.of(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
 
-    def bus(self, kind: Kind | None = None) -> Bus:
+    def bus(self, kind: WireType | None = None) -> Bus:
         """Return a bus to speak on, in the way of those who have this kind of data; the same one each time."""
         from rbxcompose.bus.bus import Bus  # takes as long as all that a list needs
 
@@ -198,7 +198,7 @@ class Guest:
             time.sleep(_PAUSE)
         return session
 
-    def _arrived(self, queue: Queue[Heard], kind: Kind) -> Callable[[Arrival], None]:
+    def _arrived(self, queue: Queue[Heard], kind: WireType) -> Callable[[Arrival], None]:
         # In a thread of the transport: a message has the time at which it came, not that at which it is shown.
         return lambda arrival: queue.put(Heard(self.clock.now(), kind, arrival), self.transport.wake)
 

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import yaml
 
-from rbxcompose.bus.graph import Kind
+from rbxcompose.bus.graph import WireType
 from rbxcompose.cli.output.console import tell_report
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.findings import Report, Span, kind
@@ -107,7 +107,7 @@ def message_type(name: str) -> type[Message]:
 
 
 def type_of(
-    one: Kind,
+    one: WireType,
     category: str,
     look: Callable[[str], type[T]],
     hash_of: Callable[[type[T]], str] = lambda found: found.HASH,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from rbxcompose.bus.graph import Kind, Name
+from rbxcompose.bus.graph import Name, WireType
 from rbxcompose.cli.bus.entities import wanted
 from rbxcompose.cli.bus.guest import Guest, Heard
 from rbxcompose.cli.bus.messages import shown, type_of
@@ -24,7 +24,7 @@ class Reader:
 
     def __init__(self, topic: Name) -> None:
         self.malformed = 0
-        self._types: dict[Kind, type[Message]] = {}
+        self._types: dict[WireType, type[Message]] = {}
         for kind in topic.kinds:
             try:
                 self._types[kind] = type_of(kind, "msg", registry.message)

@@ -20,7 +20,7 @@ _WORDS = 200  # characters of a title
 Say = Callable[[str], None]
 
 
-class Checked(Protocol):
+class CheckedTexts(Protocol):
     """What a check found, and the texts that it read."""
 
     @property
@@ -34,7 +34,7 @@ class Checked(Protocol):
         ...
 
 
-def fix(check: Callable[[], Checked], say: Say) -> None:
+def fix(check: Callable[[], CheckedTexts], say: Say) -> None:
     """Check, apply what can safely be fixed, say it, and begin anew until nothing is left."""
     for _ in range(ROUNDS):
         checked = check()

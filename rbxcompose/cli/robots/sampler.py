@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from rbxcompose.bus.graph import End, Graph, Name
+from rbxcompose.bus.graph import Graph, GraphEnd, Name
 from rbxcompose.cli.bus.guest import Guest, Heard
 from rbxcompose.cli.missions.replicas import MissionsSeen
 from rbxcompose.cli.robots.lookup import known_state
@@ -162,7 +162,7 @@ def _is_light(topic: Name) -> bool:
     return all(end.qos is not None and end.qos.is_reliable and not end.qos.is_transient_local for end in topic.givers)
 
 
-def _component(end: End) -> str:
+def _component(end: GraphEnd) -> str:
     return end.node.rpartition("/")[2]
 
 

@@ -8,7 +8,7 @@ from rbxcompose.doctor.facts import Facts, Listener, Running
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
-from rbxcompose.sections.bus import Bus
+from rbxcompose.sections.bus import BusModel
 
 PORT_TAKEN = kind(
     "RBX9402",
@@ -42,7 +42,7 @@ def ports(facts: Facts) -> Iterator[str | Finding]:
         yield from _router(one, facts)
     names = {one.name for one in facts.running}
     if facts.file is None:
-        wanted = [] if facts.running else [Bus().port]
+        wanted = [] if facts.running else [BusModel().port]
     else:
         bus = facts.file.manifest.bus
         wanted = [] if facts.file.manifest.name in names or bus.router else [bus.port]

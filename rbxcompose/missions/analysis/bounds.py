@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from rbxcompose.expressions.tree import (
     Arithmetic,
-    Call,
     Comparison,
     ExpressionNode,
     Flag,
+    FunctionCall,
     Junction,
     Minus,
     Not,
@@ -103,7 +103,7 @@ def bounds_of(node: ExpressionNode, known: Known) -> Bounds:
             return Bounds(-inner.most, -inner.least)
         case Arithmetic(operator=operator, left=left, right=right):
             return _computed(operator, bounds_of(left, known), bounds_of(right, known))
-        case Call(function="distance" | "age" | "count" | "abs"):
+        case FunctionCall(function="distance" | "age" | "count" | "abs"):
             return NOT_BELOW_ZERO
     return ANYTHING
 

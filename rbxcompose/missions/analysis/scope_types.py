@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from rbxcompose.expressions.check import Problem, check_value
 from rbxcompose.expressions.tree import Expression, Word
 from rbxcompose.expressions.types import PLACE, POSE, TEXT, UNKNOWN, Type, TypeKind
-from rbxcompose.findings import Finding, Kind, Span, nearest, replacement
+from rbxcompose.findings import Finding, FindingKind, Span, nearest, replacement
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.condition_watches import POSE as POSE_NAME
@@ -57,7 +57,7 @@ class View:
         """Tell whether the node, or any below it, takes time by itself."""
         return any(below.step.waits for below in self.program.below(self.node.number))
 
-    def typed(self, expression: Expression, wanted: Type, scalar: ScalarNode, kind: Kind) -> Iterator[Finding]:
+    def typed(self, expression: Expression, wanted: Type, scalar: ScalarNode, kind: FindingKind) -> Iterator[Finding]:
         """Yield what is wrong with an expression that must have the type `wanted`."""
         return findings_of(expression, wanted, scalar, self.scope, kind)
 
@@ -91,7 +91,7 @@ def views(program: Program, robot: RobotNames) -> Iterator[View]:
 
 
 def findings_of(
-    expression: Expression, wanted: Type, scalar: ScalarNode, scope: NodeScope, kind: Kind
+    expression: Expression, wanted: Type, scalar: ScalarNode, scope: NodeScope, kind: FindingKind
 ) -> Iterator[Finding]:
     """Yield what is wrong with an expression; what is neither a name nor a place is of the given kind."""
     for problem in check_value(expression, scope, wanted):
@@ -120,7 +120,7 @@ def findings_of(
             yield kind.at(span, problem.message, help=problem.help, fix=fix)
 
 
-def _no_text(word: str, span: Span, scope: NodeScope, kind: Kind) -> Finding:
+def _no_text(word: str, span: Span, scope: NodeScope, kind: FindingKind) -> Finding:
     """Return the finding about a bare word that stands for a text: a misspelt place, or one that needs quotes."""
     message = f"there is no place '{word}'"
     if near := nearest(word, scope.words()):

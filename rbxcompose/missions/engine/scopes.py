@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from rbxcompose.config import Place
-from rbxcompose.expressions.tree import Call, Expression, Variable, walk
+from rbxcompose.expressions.tree import Expression, FunctionCall, Variable, walk
 from rbxcompose.expressions.values import NotArrived, Value
 
 
@@ -147,5 +147,5 @@ def new_names(expression: Expression) -> frozenset[str]:
     """Return the names about which an expression asks `new($x)`."""
     if not any(call.name == "new" for call in expression.calls):
         return frozenset()
-    calls = (node for node, _ in walk(expression.tree) if isinstance(node, Call) and node.function == "new")
+    calls = (node for node, _ in walk(expression.tree) if isinstance(node, FunctionCall) and node.function == "new")
     return frozenset(argument.name for call in calls for argument in call.arguments if isinstance(argument, Variable))

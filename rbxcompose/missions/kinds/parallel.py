@@ -10,7 +10,7 @@ from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.answers import Flow, Skipped
-from rbxcompose.missions.program.branches import ALL, ANY, Branches, BranchScope, Ended, read_outcomes
+from rbxcompose.missions.program.branches import ALL, ANY, Branches, BranchResult, BranchScope, read_outcomes
 from rbxcompose.missions.program.families import Straight
 from rbxcompose.missions.program.look import Form, Look
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes, either
@@ -120,7 +120,7 @@ class ParallelTask(Task):
         self.engine.outcome = self.names[branches.names.index(branches.ends_with)] if branches.ends_with else ""
         if not branches.outcomes:
             return
-        ended = {name: Ended.of(self.results[i], self.names[i]) for i, name in enumerate(branches.names)}
+        ended = {name: BranchResult.of(self.results[i], self.names[i]) for i, name in enumerate(branches.names)}
         scope = BranchScope(self.scope, ended)
         for outcome in branches.outcomes:
             if outcome.condition is None or holds(outcome.condition, scope):

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from rbxcompose.expressions.text import Slot, parse_template
 from rbxcompose.expressions.tree import ExpressionError
 from rbxcompose.expressions.types import UNKNOWN, Type, TypeKind
-from rbxcompose.findings import Finding, Kind
+from rbxcompose.findings import Finding, FindingKind
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.language.spans import expression_of, inner_span
 
 
-def check_written(view: View, scalar: ScalarNode, wanted: Type, kind: Kind) -> Iterator[Finding]:
+def check_written(view: View, scalar: ScalarNode, wanted: Type, kind: FindingKind) -> Iterator[Finding]:
     """Yield what is wrong with a value for a type; one of the wrong type is of the given kind."""
     try:
         if wanted.kind is not TypeKind.TEXT:

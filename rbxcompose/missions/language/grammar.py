@@ -94,7 +94,7 @@ class Words:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class GrammarPlace:
     """A place of the grammar: what it takes, and the key behind which it stands."""
 
     takes: Takes

@@ -11,7 +11,7 @@ from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode
 from rbxcompose.missions.language.grammar import BELOW, Slot, Takes, Words
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
-from rbxcompose.missions.program.registry import Kind, kinds
+from rbxcompose.missions.program.registry import StepType, kinds
 
 
 class Nobody:
@@ -63,13 +63,13 @@ def step_slots(kind: str) -> Mapping[str, Slot]:
     return _step_slots(_known(), kind)
 
 
-def _known() -> tuple[Kind, ...]:
+def _known() -> tuple[StepType, ...]:
     """Return the kinds there are now: tests add some and take them out again."""
     return tuple(kinds().values())
 
 
 @cache
-def _kind_slots(known: tuple[Kind, ...]) -> Mapping[str, Mapping[str, Slot]]:
+def _kind_slots(known: tuple[StepType, ...]) -> Mapping[str, Mapping[str, Slot]]:
     """Return what the keys of each kind of step take, its word among them."""
     found = {}
     for kind in known:
@@ -91,12 +91,12 @@ def _modifier_slots() -> Mapping[str, Slot]:
 
 
 @cache
-def _words(known: tuple[Kind, ...], skills: frozenset[str]) -> Words:
+def _words(known: tuple[StepType, ...], skills: frozenset[str]) -> Words:
     return Words(_kind_slots(known), {key: _modifier_slots()[key] for key in ("name", *modifier_keys())}, skills)
 
 
 @cache
-def _step_slots(known: tuple[Kind, ...], kind: str) -> Mapping[str, Slot]:
+def _step_slots(known: tuple[StepType, ...], kind: str) -> Mapping[str, Slot]:
     return {**_words(known, frozenset()).modifiers, **_kind_slots(known).get(kind, {})}
 
 

@@ -23,7 +23,7 @@ from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
 from rbxcompose.missions.program import program
 from rbxcompose.missions.program.machines import STATE
 from rbxcompose.missions.program.program import AFTERWARDS, RESTART, Interrupt, Program, Target
-from rbxcompose.missions.program.registry import SKILL, Kind, all_kinds, kinds
+from rbxcompose.missions.program.registry import SKILL, StepType, all_kinds, kinds
 
 BODIES = ("do", "machine")
 KEYS = ("rbx", "kind", "name", "about", "inputs", "data", "outputs", "interrupts", "rate", *BODIES)
@@ -185,7 +185,7 @@ class _Reader:
         return f"{self.paths[-1]}.{word}" if step in ("do", word) else f"{self.paths[-1]}.{step}.{word}"
 
     def read(
-        self, reader: NodeReader, kind: Kind | None, parent: int | None, name: str, span: Span | None = None
+        self, reader: NodeReader, kind: StepType | None, parent: int | None, name: str, span: Span | None = None
     ) -> program.MissionNode:
         """Read the value, the options and the modifiers of a node."""
         step = (kind or all_kinds()[SKILL]).read(reader)

@@ -7,7 +7,17 @@ from dataclasses import dataclass
 
 from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Key, MappingNode, ScalarNode, TreeNode, with_children
-from rbxcompose.missions.language.grammar import BELOW, EACH, LEVELS, Place, Slot, Takes, Words, is_empty, long_form
+from rbxcompose.missions.language.grammar import (
+    BELOW,
+    EACH,
+    LEVELS,
+    GrammarPlace,
+    Slot,
+    Takes,
+    Words,
+    is_empty,
+    long_form,
+)
 from rbxcompose.missions.language.layout import state_slots, step_slots, words
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import repaired
@@ -38,7 +48,7 @@ class Repairs:
         is_step = slot.takes is Takes.STEP
         if is_step and (depth == LEVELS or is_empty(node)):
             return node
-        place = Place(slot.takes, key, self.words, slot.choices)
+        place = GrammarPlace(slot.takes, key, self.words, slot.choices)
         node = repaired(slip.at(slot.takes), place, long_form(node) if is_step else node, self.report)
         slots = self._below(slot.takes, node)
         inside = depth + (slot.takes in (Takes.STEP, Takes.STATE))

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.text import parse_template
 from rbxcompose.expressions.types import Type, TypeKind
-from rbxcompose.expressions.values import Place, Value
+from rbxcompose.expressions.values import NamedPose, Value
 from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.language.literals import literal
@@ -44,4 +44,4 @@ def place(task: Task, value: Value) -> Value:
 
 def _word(value: Value) -> Value:
     """Return a choice as text, also where a place has the same name."""
-    return value.name if isinstance(value, Place) else value
+    return value.name if isinstance(value, NamedPose) else value

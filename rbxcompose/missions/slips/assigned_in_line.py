@@ -7,7 +7,7 @@ import re
 from rbxcompose.findings import replacement
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, told
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, told
 from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
@@ -19,7 +19,7 @@ _EXAMPLE = "'name: value'"
 
 
 @slip(Takes.ASSIGNMENTS)
-def assigned_in_line(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def assigned_in_line(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a text below `set`; what is no assignment at all is told as well, and nothing else is said of it."""
     if not isinstance(node, ScalarNode):
         return None

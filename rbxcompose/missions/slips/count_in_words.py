@@ -9,7 +9,7 @@ from dataclasses import replace
 from rbxcompose.findings import replacement
 from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 
@@ -24,7 +24,7 @@ _TIMES = re.compile(r"(?P<digits>\d+)\s*(times?|x|rounds?|attempts?|tries)")
 
 
 @slip(Takes.COUNT)
-def count_in_words(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def count_in_words(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise what people say for a number, and for no end where that may stand."""
     if not isinstance(node, ScalarNode) or node.text in place.choices:
         return None

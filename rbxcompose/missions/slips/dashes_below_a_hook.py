@@ -5,7 +5,7 @@ from __future__ import annotations
 from rbxcompose.findings import Edit, Fix
 from rbxcompose.manifest.tree import Entry, MappingNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.steps_below_a_hook import is_step, steps_below_a_hook
 from rbxcompose.slips import Repair
@@ -14,7 +14,7 @@ _DASH = "- "
 
 
 @slip(Takes.HOOK, before=(steps_below_a_hook,))
-def dashes_below_a_hook(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def dashes_below_a_hook(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a list of maps; where all that it holds are steps, its dashes are not what is wrong."""
     hook = place.key.text
     items = node.items if isinstance(node, SequenceNode) else ()

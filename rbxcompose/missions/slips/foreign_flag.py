@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from rbxcompose.findings import replacement
 from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 
@@ -15,7 +15,7 @@ FLAGS: Mapping[str, str] = {"no": "false", "off": "false", "on": "true", "yes": 
 
 
 @slip(Takes.FLAG)
-def foreign_flag(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def foreign_flag(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise other words for true and false."""
     meant = FLAGS.get(node.text.lower(), "") if isinstance(node, ScalarNode) and node.filled is None else ""
     if not meant or not isinstance(node, ScalarNode):

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode, children, with_children
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.program.machines import MACHINE_KEYS
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
@@ -15,7 +15,7 @@ MACHINE = "machine"
 
 
 @slip(Takes.MISSION, Takes.STEP, Takes.STATE)
-def keys_outside_their_machine(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def keys_outside_their_machine(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise keys beside their machine, and those of any machine at the very left of a mission.
 
     The latter go to the machine that they may belong to, if there is one only.

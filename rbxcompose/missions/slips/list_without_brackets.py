@@ -5,14 +5,14 @@ from __future__ import annotations
 from rbxcompose.manifest.brackets import bracketed, without_brackets
 from rbxcompose.manifest.tree import ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 
 
 @slip(Takes.ITEMS)
-def list_without_brackets(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def list_without_brackets(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise several items; a single one may be a name of data."""
     found = without_brackets(node)
     if len(found) < 2 or not isinstance(node, ScalarNode):

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from rbxcompose.findings import Edit, Finding, Fix, nearest
 from rbxcompose.manifest.tree import Entry, Key, MappingNode, ScalarNode, TreeNode, with_children
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.language.names import NAME, cure, no_name
 from rbxcompose.missions.program.machines import ENDS
 from rbxcompose.missions.slips import slip
@@ -16,7 +16,7 @@ from rbxcompose.slips import Repair
 
 
 @slip(Takes.MACHINE)
-def misnamed_states(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def misnamed_states(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise states with names such as `go home`."""
     states = node.get("states") if isinstance(node, MappingNode) else None
     wrong = [name for name in states.entries if not NAME.fullmatch(name)] if isinstance(states, MappingNode) else []

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.findings import Edit, Fix
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, Words, told
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, told
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 
@@ -15,7 +15,7 @@ _DASH = "- "
 
 
 @slip(Takes.STEPS, Takes.BRANCHES)
-def missing_dashes(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def missing_dashes(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a `sequence` or another list of steps that is none."""
     if isinstance(node, SequenceNode) or (isinstance(node, MappingNode) and place.takes is Takes.BRANCHES):
         return None

@@ -5,14 +5,14 @@ from __future__ import annotations
 from rbxcompose.findings import nearest
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.tight_dashes import tight_dashes
 from rbxcompose.slips import Repair
 
 
 @slip(Takes.STEP, after=(tight_dashes,))
-def misspelt_kind(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def misspelt_kind(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a step of no kind with an option of some kind, and a word near to that of a kind."""
     words = place.words
     if not isinstance(node, MappingNode) or words.kind_of(node):

@@ -7,7 +7,7 @@ import re
 from rbxcompose.findings import Edit, Fix
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.program.program import RESTART
 from rbxcompose.missions.slips import slip
@@ -18,7 +18,7 @@ _DEEPER = "  "
 
 
 @slip(Takes.AFTERWARDS)
-def restart_in_line(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def restart_in_line(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise `restart NAME` and `restart: NAME`."""
     found = _IN_LINE.fullmatch(node.text) if isinstance(node, ScalarNode) and node.plain else None
     if not found or not isinstance(node, ScalarNode):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rbxcompose.findings import Edit, Finding, Fix
 from rbxcompose.manifest.tree import MappingNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, Words
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.keys_outside_their_machine import keys_outside_their_machine
 from rbxcompose.missions.slips.misspelt_kind import misspelt_kind
@@ -17,7 +17,7 @@ _DASH = "- "
 
 
 @slip(Takes.STEP, after=(tight_dashes, misspelt_kind, keys_outside_their_machine), before=(unknown_settings,))
-def second_step(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def second_step(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise keys that are steps of their own; only the first one is read here."""
     if not isinstance(node, MappingNode) or len(place.words.own(node)) < 2:
         return None

@@ -5,14 +5,14 @@ from __future__ import annotations
 from rbxcompose.findings import Edit, Finding, Fix
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.unknown_settings import is_setting, unknown_settings
 from rbxcompose.slips import Repair
 
 
 @slip(Takes.STEP, after=(unknown_settings,))
-def settings_among_branches(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def settings_among_branches(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise branches that are named like settings, and look like them."""
     kind = place.words.kind_of(node) if isinstance(node, MappingNode) else ""
     if not kind or not isinstance(node, MappingNode):

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from rbxcompose.findings import Finding, nearest
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, Words, told
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, told
 from rbxcompose.missions.program.moments import DEEDS, OPTIONS
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
@@ -24,7 +24,7 @@ _CURES: Mapping[str, str] = {
 
 
 @slip(Takes.HOOK)
-def steps_below_a_hook(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def steps_below_a_hook(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise words of steps in the line of a hook or below it; what else stands there is read."""
     if isinstance(node, ScalarNode):
         word = node.text.partition(" ")[0] if node.plain else ""

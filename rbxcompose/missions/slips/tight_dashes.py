@@ -7,7 +7,7 @@ import re
 from rbxcompose.findings import Edit, Fix
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, without_word
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, without_word
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 
@@ -16,7 +16,7 @@ _INDENT = "  "
 
 
 @slip(Takes.STEP)
-def tight_dashes(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def tight_dashes(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise keys that begin with a dash."""
     entries = node.entries if isinstance(node, MappingNode) else {}
     tight = [entry.key for key, entry in entries.items() if _TIGHT.match(key)]

@@ -8,7 +8,7 @@ from rbxcompose.findings import Finding, nearest
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, Words, without_word
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, without_word
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 from rbxcompose.units import UnitError, parse_quantity
@@ -32,7 +32,7 @@ STEPS = ("wait",)  # of our words, those that are a step
 
 
 @slip(Takes.STEP)
-def unknown_settings(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def unknown_settings(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise keys that are no settings of this step, and look less like a second step than like a setting."""
     unknown = unknown_in(node, place.words) if isinstance(node, MappingNode) else set()
     if not unknown or not isinstance(node, MappingNode):

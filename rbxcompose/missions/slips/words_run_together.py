@@ -7,7 +7,7 @@ import re
 from rbxcompose.findings import Finding, replacement
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, without_word
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, without_word
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.unknown_settings import unknown_settings
 from rbxcompose.slips import Repair
@@ -16,7 +16,7 @@ _TIGHT_COLON = re.compile(r"[a-z][a-z0-9_]*:[^\s:/].*")
 
 
 @slip(Takes.STEP, after=(unknown_settings,))
-def words_run_together(place: Place, node: TreeNode) -> Repair[TreeNode] | None:
+def words_run_together(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a word of a step that is several."""
     own = place.words.own(node) if isinstance(node, MappingNode) else []
     if not own or not isinstance(node, MappingNode):

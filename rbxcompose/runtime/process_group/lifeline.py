@@ -16,7 +16,7 @@ import zenoh
 
 from rbxcompose.bus.probe import Heard, Probe, probe_key
 from rbxcompose.bus.renewal import RenewableTransport
-from rbxcompose.bus.transport import Answer, Question, Transport
+from rbxcompose.bus.transport import Question, Transport, TransportReply
 from rbxcompose.runtime.process_group.driver import BEAT
 
 BEATS = 3  # of the process between two probes: three that are missed, and the change, take less than 4 s
@@ -149,7 +149,7 @@ class _Sent:
         self._asked.close()
         return heard
 
-    def _answered(self, given: Answer) -> None:
+    def _answered(self, given: TransportReply) -> None:
         # In a thread of the transport, so that a loop which is busy for a while does not miss it.
         if not given.error:
             self.heard = Heard.ANSWER
