@@ -17,7 +17,7 @@ from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.reader import INTERRUPT_KEYS
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program.goals import skill_of, topic_skill
-from rbxcompose.missions.program.messages import Message
+from rbxcompose.missions.program.messages import MessageTemplate
 from rbxcompose.missions.program.moments import Moments
 from rbxcompose.missions.program.registry import StepType, kinds
 from rbxcompose.schema.mission import mission_schema
@@ -87,7 +87,7 @@ class Told(Asking):
         self.words[key] = "a map from values to nodes"
         return super().cases(key)
 
-    def message(self, target: str, body: str) -> Message:
+    def message(self, target: str, body: str) -> MessageTemplate:
         """Note a name and what is sent."""
         self.words[target], self.words[body] = "its name", "a map of fields, or the value of the only one"
         return super().message(target, body)

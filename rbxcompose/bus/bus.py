@@ -10,7 +10,7 @@ from rbxcompose.bus.action_server import ActionServer
 from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.local import BusProcess, Participant, Refusing
 from rbxcompose.bus.orders import OrderPublisher
-from rbxcompose.bus.services import Client, Request, Server, Services
+from rbxcompose.bus.services import Client, ServedRequest, Server, Services
 from rbxcompose.bus.tokens import publishers_pattern
 from rbxcompose.bus.topics import Publisher, Subscription, Topics
 from rbxcompose.bus.transport import Closable, NoTransport, Transport
@@ -106,7 +106,7 @@ class Bus:
         owner: str,
         name: str,
         service: type[Service[Q, R]],
-        handle: Callable[[Request[Q, R]], None],
+        handle: Callable[[ServedRequest[Q, R]], None],
         *,
         waits: bool = False,
     ) -> None:

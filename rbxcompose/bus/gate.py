@@ -7,7 +7,7 @@ from collections.abc import Callable
 from rbxcompose.bus.allowance import Allowances
 from rbxcompose.bus.attachment import AttachmentError, decode_attachment
 from rbxcompose.bus.local import Participant
-from rbxcompose.bus.refusals import Refusal, Refusals
+from rbxcompose.bus.refusals import RefusalReason, Refusals
 from rbxcompose.bus.transport import Question
 
 REQUESTS = 1000.0  # [Hz] of one asker, for services
@@ -39,7 +39,7 @@ class Gate:
         if self._allowances.takes(asker, self._clock.now()):
             self._put(question)
         else:
-            self.refusals.add(Refusal.TOO_MANY)
+            self.refusals.add(RefusalReason.TOO_MANY)
             question.fail(f"more than {self._rate:g} requests a second")
 
     def close(self) -> None:

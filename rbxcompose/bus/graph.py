@@ -32,7 +32,7 @@ class GraphEnd:
 
 
 @dataclass(frozen=True, slots=True)
-class Name:
+class GraphName:
     """A topic, service or action: who gives (publishers, servers), and who takes (subscriptions, clients)."""
 
     name: str
@@ -70,9 +70,9 @@ class Graph:
     """All that was on the bus at one moment, sorted by name. The parts of actions are also topics and services."""
 
     nodes: Sequence[str]
-    topics: Sequence[Name]
-    services: Sequence[Name]
-    actions: Sequence[Name]
+    topics: Sequence[GraphName]
+    services: Sequence[GraphName]
+    actions: Sequence[GraphName]
 
     @classmethod
     def of(cls, keys: Iterable[str]) -> Graph:
@@ -87,26 +87,28 @@ class Graph:
         )
 
 
-def find(names: Iterable[Name], wanted: str) -> Name | None:
+def find(names: Iterable[GraphName], wanted: str) -> GraphName | None:
     """Return the one of that name, with or without its leading slash."""
     full = f"/{wanted.lstrip('/')}"
     return next((one for one in names if one.name == full), None)
 
 
-def _named(ends: Iterable[EndpointToken], giving: EntityKind, taking: EntityKind) -> list[Name]:
+def _named(ends: Iterable[EndpointToken], giving: EntityKind, taking: EntityKind) -> list[GraphName]:
     givers: dict[str, list[GraphEnd]] = {}
     takers: dict[str, list[GraphEnd]] = {}
     for token in ends:
         if token.kind in (giving, taking):
             (givers if token.kind is giving else takers).setdefault(token.name, []).append(_end(token))
-    return [Name(name, tuple(givers.get(name, ())), tuple(takers.get(name, ()))) for name in sorted({*givers, *takers})]
+    return [
+        GraphName(name, tuple(givers.get(name, ())), tuple(takers.get(name, ()))) for name in sorted({*givers, *takers})
+    ]
 
 
-def _actions(ends: Iterable[EndpointToken]) -> list[Name]:
+def _actions(ends: Iterable[EndpointToken]) -> list[GraphName]:
     """Return the actions: each is told by the service to which goals are sent."""
     sending = [token for token in ends if token.name.endswith(_SEND_GOAL)]
     return [
-        Name(one.name.removesuffix(_SEND_GOAL), _as_action(one.givers), _as_action(one.takers))
+        GraphName(one.name.removesuffix(_SEND_GOAL), _as_action(one.givers), _as_action(one.takers))
         for one in _named(sending, EntityKind.SERVER, EntityKind.CLIENT)
     ]
 

@@ -54,7 +54,7 @@ def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
             timeout: 0.5 s
     ```
     """
-    first: dict[tuple[str, str], Writer] = {}
+    first: dict[tuple[str, str], FrameWriter] = {}
     for one in sorted(_writers(robot), key=lambda one: one.component.name in robot.written):
         other = first.setdefault((one.end.topic.removesuffix(STATIC), one.frame.child.value), one)
         if other.component is not one.component:
@@ -68,7 +68,7 @@ def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
 
 
 @dataclass(frozen=True, slots=True)
-class Writer:
+class FrameWriter:
     """A component that writes a frame, and the end where it does."""
 
     component: RobotComponent
@@ -85,7 +85,7 @@ class Writer:
         )
 
 
-def _writers(robot: Robot) -> Iterator[Writer]:
+def _writers(robot: Robot) -> Iterator[FrameWriter]:
     for component, frame in robot.declared(WritesFrame):
         if end := component.end(frame.transforms):
-            yield Writer(component, frame, end)
+            yield FrameWriter(component, frame, end)

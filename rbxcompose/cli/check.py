@@ -79,9 +79,9 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
 
 
 def _check_tests(tests: list[str], checked: CheckedRobots) -> None:
-    from rbxcompose.mission_tests.reader import Reading  # only tests need it
+    from rbxcompose.mission_tests.reader import TrialReader  # only tests need it
 
-    reading, found = Reading(os.environ), Report()
+    reading, found = TrialReader(os.environ), Report()
     for path in tests:
         trial, report = reading.read(Path(path).resolve())
         found.extend(report)

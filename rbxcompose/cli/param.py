@@ -10,7 +10,7 @@ import argparse
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from rbxcompose.bus.graph import Name
+from rbxcompose.bus.graph import GraphName
 from rbxcompose.bus.services import Client
 from rbxcompose.cli.bus.entities import (
     NO_NAME,
@@ -73,7 +73,7 @@ class _Nodes:
 
     def __init__(self, guest: Guest, timeout: float) -> None:
         self._guest, self._timeout = guest, timeout
-        self._services: Mapping[str, Name] = {one.name: one for one in guest.graph().services if one.givers}
+        self._services: Mapping[str, GraphName] = {one.name: one for one in guest.graph().services if one.givers}
         self.names = sorted(name.removesuffix(_GET) for name in self._services if name.endswith(_GET))
 
     def find(self, wanted: str) -> str:

@@ -20,7 +20,7 @@ from rbxcompose.manifest.files import shown_name
 from rbxcompose.mission_tests.coverage import Coverage
 from rbxcompose.mission_tests.finding_files import tests_of
 from rbxcompose.mission_tests.junit import junit
-from rbxcompose.mission_tests.reader import Reading, Written
+from rbxcompose.mission_tests.reader import TrialReader, WrittenTrial
 from rbxcompose.mission_tests.report import FileOutcome, Teller, as_json, coverage_text
 from rbxcompose.mission_tests.runner import run_trial
 
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     files = tests_of(arguments.paths)
     if not files:
         return misused("test", f"no tests ('kind: Test') in {', '.join(map(str, arguments.paths))}")
-    reading, coverage, teller = Reading(os.environ), Coverage(), Teller(has_colour(sys.stdout))
+    reading, coverage, teller = TrialReader(os.environ), Coverage(), Teller(has_colour(sys.stdout))
     outcomes: list[FileOutcome] = []
     unreadable = Report()
     for file in files:
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if all(one.passed for one in outcomes) else FINDINGS
 
 
-def _outcome(written: Written, reading: Reading, began: float) -> FileOutcome:
+def _outcome(written: WrittenTrial, reading: TrialReader, began: float) -> FileOutcome:
     trial = reading.understand(written)
     compiled = time.perf_counter()
     shown, findings = shown_name(written.path), tuple(written.report)
@@ -84,7 +84,7 @@ def _tell(outcome: FileOutcome, teller: Teller, verbose: bool) -> None:
         tell(teller.trace(outcome.verdict))
 
 
-def _findings(reading: Reading, outcomes: Sequence[FileOutcome]) -> Report:
+def _findings(reading: TrialReader, outcomes: Sequence[FileOutcome]) -> Report:
     return Report([*reading.report, *reading.summed_up(finding for one in outcomes for finding in one.findings)])
 
 

@@ -8,7 +8,7 @@ import os
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path as FilePath
+from pathlib import Path
 
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.config import Secret
@@ -17,13 +17,13 @@ from rbxcompose.manifest.library import PREFIX, library_root
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.section import ROBOT
-from rbxcompose.manifest.tree import BROKEN, Entry, MappingNode, Path, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.printable import FORBIDDEN, escaped
 from rbxcompose.references import FILE
 from rbxcompose.units import UNITS, Dimension, Quantity, UnitError, format_quantity, to_si
 
-Note = Callable[[Path, TreeNode], str]
+Note = Callable[[KeyPath, TreeNode], str]
 
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z0-9_]+)*")
 _PLAIN = re.compile(r"(?!- |-$|---|\.\.\.)[\w./+-](?:[^\n:#]|:(?! |$)|(?<! )#)*(?<! )")
@@ -51,7 +51,7 @@ def _in_one_file(manifest: RobotManifest) -> MappingNode:
             return node
         writer = manifest.contents.documents.writer(node.span, manifest.path)
         file = resolve(str(to_plain(node)), writer, node.span)
-        return ScalarNode(_path_from(manifest.path, file), node.span) if isinstance(file, FilePath) else node
+        return ScalarNode(_path_from(manifest.path, file), node.span) if isinstance(file, Path) else node
 
     entries = dict(manifest.root.entries)
     for section in sections(ROBOT):
@@ -61,13 +61,13 @@ def _in_one_file(manifest: RobotManifest) -> MappingNode:
     return replace(manifest.root, entries=entries)
 
 
-def _path_from(robot: FilePath, file: FilePath) -> str:
+def _path_from(robot: Path, file: Path) -> str:
     if file.is_relative_to(library_root()) and not file.is_relative_to(project_of(robot)):
         return PREFIX + file.relative_to(library_root()).as_posix()
     return os.path.relpath(file, robot.parent)
 
 
-def _lines(node: TreeNode, path: Path, begin: str, indent: str, note: Note) -> Iterator[str]:
+def _lines(node: TreeNode, path: KeyPath, begin: str, indent: str, note: Note) -> Iterator[str]:
     """Yield the lines of a value; the first one goes behind `begin`, a key or a dash."""
     comment = note(path, node)
     behind = f"  # {comment}" if comment else ""
@@ -87,7 +87,7 @@ def _lines(node: TreeNode, path: Path, begin: str, indent: str, note: Note) -> I
                 yield from _lines(item, (*path, index), "-", f"{indent}  ", note)
 
 
-def _mapping(node: MappingNode, path: Path, indent: str, note: Note) -> Iterator[str]:
+def _mapping(node: MappingNode, path: KeyPath, indent: str, note: Note) -> Iterator[str]:
     for name, entry in node.entries.items():
         key = name if _KEY.fullmatch(name) else json.dumps(name, ensure_ascii=False)
         yield from _lines(entry.value, (*path, name), f"{key}:", indent, note)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rbxcompose.manifest.registry import naming, section_named, sections
-from rbxcompose.manifest.renamer import Topic
+from rbxcompose.manifest.renamer import RenamedTopic
 from rbxcompose.manifest.section import Section
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, at
 from rbxcompose.references import ANYTHING, COMPONENT, PORT, TOPIC
@@ -26,12 +26,12 @@ class Renaming:
     """How the names of one instance change; `used` are the topics of `connect` that the part has."""
 
     prefix: str
-    connect: dict[str, Topic]
+    connect: dict[str, RenamedTopic]
     own: dict[str, frozenset[str]]  # by section
     used: set[str] = field(default_factory=set)
 
     @classmethod
-    def of(cls, prefix: str, connect: dict[str, Topic], roots: Iterable[MappingNode]) -> Renaming:
+    def of(cls, prefix: str, connect: dict[str, RenamedTopic], roots: Iterable[MappingNode]) -> Renaming:
         """Return the renaming for what `roots` bring: the file of a part and all that it includes."""
         trees = list(roots)
         named = [one for one in sections() if one.names and one.is_composed]
@@ -61,7 +61,7 @@ class Renaming:
             return f"{self.topic(above)}/{name}"
         return topic
 
-    def written(self, topic: str) -> Topic:
+    def written(self, topic: str) -> RenamedTopic:
         """Return what gives a topic its other name: itself, or the topic that it stands below."""
         return self.connect.get(topic) or self.connect[topic.rpartition("/")[0]]
 

@@ -6,15 +6,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rbxcompose.composition.history import ROBOT_LAYER, History, Step
-from rbxcompose.composition.includes import Instance, Parts
+from rbxcompose.composition.history import ROBOT_LAYER, History, HistoryStep
+from rbxcompose.composition.includes import PartInstance, Parts
 from rbxcompose.composition.overlay import NOTHING_TO_CHANGE, compose, join, settled
 from rbxcompose.composition.set_options import read_sets
 from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.files import find, shown_name
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.section import OVERLAY, Contents
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.printable import plain
@@ -40,7 +40,7 @@ class Composed:
 
     root: MappingNode
     include: MappingNode
-    instances: tuple[Instance, ...]
+    instances: tuple[PartInstance, ...]
     parts: Parts
     history: History = field(default_factory=History)
 
@@ -62,7 +62,7 @@ def compose_robot(root: MappingNode, file: Path, chosen: Chosen, documents: Docu
     else:
         composed = settled(own, report)
         for name, entry in composed.entries.items():
-            history.write((name,), Step(ROBOT_LAYER, entry.value, entry.value.span))
+            history.write((name,), HistoryStep(ROBOT_LAYER, entry.value, entry.value.span))
     composed = compose(composed, [(_without(tree, INCLUDE), name) for tree, name in overlays], report, history)
     if chosen.sets:
         composed = compose(composed, read_sets(chosen.sets, composed, report, documents.sources), report, history)
@@ -79,7 +79,7 @@ def _include(
     """Return the section `include` as all layers have it: what it names is read before anything else is composed."""
     included = settled(only(root, INCLUDE), documents.report)
     for entry in included.entries.values():
-        history.write((INCLUDE,), Step(ROBOT_LAYER, entry.value, entry.value.span))
+        history.write((INCLUDE,), HistoryStep(ROBOT_LAYER, entry.value, entry.value.span))
     changes = [(only(tree, INCLUDE), name) for tree, name in overlays]
     included = compose(included, changes, documents.report, history)
     lines = read_sets(sets, included, documents.report, documents.sources, of_include=True)
@@ -131,5 +131,5 @@ def _overlays(chosen: Sequence[str], documents: Documents) -> Iterator[tuple[Map
             documents.report.add(file)
         elif (root := documents.read(file, OVERLAY)) is not None:
             documents.check(file_model(OVERLAY), root)
-            sections = {name: entry for name, entry in root.entries.items() if name not in Header.model_fields}
+            sections = {name: entry for name, entry in root.entries.items() if name not in ManifestHeader.model_fields}
             yield replace(root, entries=sections), f"overlay '{shown_name(file)}'"

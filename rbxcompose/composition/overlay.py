@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 from operator import is_
 
-from rbxcompose.composition.history import History, Step
+from rbxcompose.composition.history import History, HistoryStep
 from rbxcompose.findings import Related, Report, Span, correction, kind, suggest
 from rbxcompose.manifest.registry import section_named
-from rbxcompose.manifest.tree import BROKEN, Entry, MappingNode, Path, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.walk import REMOVE
 
 NOTHING_TO_CHANGE = kind(
@@ -149,13 +149,13 @@ class _Merge:
         self.report = report
         self.history = history
 
-    def mapping(self, base: MappingNode, over: MappingNode, path: Path) -> MappingNode:
+    def mapping(self, base: MappingNode, over: MappingNode, path: KeyPath) -> MappingNode:
         entries = dict(base.entries)
         for name, entry in over.entries.items():
             self.entry(entries, entry, (*path, name))
         return replace(base, entries=entries)
 
-    def entry(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
+    def entry(self, entries: dict[str, Entry], entry: Entry, path: KeyPath) -> None:
         """Lay one entry over those of the map above it."""
         name = entry.key.text
         below = entries.get(name)
@@ -171,30 +171,30 @@ class _Merge:
             self._clash(below, entry, path)
         elif is_gone:
             del entries[name]
-            self.history.write(path, Step(self.overlay, None, entry.key.span))
+            self.history.write(path, HistoryStep(self.overlay, None, entry.key.span))
         else:
             self._enter(entries, entry, path)
 
-    def may_merge(self, path: Path) -> bool:
+    def may_merge(self, path: KeyPath) -> bool:
         """Tell whether this layer may add to the map at `path`."""
         return True
 
-    def may_change(self, path: Path) -> bool:
+    def may_change(self, path: KeyPath) -> bool:
         """Tell whether this layer may replace or remove what is at `path`."""
         return True
 
-    def _enter(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
+    def _enter(self, entries: dict[str, Entry], entry: Entry, path: KeyPath) -> None:
         value = _settled(entry.value, self.report)
         entries[entry.key.text] = Entry(entry.key, value)
-        self.history.write(path, Step(self.overlay, value, value.span))
+        self.history.write(path, HistoryStep(self.overlay, value, value.span))
 
-    def _nothing_to_remove(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
+    def _nothing_to_remove(self, entries: dict[str, Entry], entry: Entry, path: KeyPath) -> None:
         name = entry.key.text
         where = f" in '{'.'.join(map(str, path[:-1]))}'" if path[1:] else ""
         message = f"{self.overlay} removes '{name}', which does not exist{where}"
         self.report.add(NOTHING_TO_CHANGE.misspelt(entry.key.span, message, name, entries))
 
-    def _add(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
+    def _add(self, entries: dict[str, Entry], entry: Entry, path: KeyPath) -> None:
         name = entry.key.text
         section = section_named(path[0]) if len(path) == 2 else None
         one, needed = (section.entry, section.needs) if section else ("", "")
@@ -206,7 +206,7 @@ class _Merge:
         else:
             self._enter(entries, entry, path)
 
-    def _clash(self, below: Entry, entry: Entry, path: Path) -> None:
+    def _clash(self, below: Entry, entry: Entry, path: KeyPath) -> None:
         """Say that this layer may not change what is at `path`."""
         raise AssertionError("an overlay may change everything")
 
@@ -219,13 +219,13 @@ class _Join(_Merge):
         self.span = span
         self.included = part_layer(f"{instance}.").removesuffix("'")  # how the layers of what it includes begin
 
-    def may_merge(self, path: Path) -> bool:
+    def may_merge(self, path: KeyPath) -> bool:
         return _is_shared(path) or self.may_change(path)
 
-    def may_change(self, path: Path) -> bool:
+    def may_change(self, path: KeyPath) -> bool:
         return self.history.layer(path).startswith(self.included)
 
-    def _clash(self, below: Entry, entry: Entry, path: Path) -> None:
+    def _clash(self, below: Entry, entry: Entry, path: KeyPath) -> None:
         name, *names = map(str, path)
         other, section = self.history.layer(path), section_named(name)
         what = f"'{names[-1]}' of '{name}'" if names else f"'{name}'"
@@ -237,7 +237,7 @@ class _Join(_Merge):
         self.report.add(TWO_PARTS.at(self.span, message, label="the second", help=help_text, related=related))
 
 
-def _is_shared(path: Path) -> bool:
+def _is_shared(path: KeyPath) -> bool:
     """Tell whether several parts may add to the map at `path`."""
     section = section_named(path[0])
     return section is not None and section.is_shared(path[1:])

@@ -18,7 +18,7 @@ from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.fill_names import names_of
 from rbxcompose.manifest.garbage_collection import paused_collection
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.mission_data import is_moderate
 from rbxcompose.manifest.secrets import Secrets
 from rbxcompose.manifest.section import ROBOT
@@ -96,8 +96,8 @@ def read_mission(
     root = documents.read(path, MISSION)
     if root is None:
         return None
-    header = {name: entry for name, entry in root.entries.items() if name in Header.model_fields}
-    documents.check(Header, replace(root, entries=header))
+    header = {name: entry for name, entry in root.entries.items() if name in ManifestHeader.model_fields}
+    documents.check(ManifestHeader, replace(root, entries=header))
     filled = fill(root, names_of(robot, sim, environment or {}), report, runs=True)
     return filled if is_moderate(filled.get("data"), "datum", report) else None
 

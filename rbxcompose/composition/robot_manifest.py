@@ -16,12 +16,12 @@ from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.sections.body import Description, body
 from rbxcompose.sections.bus import BusModel, bus
 from rbxcompose.sections.components import ComponentEntry, components
-from rbxcompose.sections.diagnostics import Diagnostics, diagnostics
+from rbxcompose.sections.diagnostics import DiagnosticsModel, diagnostics
 from rbxcompose.sections.missions import MissionEntry, missions
-from rbxcompose.sections.muxes import Mux, muxes
+from rbxcompose.sections.muxes import MuxModel, muxes
 from rbxcompose.sections.places import places
 from rbxcompose.sections.start import start
-from rbxcompose.sections.values import Value, values
+from rbxcompose.sections.values import ValueModel, values
 
 
 class About(StrEnum):
@@ -83,7 +83,7 @@ class RobotManifest:
         return self.contents.of(components)
 
     @property
-    def muxes(self) -> Mapping[str, Mux]:
+    def muxes(self) -> Mapping[str, MuxModel]:
         """Return the muxes."""
         return self.contents.of(muxes)
 
@@ -93,7 +93,7 @@ class RobotManifest:
         return self.contents.of(places)
 
     @property
-    def values(self) -> Mapping[str, Value]:
+    def values(self) -> Mapping[str, ValueModel]:
         """Return the values."""
         return self.contents.of(values)
 
@@ -103,7 +103,7 @@ class RobotManifest:
         return self.contents.of(missions)
 
     @property
-    def diagnostics(self) -> Diagnostics:
+    def diagnostics(self) -> DiagnosticsModel:
         """Return how the states of components are grouped."""
         return self.contents.of(diagnostics)
 

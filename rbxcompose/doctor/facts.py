@@ -21,7 +21,7 @@ class BusFacts:
 
 
 @dataclass(frozen=True, slots=True)
-class Running:
+class RunningRobot:
     """A robot that is up, or what is left of one.
 
     `problem` is why its state cannot be read, `robot` what its file describes now; `bus` is None if it cannot be
@@ -41,7 +41,7 @@ class Running:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class ResourceLimits:
     """What this user's processes may have; None is no limit. Sizes in bytes."""
 
     open_files: int | None
@@ -82,15 +82,15 @@ class Version:
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class HostFacts:
     """Everything. `file` is the robot that was named and need not be up; `processes` are titled ones of this user."""
 
-    running: Sequence[Running]
+    running: Sequence[RunningRobot]
     file: Robot | None
     python: str
     versions: Sequence[Version]
     clocks: Clocks
-    limits: Limits
+    limits: ResourceLimits
     listeners: Mapping[int, Listener]
     processes: Mapping[Process, str]
     base: Path

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rbxcompose.doctor.facts import Facts
+from rbxcompose.doctor.facts import HostFacts
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.plugins import Plugins
 
-Examine = Callable[[Facts], Iterable[str | Finding]]
+Examine = Callable[[HostFacts], Iterable[str | Finding]]
 """Yields findings, and words on what is fine."""
 
 PLUGINS = Plugins("doctor", "rbxcompose.doctor.examinations")
@@ -50,7 +50,7 @@ def examination(examine: Examine) -> Examine:
     return examine
 
 
-def examine_all(facts: Facts) -> list[ExaminationResult]:
+def examine_all(facts: HostFacts) -> list[ExaminationResult]:
     """Run every examination, by name."""
     for name in PLUGINS.names():
         PLUGINS.load(name)

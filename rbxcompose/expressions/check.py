@@ -12,7 +12,7 @@ from rbxcompose.expressions.tree import (
     Comparison,
     Expression,
     ExpressionNode,
-    Field,
+    FieldAccess,
     Flag,
     FunctionCall,
     Index,
@@ -65,7 +65,7 @@ class StaticScope(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class ExpressionProblem:
     """Something wrong at `start` to `end` of an expression's text."""
 
     message: str
@@ -76,21 +76,21 @@ class Problem:
     """What can only have been meant in its place, if that is known."""
 
 
-def check(expression: Expression, scope: StaticScope) -> tuple[Type, list[Problem]]:
+def check(expression: Expression, scope: StaticScope) -> tuple[Type, list[ExpressionProblem]]:
     """Return the type of an expression, unknown where it is wrong, and what is wrong by place."""
     checker = _Checker(scope)
     found = checker.type_of(expression.tree)
     return found, checker.sorted()
 
 
-def check_value(expression: Expression, scope: StaticScope, expected: Type) -> list[Problem]:
+def check_value(expression: Expression, scope: StaticScope, expected: Type) -> list[ExpressionProblem]:
     """Return what is wrong with an expression that must give a value of the type `expected`."""
     checker = _Checker(scope)
     checker.require(expression.tree, expected)
     return checker.sorted()
 
 
-def check_condition(expression: Expression, scope: StaticScope) -> list[Problem]:
+def check_condition(expression: Expression, scope: StaticScope) -> list[ExpressionProblem]:
     """Return what is wrong with an expression that must be true or false."""
     return check_value(expression, scope, FLAG)
 
@@ -100,13 +100,13 @@ class _Checker:
 
     def __init__(self, scope: StaticScope) -> None:
         self.scope = scope
-        self.problems: list[Problem] = []
+        self.problems: list[ExpressionProblem] = []
 
-    def sorted(self) -> list[Problem]:
+    def sorted(self) -> list[ExpressionProblem]:
         return sorted(self.problems, key=lambda problem: (problem.start, problem.end))
 
     def wrong(self, node: ExpressionNode, message: str, fix: str = "", meant: str | None = "") -> Type:
-        self.problems.append(Problem(message, node.start, node.end, fix, meant or ""))
+        self.problems.append(ExpressionProblem(message, node.start, node.end, fix, meant or ""))
         return UNKNOWN
 
     def type_of(self, node: ExpressionNode, expected: Type = UNKNOWN) -> Type:
@@ -127,7 +127,7 @@ class _Checker:
             case Items(items=nodes):
                 types = {self.type_of(item, expected.entry) for item in nodes}
                 return list_of(types.pop() if len(types) == 1 else UNKNOWN)
-            case Field() | Index():
+            case FieldAccess() | Index():
                 return self.part(node)
             case FunctionCall():
                 return self.call(node)
@@ -189,9 +189,9 @@ class _Checker:
                 fix, meant = f"did you mean '${variable}'?", f"${variable}"
         return self.wrong(node, f"unknown name '{node.name}'", fix, meant)
 
-    def part(self, node: Field | Index) -> Type:
+    def part(self, node: FieldAccess | Index) -> Type:
         whole = self.type_of(node.of)
-        if isinstance(node, Field):
+        if isinstance(node, FieldAccess):
             if whole.kind in (TypeKind.MAP, TypeKind.UNKNOWN):
                 return whole.entry
             return self.wrong(node, f"{whole.phrase} has no fields")

@@ -15,7 +15,7 @@ from rbxcompose.expressions.tree import (
     Comparison,
     Expression,
     ExpressionNode,
-    Field,
+    FieldAccess,
     Flag,
     FunctionCall,
     Index,
@@ -45,8 +45,8 @@ from rbxcompose.expressions.values import (
 )
 from rbxcompose.units import MOST, format_number
 
-Run: TypeAlias = Callable[[Scope], Value]
-Ask: TypeAlias = Callable[[Scope], bool]
+Evaluate: TypeAlias = Callable[[Scope], Value]
+Predicate: TypeAlias = Callable[[Scope], bool]
 Measure: TypeAlias = Callable[[Scope], float]
 
 _ORDERS: Mapping[str, Callable[[float, float], bool]] = {"<": lt, "<=": le, ">": gt, ">=": ge}
@@ -87,7 +87,7 @@ def holds(expression: Expression, scope: Scope) -> bool:
         return False
 
 
-def _run(node: ExpressionNode) -> Run:
+def _run(node: ExpressionNode) -> Evaluate:
     """Return what computes the value of a part of an expression."""
     match node:
         case Variable():
@@ -98,7 +98,7 @@ def _run(node: ExpressionNode) -> Run:
             return _ask(node)
         case Word(name=name):
             return lambda scope: _known(scope.word, name, name, node)
-        case Field() | Index():
+        case FieldAccess() | Index():
             return _part(node)
         case FunctionCall():
             return _called(node)
@@ -112,7 +112,7 @@ def _run(node: ExpressionNode) -> Run:
             return lambda scope: [run(scope) for run in runs]
 
 
-def _ask(node: ExpressionNode) -> Ask:
+def _ask(node: ExpressionNode) -> Predicate:
     """Return what tells whether a part of an expression is true; it may be nothing else."""
     match node:
         case Flag(value=flag):
@@ -158,7 +158,7 @@ def _measure(node: ExpressionNode) -> Measure:
     return measure
 
 
-def _variable(node: Variable) -> Run:
+def _variable(node: Variable) -> Evaluate:
     name = node.name
 
     def run(scope: Scope) -> Value:
@@ -229,7 +229,7 @@ def _items(value: Value, node: ExpressionNode) -> list[Value]:
         raise EvaluationError(f"'in' {error}", node.start, node.end) from None
 
 
-def _compared(node: Comparison) -> Ask:
+def _compared(node: Comparison) -> Predicate:
     if order := _ORDERS.get(node.operator):
         one, other = _measure(node.left), _measure(node.right)
         return lambda scope: order(one(scope), other(scope))
@@ -245,7 +245,7 @@ def _compared(node: Comparison) -> Ask:
     return ask
 
 
-def _computed(node: Arithmetic) -> Run:
+def _computed(node: Arithmetic) -> Evaluate:
     left, right, operation = _run(node.left), _run(node.right), _OPERATIONS[node.operator]
 
     def run(scope: Scope) -> Value:
@@ -263,23 +263,23 @@ def _computed(node: Arithmetic) -> Run:
     return run
 
 
-def _part(node: Field | Index) -> Run:
+def _part(node: FieldAccess | Index) -> Evaluate:
     of = _run(node.of)
-    if isinstance(node, Field):
+    if isinstance(node, FieldAccess):
         name = node.name
         return lambda scope: _entry(of(scope), name, node)
     index = _run(node.index)
     return lambda scope: _entry(of(scope), index(scope), node)
 
 
-def _entry(whole: Value, key: Value, node: Field | Index) -> Value:
+def _entry(whole: Value, key: Value, node: FieldAccess | Index) -> Value:
     if not isinstance(key, str) and isinstance(key, NamedPose):
         key = key.name
     if isinstance(whole, Mapping):
         if isinstance(key, str) and key in whole:
             return whole[key]
         raise EvaluationError(f"there is no entry '{key}'", node.start, node.end)
-    if isinstance(node, Field) or not isinstance(whole, list | tuple):
+    if isinstance(node, FieldAccess) or not isinstance(whole, list | tuple):
         raise EvaluationError("this has no entries", node.of.start, node.of.end)
     position = _number(key, node.index)
     if not (position.is_integer() and 0 <= position < len(whole)):
@@ -288,7 +288,7 @@ def _entry(whole: Value, key: Value, node: Field | Index) -> Value:
     return whole[int(position)]
 
 
-def _called(node: FunctionCall) -> Run:
+def _called(node: FunctionCall) -> Evaluate:
     function, name = FUNCTIONS[node.function], node.function
     compute, wrong = function.compute, function.wrong_count(len(node.arguments))
     if compute is None or wrong:

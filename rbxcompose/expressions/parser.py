@@ -14,7 +14,7 @@ from rbxcompose.expressions.tree import (
     Expression,
     ExpressionError,
     ExpressionNode,
-    Field,
+    FieldAccess,
     Flag,
     FunctionCall,
     Index,
@@ -198,7 +198,7 @@ class _Parser:
             case "(":
                 inner = self.expression()
                 self.close(")", token)
-                return self.parts(inner) if isinstance(inner, Variable | Word | Field | Index) else inner
+                return self.parts(inner) if isinstance(inner, Variable | Word | FieldAccess | Index) else inner
             case "[":
                 items, end = self.items("]", token)
                 return Items(token.start, end, items)
@@ -248,5 +248,5 @@ class _Parser:
             end = names.start - 1
             for name in names.text.split("."):
                 end += 1 + len(name)
-                node = Field(node.start, end, node, name)
+                node = FieldAccess(node.start, end, node, name)
         return node

@@ -72,7 +72,7 @@ class Items(_Placed):
 
 
 @dataclass(frozen=True, slots=True)
-class Field(_Placed):
+class FieldAccess(_Placed):
     """`of.name`: an entry of a map."""
 
     of: ExpressionNode
@@ -150,7 +150,7 @@ ExpressionNode: TypeAlias = (
     | Variable
     | Word
     | Items
-    | Field
+    | FieldAccess
     | Index
     | FunctionCall
     | Minus
@@ -167,7 +167,7 @@ def children(node: ExpressionNode) -> tuple[ExpressionNode, ...]:
     match node:
         case Items(items=nodes) | FunctionCall(arguments=nodes) | Junction(operands=nodes):
             return nodes
-        case Field(of=of):
+        case FieldAccess(of=of):
             return (of,)
         case Index(of=first, index=second) | Membership(item=first, group=second):
             return (first, second)

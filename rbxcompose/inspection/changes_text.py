@@ -7,7 +7,7 @@ from typing import Any
 
 from rbxcompose.composition.overlay import SET
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Path, SequenceNode, TreeNode, at, key_span, value_span
+from rbxcompose.manifest.tree import KeyPath, SequenceNode, TreeNode, at, key_span, value_span
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.diff import Change
 from rbxcompose.printable import plain
@@ -64,7 +64,7 @@ def _place(robot: Robot, component: str, reason: Mapping[str, str | None]) -> st
     return SET if span.file == SET else str(span)
 
 
-def _source(robot: Robot, component: str, key: str) -> tuple[TreeNode, Path, int]:
+def _source(robot: Robot, component: str, key: str) -> tuple[TreeNode, KeyPath, int]:
     """Return the tree in which a key of a component is written, its path there, and how much of that must be there."""
     root, own = robot.manifest.root, robot.components[component].path
     if key.startswith(_TOPIC):
@@ -80,9 +80,9 @@ def _source(robot: Robot, component: str, key: str) -> tuple[TreeNode, Path, int
     return root, keys, 1
 
 
-def _indexed(root: TreeNode, path: Path) -> Path:
+def _indexed(root: TreeNode, path: KeyPath) -> KeyPath:
     """Return a path with the numbers of items as numbers."""
-    found: Path = ()
+    found: KeyPath = ()
     for key in path:
         is_item = isinstance(at(root, found), SequenceNode) and str(key).isdigit()
         found = (*found, int(key) if is_item else key)

@@ -8,7 +8,7 @@ from typing import Any
 from rbxcompose.composition.dump import dump, dump_robot
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.inspection.origin import as_data, is_leaf, origin_of
-from rbxcompose.manifest.tree import MappingNode, Path, TreeNode, children
+from rbxcompose.manifest.tree import KeyPath, MappingNode, TreeNode, children
 
 WIDEST = 60  # columns up to which comments stand below each other
 _MARK = "\0"  # before a comment: no manifest holds it
@@ -24,7 +24,7 @@ def expand(manifest: RobotManifest, *, has_origins: bool = True) -> str:
     return aligned(dump_robot(manifest, lambda path, node: _comment(manifest, path, node)))
 
 
-def expand_below(manifest: RobotManifest, path: Path, root: MappingNode, defaults: Mapping[str, str]) -> str:
+def expand_below(manifest: RobotManifest, path: KeyPath, root: MappingNode, defaults: Mapping[str, str]) -> str:
     """Return what stands below `path`, with origins, and then the defaults of what nobody wrote there.
 
     `root` is the map at `path`.
@@ -33,7 +33,7 @@ def expand_below(manifest: RobotManifest, path: Path, root: MappingNode, default
     return aligned(written + "".join(f"{key}: {value}  # {_MARK}by default\n" for key, value in defaults.items()))
 
 
-def _comment(manifest: RobotManifest, path: Path, node: TreeNode) -> str:
+def _comment(manifest: RobotManifest, path: KeyPath, node: TreeNode) -> str:
     return _MARK + origin_of(manifest, path, node).comment if is_leaf(node) else ""
 
 
@@ -60,7 +60,7 @@ def expand_data(manifest: RobotManifest) -> dict[str, Any]:
     return {"robot": as_data(manifest.root), "origins": origins}
 
 
-def leaves(node: TreeNode, path: Path = ()) -> Iterator[tuple[Path, TreeNode]]:
+def leaves(node: TreeNode, path: KeyPath = ()) -> Iterator[tuple[KeyPath, TreeNode]]:
     """Yield everything below which nothing stands, with its path."""
     if is_leaf(node):
         yield path, node

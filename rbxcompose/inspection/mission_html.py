@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from rbxcompose.inspection.layout import Item, Layout, lay_out
+from rbxcompose.inspection.layout import Layout, LayoutItem, lay_out
 from rbxcompose.inspection.mission_style import STYLE
 from rbxcompose.inspection.mission_text import MARKS, status_of
 from rbxcompose.missions.program.look import Form
@@ -105,9 +105,9 @@ def _layout(
 ) -> tuple[Layout, dict[tuple[str, str], str]]:
     """Return the places of states and of the labels between them, and the keys of these."""
     pills = {ends: f"{ends[0]} > {ends[1]}" for ends in joined}
-    items = [Item(name, _LETTER * len(name) + 26, _BOX, is_round=True) for name in names]
+    items = [LayoutItem(name, _LETTER * len(name) + 26, _BOX, is_round=True) for name in names]
     for ends, key in pills.items():
-        items.append(Item(key, _SMALL * len(", ".join(joined[ends])) + 18, _PILL, is_round=True))
+        items.append(LayoutItem(key, _SMALL * len(", ".join(joined[ends])) + 18, _PILL, is_round=True))
     edges = [edge for (begin, to), key in pills.items() for edge in ((begin, key), (key, to))]
     return lay_out(items, edges), pills
 

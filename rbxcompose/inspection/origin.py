@@ -12,7 +12,7 @@ from rbxcompose.config import HIDDEN, Secret
 from rbxcompose.findings import Span
 from rbxcompose.manifest.arguments import show
 from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import BROKEN, MappingNode, Path, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.printable import plain
 from rbxcompose.units import Quantity
 
@@ -37,7 +37,7 @@ class Origin:
         return ", ".join(shown) + (f" = {plain(self.written, LONGEST)}" if self.written else "")
 
 
-def origin_of(manifest: RobotManifest, path: Path, node: TreeNode) -> Origin:
+def origin_of(manifest: RobotManifest, path: KeyPath, node: TreeNode) -> Origin:
     """Return where the value at `path` comes from; `node` is what stands there, filled in."""
     steps = manifest.history.of(path)
     source = steps[-1].node if steps else None

@@ -7,8 +7,8 @@ from rbxcompose.composition.set_options import in_section
 from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.file_models import robot_keys
 from rbxcompose.manifest.registry import naming
-from rbxcompose.manifest.section import Scope
-from rbxcompose.manifest.tree import MappingNode, Path, SequenceNode, TreeNode, at
+from rbxcompose.manifest.section import SetScope
+from rbxcompose.manifest.tree import KeyPath, MappingNode, SequenceNode, TreeNode, at
 from rbxcompose.model.robot import Robot
 from rbxcompose.printable import plain
 from rbxcompose.references import COMPONENT
@@ -28,7 +28,7 @@ Good: `rbxcompose why battery.runtime robots/turtlebot`
 )
 
 
-def path_of(robot: Robot, text: str) -> Path:
+def path_of(robot: Robot, text: str) -> KeyPath:
     """Return the path from the root that a text means; an item of a list is counted from 0."""
     names: list[str | int] = list(text.strip().split("."))
     manifest = robot.manifest
@@ -43,26 +43,26 @@ def path_of(robot: Robot, text: str) -> Path:
 
 def _section_of(manifest: RobotManifest, name: str) -> str:
     """Return the section in which something that runs has its name; that of the components, if nothing has it."""
-    running = sorted(naming(COMPONENT), key=lambda one: one.scope is Scope.BARE)
+    running = sorted(naming(COMPONENT), key=lambda one: one.scope is SetScope.BARE)
     return next((one.name for one in running if name in one.names_in(manifest.root)), running[-1].name)
 
 
-def short(path: Path) -> str:
+def short(path: KeyPath) -> str:
     """Return a path as people write it."""
     return ".".join(map(str, path[1:] if path[0] == "components" and len(path) > 1 else path))
 
 
-def tree_of(manifest: RobotManifest, path: Path) -> MappingNode:
+def tree_of(manifest: RobotManifest, path: KeyPath) -> MappingNode:
     """Return the tree that a path leads into: what is included is read before the rest, and kept beside it."""
     return manifest.include if path[:1] == (include.name,) else manifest.root
 
 
-def found_at(manifest: RobotManifest, path: Path) -> TreeNode | None:
+def found_at(manifest: RobotManifest, path: KeyPath) -> TreeNode | None:
     """Return what stands at a path of the composed robot, or None."""
     return at(tree_of(manifest, path), path)
 
 
-def no_such_path(robot: Robot, path: Path, guide: Guide) -> Finding:
+def no_such_path(robot: Robot, path: KeyPath, guide: Guide) -> Finding:
     """Return the finding for a path that leads nowhere, with what was probably meant at the first wrong name."""
     if path[0] == "profiles":
         return NO_SUCH_PATH.at(None, "profiles have no value of their own", help="'--profile NAME' lays one on top")
@@ -84,6 +84,6 @@ def no_such_path(robot: Robot, path: Path, guide: Guide) -> Finding:
     return NO_SUCH_PATH.misspelt(None, message, name, sorted(valid), "what it has")
 
 
-def is_known(manifest: RobotManifest, guide: Guide, path: Path) -> bool:
+def is_known(manifest: RobotManifest, guide: Guide, path: KeyPath) -> bool:
     """Tell whether a path leads to something, or is a key that could be written where it stands."""
     return found_at(manifest, path) is not None or str(path[-1]) in guide.keys(path[:-1])

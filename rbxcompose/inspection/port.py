@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rbxcompose.inspection.answer import PathAnswer
 from rbxcompose.inspection.wire_keys import does, keys_of, qos_of
-from rbxcompose.manifest.tree import Path, at
+from rbxcompose.manifest.tree import KeyPath, at
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.model.wires import PortEnd, resolve
 from rbxcompose.plan.model import BusPlan
@@ -21,7 +21,7 @@ _OTHER = {  # the first that a port is an instance of counts
 }
 
 
-def why_port(robot: Robot, path: Path) -> PathAnswer | None:
+def why_port(robot: Robot, path: KeyPath) -> PathAnswer | None:
     """Return what is known of a component (`transforms`) or of one of its ports (`go_to.cmd_vel`), None if none is."""
     name, *rest = [str(key) for key in (path[1:] if path[0] in ("components", "muxes") else path)] or [""]
     component = robot.components.get(name)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-from rbxcompose.composition.history import Step
+from rbxcompose.composition.history import HistoryStep
 from rbxcompose.composition.overlay import SET
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.findings import Finding
@@ -15,7 +15,7 @@ from rbxcompose.inspection.expand import expand_below
 from rbxcompose.inspection.origin import origin_of, shown
 from rbxcompose.inspection.paths import found_at, is_known, no_such_path, path_of, short, tree_of
 from rbxcompose.inspection.port import why_port
-from rbxcompose.manifest.tree import MappingNode, Path, ScalarNode, TreeNode, key_span
+from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, key_span
 from rbxcompose.missions.engine.value_text import show as show_value
 from rbxcompose.missions.program.program import Input
 from rbxcompose.model.robot import Robot
@@ -44,12 +44,12 @@ def why(robot: Robot, text: str) -> PathAnswer | Finding:
     return why_port(robot, path) or no_such_path(robot, path, guide)
 
 
-def _guide(manifest: RobotManifest, path: Path) -> Guide:
+def _guide(manifest: RobotManifest, path: KeyPath) -> Guide:
     types = {name: entry.type for name, entry in manifest.components.items()}
     return Guide(installed_schema("Robot"), tree_of(manifest, path), types)
 
 
-def _written(robot: Robot, guide: Guide, path: Path, node: TreeNode) -> PathAnswer:
+def _written(robot: Robot, guide: Guide, path: KeyPath, node: TreeNode) -> PathAnswer:
     about, place = _about(robot, guide, path), origin_of(robot.manifest, path, node)
     if isinstance(node, MappingNode) and node.entries:
         body = expand_below(robot.manifest, path, node, dict(_defaults(guide, path, node)))
@@ -68,7 +68,7 @@ def _written(robot: Robot, guide: Guide, path: Path, node: TreeNode) -> PathAnsw
     )
 
 
-def _argument_in_effect(robot: Robot, guide: Guide, path: Path, declared: MappingNode) -> PathAnswer:
+def _argument_in_effect(robot: Robot, guide: Guide, path: KeyPath, declared: MappingNode) -> PathAnswer:
     """Return the value that an argument has: its default, or what a layer above has put in the place of that."""
     written = {name: shown(entry.value) for name, entry in declared.entries.items()}
     limits = [f"{words} {written[key]}" for key, words in (("min", "at least"), ("max", "at most")) if key in written]
@@ -82,31 +82,31 @@ def _argument_in_effect(robot: Robot, guide: Guide, path: Path, declared: Mappin
     return replace(answer, path=short(path), about=written.get("about", ""), hints=hints)
 
 
-def _kind(path: Path, node: MappingNode) -> str:
+def _kind(path: KeyPath, node: MappingNode) -> str:
     type_ = node.get("type")
     if path[0] == "components" and len(path) == 2 and type_ is not None:
         return f"a component of type {shown(type_)}"
     return "a map with one key" if len(node.entries) == 1 else f"a map with {len(node.entries)} keys"
 
 
-def _about(robot: Robot, guide: Guide, path: Path) -> str:
+def _about(robot: Robot, guide: Guide, path: KeyPath) -> str:
     """Return what a key is for, in the words of its type."""
     if len(path) == 2 and path[0] == "components" and str(path[1]) in robot.components:
         return (robot.components[str(path[1])].cls.__doc__ or "").strip().partition("\n")[0]
     return guide.describe(path)
 
 
-def _layer(step: Step) -> Layer:
+def _layer(step: HistoryStep) -> Layer:
     name = SET if step.layer.strip("'") == SET else step.layer
     return Layer(name, None if step.node is None else shown(step.node), step.span)
 
 
-def _removed(manifest: RobotManifest, path: Path) -> tuple[Layer, ...]:
+def _removed(manifest: RobotManifest, path: KeyPath) -> tuple[Layer, ...]:
     """Return the layers of a value that is not there any more, the one that took it away last."""
     return tuple(_layer(step) for step in manifest.history.of(path))
 
 
-def _dimension(guide: Guide, path: Path, node: TreeNode) -> Dimension | None:
+def _dimension(guide: Guide, path: KeyPath, node: TreeNode) -> Dimension | None:
     if not isinstance(node, ScalarNode):
         return None
     if isinstance(node.filled, Quantity):
@@ -129,7 +129,7 @@ def _si(node: TreeNode, dimension: Dimension | None) -> float | None:
         return None
 
 
-def _sources(manifest: RobotManifest, path: Path) -> Iterator[ArgumentSource]:
+def _sources(manifest: RobotManifest, path: KeyPath) -> Iterator[ArgumentSource]:
     """Yield the arguments that a value was filled in from, each followed by those that it was given."""
     steps = manifest.history.of(path)
     written = steps[-1].node if steps else None
@@ -140,7 +140,7 @@ def _sources(manifest: RobotManifest, path: Path) -> Iterator[ArgumentSource]:
 
 
 def _argument(manifest: RobotManifest, name: str, scope: str) -> Iterator[ArgumentSource]:
-    path: Path = ("include", scope, "with", name) if scope else ("args", name, "default")
+    path: KeyPath = ("include", scope, "with", name) if scope else ("args", name, "default")
     label = f"args.{name}" + (f" of part '{scope}'" if scope else "")
     node = found_at(manifest, path)
     if node is not None:
@@ -152,7 +152,7 @@ def _argument(manifest: RobotManifest, name: str, scope: str) -> Iterator[Argume
         yield ArgumentSource(label, f"{given}the default in {manifest.parts[scope].file}", None)
 
 
-def _unwritten(robot: Robot, guide: Guide, path: Path) -> PathAnswer | None:
+def _unwritten(robot: Robot, guide: Guide, path: KeyPath) -> PathAnswer | None:
     """Return what holds for a key that exists and that nobody wrote."""
     if given := _input(robot, path):
         return _unwritten_input(path, given)
@@ -177,7 +177,7 @@ def _unwritten(robot: Robot, guide: Guide, path: Path) -> PathAnswer | None:
     )
 
 
-def _unwritten_input(path: Path, given: Input) -> PathAnswer:
+def _unwritten_input(path: KeyPath, given: Input) -> PathAnswer:
     default = given.default
     value = "nothing" if default is None else show_value(given.type, default.value)
     said = f"no file writes it: this is the default of the mission ({given.span})" if default else f"see {given.span}"
@@ -195,11 +195,11 @@ def _unwritten_input(path: Path, given: Input) -> PathAnswer:
     )
 
 
-def _to_set(path: Path) -> str:
+def _to_set(path: KeyPath) -> str:
     return f"{SET} {short(path)}=VALUE"
 
 
-def _input(robot: Robot, path: Path) -> Input | None:
+def _input(robot: Robot, path: KeyPath) -> Input | None:
     """Return the input of a mission that a path names."""
     match path:
         case ("missions", str(mission), "with", str(name)) if mission in robot.missions:
@@ -213,7 +213,7 @@ def _default(value: object) -> str:
     return "" if value is None or isinstance(value, dict) else plain(str(value))
 
 
-def _defaults(guide: Guide, path: Path, node: MappingNode) -> Iterator[tuple[str, str]]:
+def _defaults(guide: Guide, path: KeyPath, node: MappingNode) -> Iterator[tuple[str, str]]:
     """Yield the keys of a map that nobody wrote and that have a default, with that."""
     for key in guide.keys(path):
         if key not in node and (default := _default(guide.value((*path, key)).default)):

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from rbxcompose.lsp.quick import LARGE, near, quick_tree
 from rbxcompose.manifest.garbage_collection import paused_collection
-from rbxcompose.manifest.tree import Entry, MappingNode, Path, ScalarNode, SequenceNode, TreeNode, at
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
 
 MARK = "\ue000"  # a character for private use, so that it stands in no manifest
 _TOKEN_BEHIND = re.compile(r"[^\s:,\[\]{}#]*")
@@ -32,7 +32,7 @@ class Cursor:
     """
 
     root: MappingNode
-    path: Path
+    path: KeyPath
     before: str
     after: str
     is_key: bool
@@ -52,7 +52,7 @@ class Cursor:
         return self.before + self.after
 
     @property
-    def place(self) -> Path:
+    def place(self) -> KeyPath:
         """Return the path of what is meant: for a key, that of its value."""
         return (*self.path, self.text) if self.is_key else self.path
 
@@ -75,7 +75,7 @@ def locate(text: str, line: int, column: int) -> Cursor | None:
     return None
 
 
-def _cursor(tree: MappingNode, path: Path, scalar: ScalarNode, is_key: bool, before: str, after: str) -> Cursor:
+def _cursor(tree: MappingNode, path: KeyPath, scalar: ScalarNode, is_key: bool, before: str, after: str) -> Cursor:
     start, _, end = scalar.text.partition(MARK)
     above = at(tree, path)
     others = above.entries if is_key and isinstance(above, MappingNode) else {}
@@ -93,7 +93,7 @@ def _cursor(tree: MappingNode, path: Path, scalar: ScalarNode, is_key: bool, bef
     )
 
 
-def _without_key(node: TreeNode, path: Path, key: str) -> TreeNode:
+def _without_key(node: TreeNode, path: KeyPath, key: str) -> TreeNode:
     """Return a tree without the key `key` of the map at `path`."""
     match node:
         case SequenceNode(items=items) if path:
@@ -108,7 +108,7 @@ def _without_key(node: TreeNode, path: Path, key: str) -> TreeNode:
     return node
 
 
-def _without_mark(node: TreeNode, path: Path) -> TreeNode:
+def _without_mark(node: TreeNode, path: KeyPath) -> TreeNode:
     """Return the tree of the text as if the mark had never been in the scalar; `path` leads towards that."""
     match node:
         case ScalarNode(text=text):
@@ -165,7 +165,7 @@ def _closing(before: str) -> str:
     return "".join(reversed(waiting))
 
 
-def _marked(node: TreeNode, path: Path, seen: set[int]) -> tuple[Path, ScalarNode, bool] | None:
+def _marked(node: TreeNode, path: KeyPath, seen: set[int]) -> tuple[KeyPath, ScalarNode, bool] | None:
     """Return the path, the scalar with the mark in it, and whether that is a key; what aliases repeat is seen once."""
     if isinstance(node, ScalarNode):
         return (path, node, False) if MARK in node.text else None

@@ -8,7 +8,7 @@ from rbxcompose.lsp.definition import word_at
 from rbxcompose.lsp.document import Document, Spot
 from rbxcompose.lsp.names import SKILL, below_profile
 from rbxcompose.lsp.variables import fills, variables
-from rbxcompose.manifest.tree import BROKEN, Path, ScalarNode, at
+from rbxcompose.manifest.tree import BROKEN, KeyPath, ScalarNode, at
 from rbxcompose.model.robot import Robot
 from rbxcompose.references import PLACE
 from rbxcompose.units import Quantity, format_quantity
@@ -74,7 +74,7 @@ def _value(spot: Spot) -> str:
     return f"`{node.text}`{'' if filled is None else f' = `{shown}`'} from {node.span}{''.join(_lost(robot, path))}"
 
 
-def _lost(robot: Robot, path: Path) -> Iterator[str]:
+def _lost(robot: Robot, path: KeyPath) -> Iterator[str]:
     """Yield the values that a later layer has replaced, the last one first."""
     for step in reversed(robot.manifest.history.of(path)[:-1]):
         if isinstance(step.node, ScalarNode):

@@ -11,8 +11,7 @@ from rbxcompose.manifest.options import OWN_PORT
 from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.registry import naming, section_named
 from rbxcompose.manifest.shapes import kind_of_keys
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, at
-from rbxcompose.manifest.tree import Path as TreePath
+from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, at
 from rbxcompose.model.robot import Robot
 from rbxcompose.references import COMPONENT, PORT, RUNNING, VALUE
 from rbxcompose.sections.args import args
@@ -23,12 +22,12 @@ from rbxcompose.sections.profiles import profiles
 SKILL = "skill"
 
 
-def below_profile(path: TreePath) -> TreePath:
+def below_profile(path: KeyPath) -> KeyPath:
     """Return a path as it is in the robot that a profile changes."""
     return path[2:] if path[:1] == (profiles.name,) else path
 
 
-def named_by_key(path: TreePath, is_overlay: bool) -> str:
+def named_by_key(path: KeyPath, is_overlay: bool) -> str:
     """Return of what the keys of the map at `path` are names that exist, or nothing."""
     below = below_profile(path)
     section = section_named(below[0]) if below else None
@@ -41,14 +40,14 @@ def named_by_key(path: TreePath, is_overlay: bool) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class KnownNames:
     """The names of a robot as it was last read, and those of the file that is being typed, each with a few words."""
 
     path: Path
     root: MappingNode
     robot: Robot | None
 
-    def of(self, kind: str, path: TreePath = ()) -> dict[str, str]:
+    def of(self, kind: str, path: KeyPath = ()) -> dict[str, str]:
         """Return the names of a kind with what each is; `path` is where one of them is to stand."""
         special: dict[str, Callable[[], dict[str, str]]] = {
             PORT: lambda: {**self._in_text(COMPONENT), **dict(self._ports())},

@@ -11,7 +11,7 @@ from rbxcompose.config import Config, Secret
 from rbxcompose.expressions.types import TYPES, Type, TypeKind, choice_of
 from rbxcompose.findings import Report
 from rbxcompose.manifest.scalars import describe
-from rbxcompose.manifest.tree import BROKEN, MappingNode, Path, ScalarNode, SequenceNode, TreeNode, key_span
+from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, key_span
 from rbxcompose.manifest.validate import (
     MISSING_KEY,
     NOT_A_CHOICE,
@@ -46,7 +46,7 @@ class ArgumentModel(Config):
 
 
 @dataclass(frozen=True, slots=True)
-class Argument:
+class DeclaredArgument:
     """A declared argument: what a value of it must be."""
 
     name: str
@@ -66,7 +66,7 @@ class Argument:
         return value
 
 
-def read_argument(name: str, node: TreeNode, path: Path, report: Report) -> Argument | None:
+def read_argument(name: str, node: TreeNode, path: KeyPath, report: Report) -> DeclaredArgument | None:
     """Return the declaration of an argument that stands at `path`, or None after its findings."""
     model = validate(ArgumentModel, node, path, report)
     if model is None or not isinstance(node, MappingNode):
@@ -81,10 +81,10 @@ def read_argument(name: str, node: TreeNode, path: Path, report: Report) -> Argu
                 report.add(WRONG_TYPE.at(key_span(node, (key,)), f"'{key}' has no meaning for {declared.phrase}"))
                 continue
             bounds[key] = read_value(bound, declared, key, report)
-    return Argument(name, declared, node.get("default"), bounds.get("min"), bounds.get("max"))
+    return DeclaredArgument(name, declared, node.get("default"), bounds.get("min"), bounds.get("max"))
 
 
-def _type(model: ArgumentModel, node: MappingNode, path: Path, report: Report) -> Type | None:
+def _type(model: ArgumentModel, node: MappingNode, path: KeyPath, report: Report) -> Type | None:
     written = node.get("type")
     if model.type == CHOICE:
         if model.choices:

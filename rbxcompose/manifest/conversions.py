@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic_core import ErrorDetails
 
-from rbxcompose.manifest.tree import Path, ScalarNode, TreeNode, at
+from rbxcompose.manifest.tree import KeyPath, ScalarNode, TreeNode, at
 from rbxcompose.units import Quantity, format_quantity
 
 
@@ -22,7 +22,7 @@ def repaired(data: Any, error: ErrorDetails, node: TreeNode) -> Any:
         return data
 
 
-def changed(data: Any, path: Path, convert: Callable[[object], object]) -> Any:
+def changed(data: Any, path: KeyPath, convert: Callable[[object], object]) -> Any:
     """Return `data` with the value at `path` converted; the same object if the value stays the same."""
     if not path:
         return convert(data)

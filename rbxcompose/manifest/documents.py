@@ -9,7 +9,7 @@ from typing import Any
 
 from rbxcompose.findings import Finding, Related, Report, Span, kind
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.manifest.validate import validate
@@ -64,7 +64,7 @@ class Documents:
         """Return the file that a value was written in; the robot's for one of the command line."""
         return self.files.get(span.file, robot)
 
-    def check(self, model: type[Header], root: MappingNode) -> None:
+    def check(self, model: type[ManifestHeader], root: MappingNode) -> None:
         """Add what is wrong with the keys of a whole file; what a section holds is looked at where it is read."""
         anything = {name for name, field in model.model_fields.items() if field.annotation is Any}
         keys = {

@@ -11,7 +11,7 @@ from rbxcompose.manifest.tree import TreeNode
 
 
 @dataclass(frozen=True, slots=True)
-class Topic:
+class RenamedTopic:
     """Another name for a topic of a part, and where it is written."""
 
     name: str
@@ -40,7 +40,7 @@ class Renames(Protocol):
         """Return what a topic becomes."""
         ...
 
-    def written(self, topic: str) -> Topic:
+    def written(self, topic: str) -> RenamedTopic:
         """Return what gives a topic its other name: itself, or the topic that it stands below."""
         ...
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from enum import Enum
 from functools import cache, cached_property
-from pathlib import Path as FilePath
+from pathlib import Path
 from types import GenericAlias
 from typing import Annotated, Any, Generic, TypeVar, cast
 
@@ -21,7 +21,7 @@ from rbxcompose.findings import Report
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.shapes import below, kinds_of, with_references
-from rbxcompose.manifest.tree import Entry, MappingNode, Path, ScalarNode, TreeNode, at
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.manifest.validate import WRONG_TYPE, is_valid, label_of, validate
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.references import COMPONENT, Refers
@@ -36,7 +36,7 @@ ANY = "*"
 """Any key, in a path of `Section.shared`."""
 
 
-class Scope(Enum):
+class SetScope(Enum):
     """What a path of `--set` may name in a section."""
 
     NOTHING = "nothing"
@@ -93,7 +93,7 @@ class Declaration(Generic[M]):
     short: Short | None = None
     needs: str = ""
     """The key that a new entry must have in an overlay; without it, it was to change an old one."""
-    scope: Scope = Scope.ANYTHING
+    scope: SetScope = SetScope.ANYTHING
 
     is_composed: bool = True
     """Whether it is part of the composed robot; else composition itself is what reads it."""
@@ -136,7 +136,7 @@ class Declaration(Generic[M]):
         """Tell whether its keys are names of a kind; what runs is a component as well."""
         return kind == self.names or (kind == COMPONENT and self.runs)
 
-    def is_shared(self, path: Path) -> bool:
+    def is_shared(self, path: KeyPath) -> bool:
         """Tell whether several parts may add to the map at a path below it."""
         patterns = self.shared if self.shared is not None else [()] if self.is_map else []
         return any(
@@ -201,7 +201,7 @@ class Contents:
     """What the sections of a filled tree say: each is read when it is first asked for."""
 
     def __init__(
-        self, root: MappingNode, file: FilePath, documents: Documents, sections: Iterable[Section[Any, Any]] = ()
+        self, root: MappingNode, file: Path, documents: Documents, sections: Iterable[Section[Any, Any]] = ()
     ) -> None:
         self.root, self.file, self.documents = root, file, documents
         self._naming = [one for one in sections if one.names]
@@ -259,7 +259,7 @@ class Reading(Generic[M]):
         node = self.contents.root.get(self.section.name)
         return None if node is None or is_empty(node) else node
 
-    def writer(self, node: TreeNode) -> FilePath:
+    def writer(self, node: TreeNode) -> Path:
         """Return the file that a value was written in."""
         return self.contents.documents.writer(node.span, self.contents.file)
 

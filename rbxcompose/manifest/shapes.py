@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel
 
 from rbxcompose.config import Dimensioned
-from rbxcompose.manifest.tree import Entry, MappingNode, Path, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, SequenceNode, TreeNode
 from rbxcompose.references import Refers
 from rbxcompose.units import Dimension
 
@@ -24,12 +24,12 @@ def field_types(model: type[BaseModel]) -> dict[str, Any]:
     }
 
 
-def keys_at(model: Any, path: Path) -> list[str]:
+def keys_at(model: Any, path: KeyPath) -> list[str]:
     """Return the keys of the map at `path` below `model`; none if the model does not name them."""
     return sorted({name for one in _types_at(model, path) for shape in _models(one) for name in field_types(shape)})
 
 
-def dimension_at(model: Any, path: Path) -> Dimension | None:
+def dimension_at(model: Any, path: KeyPath) -> Dimension | None:
     """Return what the quantity at `path` below `model` measures, None if it is no quantity."""
     marks = (mark for one in _types_at(model, path) for mark in alternatives(one))
     return next((mark.dimension for mark in marks if isinstance(mark, Dimensioned)), None)
@@ -40,7 +40,7 @@ def kinds_of(hint: Any) -> Iterator[str]:
     return (one.kind for one in alternatives(hint) if isinstance(one, Refers))
 
 
-def kind_of_keys(model: Any, path: Path) -> str:
+def kind_of_keys(model: Any, path: KeyPath) -> str:
     """Return of what the keys of the map at `path` below `model` are names, or nothing."""
     maps = (shape for one in _types_at(model, path) for shape in alternatives(one) if get_origin(shape) is dict)
     return next((kind for one in maps for kind in kinds_of(get_args(one)[0])), "")
@@ -94,7 +94,7 @@ def _models(hint: Any) -> Iterator[type[BaseModel]]:
     return (one for one in alternatives(hint) if isinstance(one, type) and issubclass(one, BaseModel))
 
 
-def _types_at(model: Any, path: Path) -> list[Any]:
+def _types_at(model: Any, path: KeyPath) -> list[Any]:
     found = [model]
     for key in path:
         found = [inner for one in found for inner in below(one, key)]

@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from rbxcompose.config import Config, Name, Time
 from rbxcompose.manifest.fields import TopicName
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 
 TEST = "Test"
 LONGEST_TEST = 3600.0  # [s] of robot time
@@ -21,11 +21,11 @@ def _given(value: bool) -> bool:
     return value
 
 
-Order = Annotated[bool, AfterValidator(_given)]
+TrueOnly = Annotated[bool, AfterValidator(_given)]
 CallNumber = Annotated[str, StringConstraints(pattern=r"^[1-9][0-9]{0,5}$")]
 
 
-class TrialFile(Header):
+class TrialFile(ManifestHeader):
     """A test of a mission: what happens to it, and what it must do."""
 
     robot: Any = None
@@ -79,13 +79,13 @@ class EventModel(Config):
     """Values that get this value now, and keep it until the test sets them again."""
     publish: SentModel | None = None
     """A message that comes from outside."""
-    stop: Order = False
+    stop: TrueOnly = False
     """The robot is stopped, and its mission paused."""
-    release: Order = False
+    release: TrueOnly = False
     """The stop is released."""
-    pause: Order = False
+    pause: TrueOnly = False
     """The mission is paused."""
-    resume: Order = False
+    resume: TrueOnly = False
     """The mission goes on."""
 
 

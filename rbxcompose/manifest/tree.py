@@ -12,7 +12,7 @@ BROKEN = object()
 """What `Scalar.filled` holds of a value of which all was said: filling it in has failed, or it was a slip."""
 
 Key = str | int
-Path = tuple[Key, ...]  # from the root of a file: ("components", "base", "max_speed") or ("do", 0, "go_to")
+KeyPath = tuple[Key, ...]  # from the root of a file: ("components", "base", "max_speed") or ("do", 0, "go_to")
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ def is_larger(node: TreeNode, most: int) -> bool:
     return count > most
 
 
-def at(node: TreeNode, path: Path) -> TreeNode | None:
+def at(node: TreeNode, path: KeyPath) -> TreeNode | None:
     """Return the node at `path`, or None if there is none."""
     found: TreeNode | None = node
     for key in path:
@@ -129,7 +129,7 @@ def at(node: TreeNode, path: Path) -> TreeNode | None:
     return found
 
 
-def key_span(node: TreeNode, path: Path) -> Span:
+def key_span(node: TreeNode, path: KeyPath) -> Span:
     """Return the place of the key at `path`; of the nearest place above it, where there is no key."""
     for length in range(len(path), 0, -1):
         above = at(node, path[: length - 1])
@@ -140,7 +140,7 @@ def key_span(node: TreeNode, path: Path) -> Span:
     return node.span
 
 
-def value_span(node: TreeNode, path: Path) -> Span:
+def value_span(node: TreeNode, path: KeyPath) -> Span:
     """Return the place of the value at `path`; of the nearest node above it, where there is none."""
     for length in range(len(path), -1, -1):
         if (found := at(node, path[:length])) is not None:

@@ -17,11 +17,11 @@ from rbxcompose.findings import SIMILAR, Finding, Report, Span, correction, kind
 from rbxcompose.manifest.conversions import changed, repaired
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import dimension_at, keys_at
-from rbxcompose.manifest.slips import Refused, value_slip
+from rbxcompose.manifest.slips import RefusedValue, value_slip
 from rbxcompose.manifest.tree import (
     BROKEN,
+    KeyPath,
     MappingNode,
-    Path,
     ScalarNode,
     SequenceNode,
     TreeNode,
@@ -188,7 +188,7 @@ def is_valid(model: Any, data: object) -> bool:
 def validate(
     model: type[T],
     node: TreeNode,
-    path: Path,
+    path: KeyPath,
     report: Report,
     context: Mapping[str, object] | None = None,
     *,
@@ -216,12 +216,12 @@ def validate(
 
 
 def _findings(
-    model: Any, node: TreeNode, path: Path, errors: list[ErrorDetails], also: tuple[str, ...]
+    model: Any, node: TreeNode, path: KeyPath, errors: list[ErrorDetails], also: tuple[str, ...]
 ) -> Iterator[Finding]:
     """Turn pydantic's errors into findings: one for each place, none for what was said before."""
     located = [(_locate(node, error), error) for error in errors]
     lacking = {loc for loc, error in located if error["type"] == "missing"}
-    said: set[Path] = set()
+    said: set[KeyPath] = set()
     for loc, error in located:
         if error["type"] == "extra_forbidden":
             known = [*keys_at(model, loc[:-1]), *(() if len(loc) > 1 else also)]
@@ -234,9 +234,9 @@ def _findings(
             yield _slip(model, node, path, loc, error) or _finding(model, node, path, loc, error)
 
 
-def _locate(node: TreeNode, error: ErrorDetails) -> Path:
+def _locate(node: TreeNode, error: ErrorDetails) -> KeyPath:
     """Return the place of an error in the tree; pydantic's own steps, such as members of a union, are left out."""
-    found: Path = ()
+    found: KeyPath = ()
     for step in error["loc"]:
         if at(node, (*found, step)) is not None:
             found = (*found, step)
@@ -245,7 +245,7 @@ def _locate(node: TreeNode, error: ErrorDetails) -> Path:
     return found
 
 
-def where(path: Path) -> str:
+def where(path: KeyPath) -> str:
     """Return how a map at `path` is called: "component 'gui'", "'inputs.teleop' of mux 'cmd_vel'"."""
     match path:
         case ():
@@ -258,7 +258,7 @@ def where(path: Path) -> str:
 
 
 def _unknown_key(
-    known: Iterable[str], node: TreeNode, path: Path, loc: Path, lacking: set[Path]
+    known: Iterable[str], node: TreeNode, path: KeyPath, loc: KeyPath, lacking: set[KeyPath]
 ) -> tuple[Finding, str]:
     """Return the finding for an unknown key, and the missing key that it is a misspelling of, if any."""
     key = str(loc[-1])
@@ -271,7 +271,7 @@ def _unknown_key(
     return finding, meant[0] if meant else ""
 
 
-def _finding(model: Any, node: TreeNode, path: Path, loc: Path, error: ErrorDetails) -> Finding:
+def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: ErrorDetails) -> Finding:
     name = _called((*path, *loc))
     value = at(node, loc)
     context = error.get("ctx", {})
@@ -324,7 +324,7 @@ def not_a_choice(span: Span, name: str, value: TreeNode | None, choices: list[st
     return finding if is_near else replace(finding, help="")  # the message lists all there are
 
 
-def _called(path: Path) -> str:
+def _called(path: KeyPath) -> str:
     """Return how a value is called: by its key, or by its list and number."""
     *above, last = path or ("this file",)
     return f"{above[-1]}[{last}]" if isinstance(last, int) and above else str(last)
@@ -352,24 +352,24 @@ def unit_finding(error: UnitError, node: TreeNode, name: str) -> Finding:
     return WRONG_TYPE.at(node.span, f"'{name}' {error.message}", label=label, help="" if is_word else error.help)
 
 
-def _slip(model: Any, node: TreeNode, path: Path, loc: Path, error: ErrorDetails) -> Finding | None:
+def _slip(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: ErrorDetails) -> Finding | None:
     """Return the finding about a slip, if the model has nothing against what it stands for."""
     refused_at = loc[:-1] if error["type"] == "missing" else loc
     written = at(node, refused_at)
     if written is None:
         return None
     for slip in value_slip.at(error["type"]):
-        repair = slip(Refused((*path, *loc), _finding(model, node, path, loc, error)), written)
+        repair = slip(RefusedValue((*path, *loc), _finding(model, node, path, loc, error)), written)
         if repair and _takes(model, _with(to_plain(node), refused_at, to_plain(repair.node)), loc):
             return repair.findings[0]
     return None
 
 
-def _with(data: object, path: Path, value: object) -> object:
+def _with(data: object, path: KeyPath, value: object) -> object:
     return changed(data, path, lambda _: value)
 
 
-def _takes(model: Any, data: object, loc: Path) -> bool:
+def _takes(model: Any, data: object, loc: KeyPath) -> bool:
     """Tell whether a model has nothing against what stands at `loc`."""
     try:
         _adapter(model).validate_python(data)

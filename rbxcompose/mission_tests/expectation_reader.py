@@ -25,7 +25,7 @@ from rbxcompose.mission_tests.model import (
     ExpectedValue,
 )
 from rbxcompose.mission_tests.scope import read_value
-from rbxcompose.mission_tests.sections import Context, entries_of
+from rbxcompose.mission_tests.sections import TrialContext, entries_of
 from rbxcompose.missions.analysis.held_nodes import brief
 from rbxcompose.missions.language.literals import literal
 from rbxcompose.msgs import registry
@@ -34,7 +34,7 @@ STEP_HELP = "write the name of a skill, a node or a state, such as '- go_to: cor
 ENDS = {one: one for one in (SUCCEEDS, FAILS, HALTED, SKIPPED)}
 
 
-def read_expect(context: Context, node: TreeNode | None, model: trials.ExpectModel) -> Expectations:
+def read_expect(context: TrialContext, node: TreeNode | None, model: trials.ExpectModel) -> Expectations:
     """Return what is expected."""
     root = node or MappingNode()
     _look_at_outcome(context, root, model)
@@ -55,7 +55,7 @@ def read_expect(context: Context, node: TreeNode | None, model: trials.ExpectMod
     return expect
 
 
-def _look_at_outcome(context: Context, root: TreeNode, model: trials.ExpectModel) -> None:
+def _look_at_outcome(context: TrialContext, root: TreeNode, model: trials.ExpectModel) -> None:
     report, ends = context.report, {**context.facts.ends, RUNS: RUNS}
     if model.outcome is not None and model.outcome not in ends:
         message = f"the mission '{context.program.name}' has no outcome '{model.outcome}'"
@@ -66,12 +66,12 @@ def _look_at_outcome(context: Context, root: TreeNode, model: trials.ExpectModel
         report.add(codes.NEVER.at(key_span(root, ("outcome",)), "every test of a mission ends", help=help_text))
 
 
-def _steps(context: Context, node: TreeNode | None) -> list[ExpectedStep]:
+def _steps(context: TrialContext, node: TreeNode | None) -> list[ExpectedStep]:
     items = node.items if isinstance(node, SequenceNode) else ()
     return [step for item in items if (step := _step(context, item))]
 
 
-def _step(context: Context, node: TreeNode) -> ExpectedStep | None:
+def _step(context: TrialContext, node: TreeNode) -> ExpectedStep | None:
     """Read one step: a word, or a map with one name beside `ended` and `at`."""
     entries = dict(entries_of(node))
     if isinstance(node, ScalarNode):
@@ -95,7 +95,7 @@ def _step(context: Context, node: TreeNode) -> ExpectedStep | None:
     return ExpectedStep(name, entry.key.span, arguments, _ended(context, name, entries), when, text, steps[name])
 
 
-def _ended(context: Context, name: str, entries: Mapping[str, Entry]) -> str:
+def _ended(context: TrialContext, name: str, entries: Mapping[str, Entry]) -> str:
     node = entries["ended"].value if "ended" in entries else None
     if node is None:
         return ""
@@ -107,7 +107,7 @@ def _ended(context: Context, name: str, entries: Mapping[str, Entry]) -> str:
     return word
 
 
-def _arguments(context: Context, name: str, node: TreeNode) -> dict[str, Value]:
+def _arguments(context: TrialContext, name: str, node: TreeNode) -> dict[str, Value]:
     """Return the arguments of a call that are expected; a single value is the main one."""
     if isinstance(node, ScalarNode) and node.plain and not node.text:
         return {}
@@ -128,7 +128,7 @@ def _arguments(context: Context, name: str, node: TreeNode) -> dict[str, Value]:
     return found
 
 
-def _counts(context: Context, node: TreeNode | None, counts: Mapping[str, int]) -> list[ExpectedValue]:
+def _counts(context: TrialContext, node: TreeNode | None, counts: Mapping[str, int]) -> list[ExpectedValue]:
     found = []
     for name, entry in entries_of(node):
         if name not in context.facts.steps:
@@ -141,7 +141,7 @@ def _counts(context: Context, node: TreeNode | None, counts: Mapping[str, int]) 
     return found
 
 
-def _data(context: Context, node: TreeNode | None) -> list[ExpectedValue]:
+def _data(context: TrialContext, node: TreeNode | None) -> list[ExpectedValue]:
     found = []
     for name, entry in entries_of(node):
         wanted = context.type_of_datum(name)
@@ -155,7 +155,9 @@ def _data(context: Context, node: TreeNode | None) -> list[ExpectedValue]:
     return found
 
 
-def _published(context: Context, node: TreeNode | None, models: Sequence[trials.SentModel]) -> list[ExpectedMessage]:
+def _published(
+    context: TrialContext, node: TreeNode | None, models: Sequence[trials.SentModel]
+) -> list[ExpectedMessage]:
     found = []
     for index, model in enumerate(models):
         span: Span = value_span(node or MappingNode(), (index, "topic"))
@@ -171,7 +173,7 @@ def _published(context: Context, node: TreeNode | None, models: Sequence[trials.
     return found
 
 
-def _fields(context: Context, topic: str, node: TreeNode | None) -> dict[str, Value]:
+def _fields(context: TrialContext, topic: str, node: TreeNode | None) -> dict[str, Value]:
     """Return the fields that are expected of a message; a single value stands for the only one."""
     if node is None:
         return {}

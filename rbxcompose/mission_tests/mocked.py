@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
 from rbxcompose.mission_tests.model import FAILS, SUCCEEDS, Mock, ValueSetting
 from rbxcompose.mission_tests.scope import TrialScope, agrees
-from rbxcompose.missions.engine.scopes import Values
+from rbxcompose.missions.engine.scopes import RobotValues
 from rbxcompose.missions.program.program import RobotNames
 from rbxcompose.missions.program.results import Result
 
@@ -81,7 +81,7 @@ class Mocked:
 class SetValues:
     """The values that a test has set, over those of the robot."""
 
-    def __init__(self, robot: RobotNames, inputs: Mapping[str, Value], below: Values | None = None) -> None:
+    def __init__(self, robot: RobotNames, inputs: Mapping[str, Value], below: RobotValues | None = None) -> None:
         self._robot = robot
         self._inputs = inputs
         self.below = below  # the robot's own, if it runs

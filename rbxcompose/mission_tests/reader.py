@@ -11,7 +11,7 @@ from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import resolve, shown_name
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.test_file import SECTIONS, TEST, TrialFile
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
@@ -19,10 +19,10 @@ from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, vali
 from rbxcompose.mission_tests import codes
 from rbxcompose.mission_tests.event_reader import PUBLISH, read_events
 from rbxcompose.mission_tests.expectation_reader import read_expect
-from rbxcompose.mission_tests.mission_facts import Facts
+from rbxcompose.mission_tests.mission_facts import MissionFacts
 from rbxcompose.mission_tests.mock_reader import read_mocks
 from rbxcompose.mission_tests.model import Mock, Trial, TrialEvent
-from rbxcompose.mission_tests.sections import Context
+from rbxcompose.mission_tests.sections import TrialContext
 from rbxcompose.missions.engine.inputs import bind_inputs
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.program import Program
@@ -31,7 +31,7 @@ from rbxcompose.plan.model import Plan
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class WrittenTrial:
     """The file of a test, before anything in it is understood; without `root` it cannot be read."""
 
     path: Path
@@ -41,7 +41,7 @@ class Written:
 
 
 @dataclass(slots=True)
-class Reading:
+class TrialReader:
     """Reads the tests of one run; each robot is compiled once, and its findings are told once.
 
     `sources` are the texts of all files, `report` has what is wrong with robots.
@@ -58,14 +58,14 @@ class Reading:
         written = self.open(path)
         return self.understand(written), written.report
 
-    def open(self, path: Path) -> Written:
+    def open(self, path: Path) -> WrittenTrial:
         """Return what is written in a file; a test without a name is called like its file."""
         report = Report()
         root = Documents(report, self.sources).read(path, TEST)
         name = root.get("name") if root else None
-        return Written(path, name.text if isinstance(name, ScalarNode) and name.text else path.name, root, report)
+        return WrittenTrial(path, name.text if isinstance(name, ScalarNode) and name.text else path.name, root, report)
 
-    def understand(self, written: Written) -> Trial | None:
+    def understand(self, written: WrittenTrial) -> Trial | None:
         """Return the test that is written, None if it cannot run; what is wrong is added to its report."""
         root, report = written.root, written.report
         if root is None:
@@ -119,7 +119,7 @@ def _no_robot(robot: str, which: str) -> str:
 def _without_values(root: MappingNode) -> MappingNode:
     """Return the header and the names of the sections; what these hold is looked at where it is read."""
     sections = {name: Entry(entry.key, ScalarNode("", entry.value.span)) for name, entry in root.entries.items()}
-    header = {name: entry for name, entry in root.entries.items() if name in Header.model_fields}
+    header = {name: entry for name, entry in root.entries.items() if name in ManifestHeader.model_fields}
     return replace(root, entries={**sections, **header})
 
 
@@ -146,7 +146,7 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
     names, program = robot.names, robot.missions[chosen.text].program
     linked = link(program, names.missions)
     inputs = _inputs(root, robot, chosen, program, report)
-    context = Context(robot, linked, names, Facts.of(linked, names), report)
+    context = TrialContext(robot, linked, names, MissionFacts.of(linked, names), report)
     sections = {key: validate(model, root.entries[key].value, (key,), report) for key, model in _there(root)}
     mocks = read_mocks(context, root.get("mocks"), sections.get("mocks") or {})
     events = read_events(context, root.get("events"), sections.get("events") or ())
@@ -175,7 +175,7 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
     )
 
 
-def _is_complete(facts: Facts, mocks: Mapping[str, Mock], events: tuple[TrialEvent, ...]) -> bool:
+def _is_complete(facts: MissionFacts, mocks: Mapping[str, Mock], events: tuple[TrialEvent, ...]) -> bool:
     """Tell whether the mission asks for nothing but what the test gives, and nothing goes over the bus."""
     deeds = [deed for event in events for deed in event.deeds]
     values = {name for deed in deeds for name in deed.settings} | {name for one in mocks.values() for name in one.sets}

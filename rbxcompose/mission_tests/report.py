@@ -9,8 +9,8 @@ from typing import Any
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.levels import Level
 from rbxcompose.mission_tests.coverage import Coverage
-from rbxcompose.mission_tests.judge import Problem
-from rbxcompose.mission_tests.record import Record
+from rbxcompose.mission_tests.judge import UnmetExpectation
+from rbxcompose.mission_tests.record import TrialRecord
 from rbxcompose.mission_tests.runner import Verdict
 from rbxcompose.printable import plain
 
@@ -60,7 +60,7 @@ class Teller:
     def trace(self, verdict: Verdict) -> str:
         """Return what happened, with each problem behind the line at which it shows."""
         record = verdict.record
-        placed: dict[int, list[Problem]] = {}
+        placed: dict[int, list[UnmetExpectation]] = {}
         for problem in verdict.problems:
             line = len(record.lines) - 1 if problem.line is None else problem.line
             placed.setdefault(line, []).append(problem)
@@ -75,13 +75,13 @@ class Teller:
             before = index
         return "\n".join(lines)
 
-    def _step(self, record: Record, index: int) -> str:
+    def _step(self, record: TrialRecord, index: int) -> str:
         line = record.lines[index]
         text = plain(line.text)
         told = text if line.level is Level.OK else self.paint("warn", text)
         return f"  {self.paint('time', f'{line.time:9.2f}')}  {told}"
 
-    def _problem(self, problem: Problem) -> str:
+    def _problem(self, problem: UnmetExpectation) -> str:
         where = f"  [{problem.span.file}:{problem.span.line}]" if problem.span else ""
         return f"  {self.paint('fail', f'{MARK:>9}  {plain(problem.message)}')}{where}"
 
@@ -98,7 +98,7 @@ class Teller:
         return "\n".join(lines)
 
 
-def _shown(count: int, placed: dict[int, list[Problem]]) -> Iterator[int]:
+def _shown(count: int, placed: dict[int, list[UnmetExpectation]]) -> Iterator[int]:
     """Yield which lines of a trace are shown: all, or of a long one its ends and what surrounds the problems."""
     near = {line + offset for line in placed for offset in range(-5, 6)}
     for index in range(count):

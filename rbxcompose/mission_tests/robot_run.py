@@ -12,7 +12,7 @@ from rbxcompose.expressions.values import NotArrived, Value
 from rbxcompose.manifest.test_file import LONGEST_TEST
 from rbxcompose.mission_tests.mocked import Mocked, SetValues
 from rbxcompose.mission_tests.model import EventDeed, Trial, TrialEvent
-from rbxcompose.mission_tests.record import Record
+from rbxcompose.mission_tests.record import TrialRecord
 from rbxcompose.mission_tests.watched_run import Setter, Watcher
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.world import World
@@ -36,7 +36,7 @@ class RobotRun:
     def __init__(self, trial: Trial, watcher: Watcher) -> None:
         self.trial = trial
         self.watcher = watcher
-        self.record = Record(trial.mission, trial.names.skills)
+        self.record = TrialRecord(trial.mission, trial.names.skills)
         self.mocked = Mocked(trial.mocks)
         self.values = SetValues(trial.names, trial.inputs)
         self.setter = Setter(trial, self.record, self.values)
@@ -64,7 +64,7 @@ class RobotRun:
         self.ended = ended
         return TrialWorld(self, world), robot
 
-    def run(self) -> Record:
+    def run(self) -> TrialRecord:
         """Run until the mission or the test has ended, and return what happened."""
         for event in self.events:
             self.bench.scheduler.at(event.at, OWNER, lambda event=event: self._happens(event))  # type: ignore[misc]

@@ -16,7 +16,7 @@ from rbxcompose.mission_tests.model import ValueSetting
 from rbxcompose.missions.analysis.scope_types import NodeScope, View
 from rbxcompose.missions.engine import value_text
 from rbxcompose.missions.engine.condition_watches import POSE as POSE_NAME
-from rbxcompose.missions.engine.scopes import Values
+from rbxcompose.missions.engine.scopes import RobotValues
 from rbxcompose.missions.language.argument_types import check_written
 from rbxcompose.missions.language.literals import WrongValue, literal, typed
 from rbxcompose.missions.language.spans import expression_of
@@ -30,7 +30,7 @@ CLOSE = 1e-6  # relative difference of numbers that are equal
 class TrialScope:
     """The inputs of the mission, or the arguments of a call before them, then the robot's values and places."""
 
-    def __init__(self, known: Mapping[str, Value], places: Mapping[str, Place], values: Values) -> None:
+    def __init__(self, known: Mapping[str, Value], places: Mapping[str, Place], values: RobotValues) -> None:
         self._known = known
         self._places = places
         self._values = values

@@ -9,7 +9,7 @@ from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode
 from rbxcompose.mission_tests import codes
-from rbxcompose.mission_tests.mission_facts import Facts
+from rbxcompose.mission_tests.mission_facts import MissionFacts
 from rbxcompose.mission_tests.model import ValueSetting
 from rbxcompose.mission_tests.scope import check_setting, names_of, setting_of
 from rbxcompose.missions.program.program import Program, RobotNames
@@ -17,13 +17,13 @@ from rbxcompose.model.robot import Robot
 
 
 @dataclass(frozen=True, slots=True)
-class Context:
+class TrialContext:
     """The robot and the mission that a test is about, what is known of them, and where mistakes go."""
 
     robot: Robot
     program: Program
     names: RobotNames
-    facts: Facts
+    facts: MissionFacts
     report: Report
 
     def settings(self, node: TreeNode | None, known: Mapping[str, Type]) -> dict[str, ValueSetting]:

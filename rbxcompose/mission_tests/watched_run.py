@@ -8,7 +8,7 @@ from typing import Protocol
 from rbxcompose.expressions.values import EvaluationError, NotArrivedError, Value
 from rbxcompose.mission_tests.mocked import SetValues
 from rbxcompose.mission_tests.model import Trial, ValueSetting
-from rbxcompose.mission_tests.record import Record
+from rbxcompose.mission_tests.record import TrialRecord
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.value_text import show_briefly
 from rbxcompose.missions.engine.world import Observer
@@ -25,7 +25,7 @@ class Watcher(Observer, Protocol):
 class Setter:
     """Sets values for a test and tells it; an expression without a value is the end of the test."""
 
-    def __init__(self, trial: Trial, record: Record, values: SetValues) -> None:
+    def __init__(self, trial: Trial, record: TrialRecord, values: SetValues) -> None:
         self.trial = trial
         self.record = record
         self.values = values

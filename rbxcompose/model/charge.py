@@ -10,7 +10,7 @@ from rbxcompose.expressions.tree import Comparison, Variable
 from rbxcompose.missions.analysis.facts import Constants, constants_of, number_in
 from rbxcompose.missions.analysis.travel_times import Driving, Ways
 from rbxcompose.missions.program.program import Interrupt, MissionNode
-from rbxcompose.model.flow import Flow
+from rbxcompose.model.flow import MessageFlow
 from rbxcompose.model.robot import Robot, RobotComponent, RobotMission
 from rbxcompose.sdk.capabilities import Charges, CommandsMotion, Drains, Navigates
 
@@ -72,7 +72,7 @@ def _is_served(robot: Robot, skill: str, component: RobotComponent, port: str) -
 def top_speed(robot: Robot, driver: RobotComponent, navigates: Navigates) -> float:
     """Return how fast the robot drives to a place at most [m/s], infinite if nobody says."""
     limits = [navigates.max_speed, *(one.max_speed for one in driver.declared(CommandsMotion))]
-    limits += [one.drives.max_speed for one in Flow(robot).drives() if one.driver is driver]
+    limits += [one.drives.max_speed for one in MessageFlow(robot).drives() if one.driver is driver]
     return min((limit.value for limit in limits if limit), default=math.inf)
 
 

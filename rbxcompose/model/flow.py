@@ -26,7 +26,7 @@ class Drive:
 
 
 @dataclass(frozen=True, slots=True)
-class Flow:
+class MessageFlow:
     """Which messages of a robot reach whom."""
 
     robot: Robot

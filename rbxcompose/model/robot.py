@@ -13,7 +13,7 @@ from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span
 from rbxcompose.levels import Level
 from rbxcompose.manifest.registry import naming
-from rbxcompose.manifest.tree import Path, at, key_span, value_span
+from rbxcompose.manifest.tree import KeyPath, at, key_span, value_span
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource
 from rbxcompose.model.wires import PortEnd
@@ -37,7 +37,7 @@ class RobotComponent:
     process: str
     starts_after: tuple[str, ...]
     ends: tuple[PortEnd, ...]
-    path: Path = ()
+    path: KeyPath = ()
     restart: Restart = DEFAULT
     log: Level = Level.OK  # the least of what goes to the log
     capabilities: tuple[Capability, ...] = ()

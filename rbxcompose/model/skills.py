@@ -8,7 +8,7 @@ from typing import Any
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.missions.program.goals import service_skill, skill_of, topic_skill
 from rbxcompose.missions.program.program import Program, Skill
-from rbxcompose.missions.program.sources import Orders, OrderTopic, SkillSource, TopicSource, Way
+from rbxcompose.missions.program.sources import Orders, OrderTopic, SkillSource, SkillWay, TopicSource
 from rbxcompose.model.robot import RobotComponent
 from rbxcompose.model.wires import PortEnd
 from rbxcompose.plugins import BrokenPluginError
@@ -56,7 +56,7 @@ def _services(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]
         if isinstance(end.port, Serves) and end.port.interface is not None:
             skill = service_skill(end.port.interface, end.topic.rsplit("/", 1)[-1])
             if skill is not None:
-                yield SkillSource(skill, end.type_name, end.topic, Way.SERVICE)
+                yield SkillSource(skill, end.type_name, end.topic, SkillWay.SERVICE)
 
 
 def _topics(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
@@ -67,7 +67,7 @@ def _topics(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
         told = port.ends.interface if port.ends is not None else None
         name = end.topic.rsplit("/", 1)[-1]
         skill = topic_skill(port.interface, name, told, port.claims, port.restartable, outcomes=port.outcomes)
-        yield SkillSource(skill, end.type_name, end.topic, Way.TOPIC, _orders(components, end, port))
+        yield SkillSource(skill, end.type_name, end.topic, SkillWay.TOPIC, _orders(components, end, port))
 
 
 def _orders(components: Mapping[str, RobotComponent], end: PortEnd, port: ServesTopic[Any]) -> Orders:
@@ -94,7 +94,7 @@ def python_skills(names: Iterable[str]) -> list[SkillSource]:
     found = []
     for name in sorted(set(names) & set(skill_names())):
         try:
-            found.append(SkillSource(as_skill(skill_type(name)), "", "", Way.PYTHON))
+            found.append(SkillSource(as_skill(skill_type(name)), "", "", SkillWay.PYTHON))
         except BrokenPluginError:  # a mission that uses it is told that nobody provides it
             continue
     return found

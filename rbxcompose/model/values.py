@@ -11,7 +11,7 @@ from rbxcompose.model.robot import RobotComponent
 from rbxcompose.model.wires import PortEnd, resolve
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.ports import In, Out
-from rbxcompose.sections.values import Value as ValueEntry
+from rbxcompose.sections.values import ValueModel
 from rbxcompose.units import UNITS
 
 # The message that carries data from outside, where nobody in the robot says which it is.
@@ -24,7 +24,7 @@ DATA = "data"  # the field of the standard messages
 
 
 def value_of(
-    entry: ValueEntry,
+    entry: ValueModel,
     components: Mapping[str, RobotComponent],
     ends: Iterable[PortEnd],
     namespace: str,

@@ -34,7 +34,7 @@ VERSION = 1
 VERSION_KEY = "rbxcompose_plan"
 
 
-Order = Callable[[Iterable[tuple[str, Any]]], list[tuple[str, Any]]]  # brings the entries of a map in order
+EntryOrder = Callable[[Iterable[tuple[str, Any]]], list[tuple[str, Any]]]  # brings the entries of a map in order
 
 
 class PlanTextError(ValueError):
@@ -76,7 +76,7 @@ def load(text: str) -> Plan:
     return plan
 
 
-def _encode(value: Any, hint: Any, order: Order) -> Any:
+def _encode(value: Any, hint: Any, order: EntryOrder) -> Any:
     """Return a value of a field's type as data for JSON."""
     hint = _plain_hint(hint)
     if hint in (Any, object):

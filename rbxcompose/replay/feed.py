@@ -23,8 +23,8 @@ from rbxcompose.msgs.std_msgs import Float64, String
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.tape import INSTANTS, ORDERS
 from rbxcompose.replay.aliases import Aliases
-from rbxcompose.replay.services import Known, Services
-from rbxcompose.replay.stage import Fed, Stage
+from rbxcompose.replay.services import Known, ReplayedServices
+from rbxcompose.replay.stage import Fed, ReplayStage
 from rbxcompose.requests import Refused
 from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.scheduler import Scheduler
@@ -32,7 +32,7 @@ from rbxcompose.scheduler import Scheduler
 LAST = "\U0010ffff"  # an owner whose events come after those of all others
 
 
-class Feed:
+class ReplayFeed:
     """Goes through the records of a run, once; those of the component itself go to `expect`."""
 
     def __init__(
@@ -40,8 +40,8 @@ class Feed:
         records: Iterator[Recorded],
         name: str,
         domain: int,
-        stage: Stage,
-        services: Services,
+        stage: ReplayStage,
+        services: ReplayedServices,
         aliases: Aliases,
         expect: Callable[[Recorded], None],
     ) -> None:

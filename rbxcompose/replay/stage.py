@@ -35,7 +35,7 @@ class Fed:
 
 
 @dataclass(slots=True)
-class Stage(NoTransport):
+class ReplayStage(NoTransport):
     """A transport whose other side is a recording. Keys are those of topics and services."""
 
     scheduler: Scheduler
@@ -89,7 +89,9 @@ class Stage(NoTransport):
 class StageBus(Bus):
     """The bus of one component. What its host says of it reaches nobody: the recording has what the whole host said."""
 
-    def __init__(self, scheduler: Scheduler, clock: Clock, plan: Plan, owner: str, stage: Stage, tape: Tape) -> None:
+    def __init__(
+        self, scheduler: Scheduler, clock: Clock, plan: Plan, owner: str, stage: ReplayStage, tape: Tape
+    ) -> None:
         names, wire = plan.bus, plan.bus.wire
         super().__init__(
             scheduler,

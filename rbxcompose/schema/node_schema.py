@@ -14,7 +14,7 @@ from rbxcompose.missions.language.layout import Nobody
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.value_reader import UNREADABLE
 from rbxcompose.missions.modifiers.registry import modifiers
-from rbxcompose.missions.program.messages import Message
+from rbxcompose.missions.program.messages import MessageTemplate
 from rbxcompose.missions.program.modifier import Modifier
 from rbxcompose.missions.program.moments import Moments
 from rbxcompose.missions.program.registry import StepType
@@ -95,12 +95,12 @@ class Asking(NodeReader):
         self.schemas[key] = {"type": "object", "minProperties": 1, "additionalProperties": NODE}
         return ()
 
-    def message(self, target: str, body: str) -> Message:
+    def message(self, target: str, body: str) -> MessageTemplate:
         """Note a name and what is sent."""
         self.schemas[target] = {"type": "string", "minLength": 1}
         self.schemas[body] = ANYTHING
         self.optional.add(body)
-        return Message(ScalarNode("", MappingNode().span), None)
+        return MessageTemplate(ScalarNode("", MappingNode().span), None)
 
     def moments(self, keys: Iterable[str]) -> Moments:
         """Note hooks, each of which may be missing."""

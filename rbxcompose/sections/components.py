@@ -12,7 +12,7 @@ from rbxcompose.findings import SIMILAR, Report, Span, kind
 from rbxcompose.manifest.options import OPTIONS, ComponentOptions
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.renamer import Renames
-from rbxcompose.manifest.section import Contents, Reading, Scope
+from rbxcompose.manifest.section import Contents, Reading, SetScope
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, label_of, validate
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
@@ -114,7 +114,7 @@ def _details(read: Mapping[str, ComponentEntry]) -> dict[str, str]:
     runs=True,
     entry="component",
     needs="type",
-    scope=Scope.BARE,
+    scope=SetScope.BARE,
     models=_models,
     rename=_rename,
     topics=_topics,

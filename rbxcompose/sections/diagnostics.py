@@ -19,7 +19,7 @@ from rbxcompose.references import ANALYZER, RUNNING, Refers
 Pattern = Annotated[str, Refers(RUNNING, is_told=True)]
 
 
-class Analyzer(Config):
+class AnalyzerModel(Config):
     """One group of statuses."""
 
     match: tuple[Pattern, ...] = Field(min_length=1)
@@ -30,10 +30,10 @@ class Analyzer(Config):
     """Names that must report, whatever matches."""
 
 
-class Diagnostics(Config):
+class DiagnosticsModel(Config):
     """How the states of components are grouped."""
 
-    analyzers: dict[Name, Analyzer] = {}
+    analyzers: dict[Name, AnalyzerModel] = {}
     """Groups by name."""
 
 
@@ -68,14 +68,14 @@ def _pattern(renames: Renames, pattern: str) -> list[str]:
 
 @section(
     "diagnostics",
-    Diagnostics,
+    DiagnosticsModel,
     order=60,
     names=ANALYZER,
     at=("analyzers",),
     shared=((), ("analyzers",)),
     rename=_rename,
 )
-def diagnostics(reading: Reading[Diagnostics]) -> Diagnostics:
+def diagnostics(reading: Reading[DiagnosticsModel]) -> DiagnosticsModel:
     """How the states of components are grouped: each group is OK, WARN, ERROR or STALE.
 
     Example:
@@ -88,8 +88,8 @@ def diagnostics(reading: Reading[Diagnostics]) -> Diagnostics:
     """
     node = reading.node
     if not isinstance(node, MappingNode):
-        return reading.whole() or Diagnostics()
+        return reading.whole() or DiagnosticsModel()
     others = {name: entry for name, entry in node.entries.items() if name != "analyzers"}
-    validate(Diagnostics, replace(node, entries=others), ("diagnostics",), reading.report)
-    found = ((name, reading.valid(Analyzer, name, entry.value)) for name, entry in reading.named())
-    return Diagnostics(analyzers={name: read for name, read in found if read is not None})
+    validate(DiagnosticsModel, replace(node, entries=others), ("diagnostics",), reading.report)
+    found = ((name, reading.valid(AnalyzerModel, name, entry.value)) for name, entry in reading.named())
+    return DiagnosticsModel(analyzers={name: read for name, read in found if read is not None})

@@ -24,7 +24,7 @@ INPUT = "input"
 """An input of the mission that an entry names."""
 
 
-class Mission(Config):
+class MissionModel(Config):
     """A mission that the robot has."""
 
     file: FileName
@@ -49,8 +49,8 @@ def _details(read: Mapping[str, MissionEntry]) -> dict[str, str]:
     return dict.fromkeys(read, "mission")
 
 
-@section("missions", Mission, order=90, names=MISSION, entry="mission", short=Short("file"), details=_details)
-def missions(reading: Reading[Mission]) -> dict[str, MissionEntry]:
+@section("missions", MissionModel, order=90, names=MISSION, entry="mission", short=Short("file"), details=_details)
+def missions(reading: Reading[MissionModel]) -> dict[str, MissionEntry]:
     """Missions that the robot has, by name: their files, and the values of their inputs.
 
     Example:
@@ -64,9 +64,9 @@ def missions(reading: Reading[Mission]) -> dict[str, MissionEntry]:
     return {name: one for name, one in found if one is not None}
 
 
-def _mission(reading: Reading[Mission], name: str, entry: Entry) -> MissionEntry | None:
+def _mission(reading: Reading[MissionModel], name: str, entry: Entry) -> MissionEntry | None:
     node = entry.value
-    read = reading.valid(Mission, name, node)
+    read = reading.valid(MissionModel, name, node)
     if read is None or not isinstance(node, MappingNode):
         return None
     _refuse_secrets(node, reading.report)

@@ -24,7 +24,7 @@ from rbxcompose.bus.goals import GoalState
 ROBOT = "robot itself"  # whom a stop or a release is told first; each process hears of it a little later
 ROUNDING = 1e-6  # a velocity this small is rest [m/s, rad/s]
 
-Velocity = tuple[float, float]  # forwards [m/s], turning [rad/s]
+PlanarVelocity = tuple[float, float]  # forwards [m/s], turning [rad/s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Base:
     process: str
     timeout: float
     cycle: float
-    deceleration: Velocity  # [m/s^2], [rad/s^2]
+    deceleration: PlanarVelocity  # [m/s^2], [rad/s^2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ class SentVelocity:
 
     time: float
     topic: str
-    velocity: Velocity
+    velocity: PlanarVelocity
 
     @property
     def is_finite(self) -> bool:
@@ -152,7 +152,7 @@ def unwarranted_motion(base: Base, story: ObservedStory, slack: float) -> Iterat
     force = base.timeout + 2 * base.cycle + slack  # for how long it may follow what was sent
     deadline = commanded = -math.inf  # until when it may follow a command; when the last one was sent
     is_stopped, told = False, math.inf  # when it told its motion last
-    fastest: Velocity = (0.0, 0.0)
+    fastest: PlanarVelocity = (0.0, 0.0)
     for event in story:
         match event:
             case Ordered(time, process, "stop" | "brake") if process == base.process:
@@ -241,7 +241,7 @@ class _Input:
         if not self._is_held:
             self._counting.append(sent.time)
 
-    def has_sent(self, velocity: Velocity, since: float) -> bool:
+    def has_sent(self, velocity: PlanarVelocity, since: float) -> bool:
         return any(one.velocity == velocity and one.time >= since - ROUNDING for one in self._recent)
 
     def spoke_before(self, time: float) -> float:

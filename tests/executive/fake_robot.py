@@ -19,7 +19,7 @@ from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.goals import skill_of
 from rbxcompose.missions.program.program import Program, Skill
-from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource, Way
+from rbxcompose.missions.program.sources import SkillSource, SkillWay, TopicSource, ValueSource
 from rbxcompose.model.skills import python_skills
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
@@ -183,7 +183,7 @@ class Robot:
                     Skill("switch", {"data": FLAG}, "data", results={"message": TEXT}),
                     "std_srvs/srv/SetBool",
                     "switch",
-                    Way.SERVICE,
+                    SkillWay.SERVICE,
                 ),
                 **{one.skill.name: one for one in python_skills(["say", "toy_count", "toy_raise", "toy_slow"])},
             },

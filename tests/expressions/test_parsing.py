@@ -14,7 +14,7 @@ from rbxcompose.expressions.tree import (
     Comparison,
     ExpressionError,
     ExpressionNode,
-    Field,
+    FieldAccess,
     Index,
     Junction,
     Membership,
@@ -46,7 +46,7 @@ def shape(node: ExpressionNode) -> str:
             return f"({f' {operator} '.join(below)})"
         case Membership():
             return f"({below[0]} in {below[1]})"
-        case Field(name=name):
+        case FieldAccess(name=name):
             return f"{below[0]}.{name}"
         case Index():
             return f"{below[0]}[{below[1]}]"

@@ -15,7 +15,7 @@ from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.types import Message
 from rbxcompose.qos import Qos
-from rbxcompose.testing.invariants import SentVelocity, Velocity
+from rbxcompose.testing.invariants import PlanarVelocity, SentVelocity
 
 COMMAND, MOTION = "cmd_vel", "odom"
 PATIENCE = 20.0  # [s]
@@ -46,7 +46,7 @@ class Observer:
         key = data_key(0, topic, message.TYPE, message.HASH)
         self._transport.subscribe(key, qos, lambda arrival: take(decode(message, arrival.payload)))
 
-    def _follow(self, topic: str, message: type[M], qos: Qos, velocity: Callable[[M], Velocity]) -> None:
+    def _follow(self, topic: str, message: type[M], qos: Qos, velocity: Callable[[M], PlanarVelocity]) -> None:
         self.listen(
             topic, message, qos, lambda one: self.story.append(SentVelocity(time.monotonic(), topic, velocity(one)))
         )

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.composition.history import History, Step
+from rbxcompose.composition.history import History, HistoryStep
 from rbxcompose.composition.overlay import compose, settled
 from rbxcompose.composition.set_options import read_sets
 from rbxcompose.findings import Report, Span
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import BROKEN, Entry, MappingNode, Path, ScalarNode, TreeNode, at, children, value_span
+from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at, children, value_span
 from rbxcompose.manifest.validate import to_plain
 
 HERE = Span("f", 1, 1, 1, 2)
@@ -100,7 +100,7 @@ def test_overlays_that_have_no_name_in_common_may_come_in_any_order(base: object
 def test_the_history_of_a_value_ends_with_the_one_that_holds(base: object, layers: list[object]) -> None:
     history = History()
     tree = a_map(base)
-    history.write((), Step("base", tree, tree.span))
+    history.write((), HistoryStep("base", tree, tree.span))
     for number, layer in enumerate(layers):
         tree = compose(tree, [(a_map(layer), f"layer {number}")], Report(), history)
     for path, node in below(tree):
@@ -111,7 +111,7 @@ def test_the_history_of_a_value_ends_with_the_one_that_holds(base: object, layer
             assert ([step.layer for step in steps], steps[-1].node) == (wrote, node)
 
 
-def below(node: TreeNode, path: Path = ()) -> Iterator[tuple[Path, TreeNode]]:
+def below(node: TreeNode, path: KeyPath = ()) -> Iterator[tuple[KeyPath, TreeNode]]:
     for key, child in children(node):
         yield (*path, key), child
         yield from below(child, (*path, key))

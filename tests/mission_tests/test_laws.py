@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rbxcompose.manifest.tree import NOWHERE
 from rbxcompose.mission_tests.judge import judge
 from rbxcompose.mission_tests.model import Expectations, ExpectedStep, Trial
-from rbxcompose.mission_tests.record import Done, Record
+from rbxcompose.mission_tests.record import Done, TrialRecord
 from rbxcompose.mission_tests.runner import run_trial
 from tests.mission_tests.trying import Trying
 
@@ -47,11 +47,11 @@ TEXTS = st.builds(
 )
 
 
-def told(record: Record) -> list[tuple[float, str]]:
+def told(record: TrialRecord) -> list[tuple[float, str]]:
     return [(line.time, line.text) for line in record.lines]
 
 
-def expecting(trial: Trial, record: Record) -> Trial:
+def expecting(trial: Trial, record: TrialRecord) -> Trial:
     """Return a test that expects just what happened."""
     span = trial.span
     steps = tuple(
@@ -82,9 +82,9 @@ ENDS = st.sampled_from(["success", "failure", "halted"])
 DONE = st.lists(st.tuples(NAMES, ENDS), max_size=12)
 
 
-def recorded(done: list[tuple[str, str]]) -> Record:
+def recorded(done: list[tuple[str, str]]) -> TrialRecord:
     steps = [Done(name, name, {}, float(time), -1, ended) for time, (name, ended) in enumerate(done)]
-    return Record("m", {}, steps=steps)
+    return TrialRecord("m", {}, steps=steps)
 
 
 @given(done=DONE, data=st.data())

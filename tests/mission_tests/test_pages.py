@@ -9,7 +9,7 @@ import pytest
 
 from rbxcompose.config import Config
 from rbxcompose.manifest.test_file import EventModel, ExpectModel, MockModel, TrialFile
-from rbxcompose.mission_tests.reader import Reading
+from rbxcompose.mission_tests.reader import TrialReader
 from rbxcompose.mission_tests.runner import run_trial
 from rbxcompose.rendering.text import render_text
 from rbxcompose.schema.documents import files
@@ -25,7 +25,7 @@ def test_a_test_on_a_page_passes(block: Block, tmp_path: Path) -> None:
     (tmp_path / "tests" / "pages").mkdir(parents=True)
     path = tmp_path / "tests" / "pages" / "shown.test.yaml"
     path.write_text(block.text, encoding="utf-8")
-    reading = Reading({})
+    reading = TrialReader({})
     trial, report = reading.read(path)
     assert trial is not None, render_text(report, reading.sources)
     assert trial.is_complete

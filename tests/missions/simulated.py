@@ -15,7 +15,7 @@ from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
-from rbxcompose.missions.engine.story import Story
+from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, Settings
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
@@ -88,7 +88,7 @@ class Simulated:
         self.calls: dict[str, int] = {}
         self.events: list[tuple[float, MissionEvent]] = []
         self.told: list[str] = []
-        self.story = Story("test", SKILLS)
+        self.story = MissionStory("test", SKILLS)
         self.changes: list[tuple[float, Callable[[], None]]] = []
         defaults = {name: one.default.value for name, one in self.program.inputs.items() if one.default}
         self.engine = Engine(self.program, self.robot, {**defaults, **self.inputs}, self, self.settings)

@@ -97,7 +97,7 @@ class SimulatedProcess(Turned):
             self._is_at_rest = True
             self._say(say.AtRest())
 
-    def handle(self, order: say.Order) -> None:
+    def handle(self, order: say.ChannelOrder) -> None:
         """Carry out what the conductor wants."""
         host = self.host
         match order:
@@ -164,7 +164,7 @@ class SimulatedProcess(Turned):
         if record.text == "restarted":  # a component began anew, which has forgotten what it knew
             self._told("restart")
 
-    def _say(self, word: say.Word) -> None:
+    def _say(self, word: say.ChannelWord) -> None:
         self.robot.hear(self.name, self.session, word)
 
 
@@ -243,7 +243,7 @@ class WholeRobot:
         """Have something run by the supervisor, at this instant."""
         self.scheduler.at(self.clock.now(), "supervisor", callback)
 
-    def hear(self, name: str, session: str, word: say.Word) -> None:
+    def hear(self, name: str, session: str, word: say.ChannelWord) -> None:
         """Bring a word of a process to the conductor."""
 
         def heard() -> None:
@@ -261,7 +261,7 @@ class WholeRobot:
     def fork(self, process: str, *, is_restart: bool, is_stopped: bool) -> None:
         self.processes[process] = SimulatedProcess(self, process, is_restart=is_restart, is_stopped=is_stopped)
 
-    def send(self, process: str, message: say.Order) -> None:
+    def send(self, process: str, message: say.ChannelOrder) -> None:
         if (found := self.processes.get(process)) is not None:
             found.post("", lambda: found.handle(message))
 

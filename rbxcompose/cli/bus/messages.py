@@ -18,7 +18,7 @@ from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, key_span, value_span
 from rbxcompose.msgs import registry
-from rbxcompose.msgs.plain import Path, from_plain
+from rbxcompose.msgs.plain import KeyPath, from_plain
 from rbxcompose.msgs.types import Interface, Message
 from rbxcompose.printable import FORBIDDEN
 
@@ -47,11 +47,11 @@ class _Places:
 
     root: TreeNode
 
-    def key(self, path: Path) -> Span:
+    def key(self, path: KeyPath) -> Span:
         """Return the place of a key."""
         return key_span(self.root, path)
 
-    def value(self, path: Path) -> Span:
+    def value(self, path: KeyPath) -> Span:
         """Return the place of a value."""
         return value_span(self.root, path)
 

@@ -21,7 +21,7 @@ from rbxcompose.inspection.mission_graphs import mission_dot, mission_mermaid
 from rbxcompose.inspection.mission_html import mission_html
 from rbxcompose.inspection.mission_text import mission_text
 from rbxcompose.missions.program.program import Skill
-from rbxcompose.missions.program.sources import SkillSource, Way
+from rbxcompose.missions.program.sources import SkillSource, SkillWay
 from rbxcompose.missions.program.statuses import IDLE, NAMES
 from rbxcompose.missions.view.mirror import joined, status_list
 from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of
@@ -135,7 +135,7 @@ def _ends(skill: Skill) -> str:
 
 
 def _how(source: SkillSource) -> str:
-    words = [f"{source.way} {source.topic}" if source.way is not Way.PYTHON else "Python"]
+    words = [f"{source.way} {source.topic}" if source.way is not SkillWay.PYTHON else "Python"]
     words += [] if source.skill.restartable else ["cannot be restarted"]
     return ", ".join([*words, *(["can pause"] if source.skill.pausable else [])])
 

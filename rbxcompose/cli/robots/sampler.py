@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from rbxcompose.bus.graph import Graph, GraphEnd, Name
-from rbxcompose.cli.bus.guest import Guest, Heard
+from rbxcompose.bus.graph import Graph, GraphEnd, GraphName
+from rbxcompose.cli.bus.guest import Guest, HeardMessage
 from rbxcompose.cli.missions.replicas import MissionsSeen
 from rbxcompose.cli.robots.lookup import known_state
 from rbxcompose.cli.robots.picture import MOST_WARNINGS, ComponentPicture, Load, RobotPicture, Tree
@@ -93,7 +93,7 @@ class Sampler:
         active = {name: seen for name, seen in self._missions.by_name.items() if seen["state"] in ACTIVE}
         return [_tree(name, seen) for name, seen in sorted(active.items())]
 
-    def _heard(self, topic: str, heard: Heard) -> None:
+    def _heard(self, topic: str, heard: HeardMessage) -> None:
         self._counts[heard.sender] += 1
         if topic == _HEALTH:
             self._healthy(heard)
@@ -101,7 +101,7 @@ class Sampler:
             charge = _charge(gauge, heard)
             self._charges |= {} if charge is None else {topic: charge}
 
-    def _healthy(self, heard: Heard) -> None:
+    def _healthy(self, heard: HeardMessage) -> None:
         if heard.kind.type != DiagnosticArray.TYPE:
             return
         try:
@@ -158,7 +158,7 @@ class Sampler:
         )
 
 
-def _is_light(topic: Name) -> bool:
+def _is_light(topic: GraphName) -> bool:
     return all(end.qos is not None and end.qos.is_reliable and not end.qos.is_transient_local for end in topic.givers)
 
 
@@ -166,7 +166,7 @@ def _component(end: GraphEnd) -> str:
     return end.node.rpartition("/")[2]
 
 
-def _charge(gauge: Gauge, heard: Heard) -> float | None:
+def _charge(gauge: Gauge, heard: HeardMessage) -> float | None:
     """Return the charge that a message tells (a ratio); None if it tells none."""
     try:
         message = decode(registry.message(heard.kind.type), heard.arrival.payload)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.doctor.facts import Facts
+from rbxcompose.doctor.facts import HostFacts
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, kind
 from rbxcompose.model.robot import Robot
@@ -30,7 +30,7 @@ Good: `port: /dev/serial/by-id/...`, and `sudo usermod -aG dialout $USER`
 
 
 @examination
-def devices(facts: Facts) -> Iterator[str | Finding]:
+def devices(facts: HostFacts) -> Iterator[str | Finding]:
     """Look whether each device is there and may be opened."""
     named = {device: (robot, component) for robot in facts.robots for component, device in _named(robot)}
     for device, (robot, component) in sorted(named.items()):

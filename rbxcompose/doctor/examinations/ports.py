@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.doctor.facts import Facts, Listener, Running
+from rbxcompose.doctor.facts import HostFacts, Listener, RunningRobot
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
@@ -36,7 +36,7 @@ Good: `rbxcompose down`, then `rbxcompose up`
 
 
 @examination
-def ports(facts: Facts) -> Iterator[str | Finding]:
+def ports(facts: HostFacts) -> Iterator[str | Finding]:
     """Look at the routers of robots that are up, and at the port that the named robot wants."""
     for one in facts.running:
         yield from _router(one, facts)
@@ -57,7 +57,7 @@ def ports(facts: Facts) -> Iterator[str | Finding]:
         )
 
 
-def _router(one: Running, facts: Facts) -> Iterator[str | Finding]:
+def _router(one: RunningRobot, facts: HostFacts) -> Iterator[str | Finding]:
     if one.state is None or one.state.router is None or "router" not in one.state.processes:
         return  # it uses a router from elsewhere, or none is known
     if not one.state.is_supervised:

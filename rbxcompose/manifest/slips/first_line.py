@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rbxcompose.findings import Fix, replacement
-from rbxcompose.manifest.slips import Refused, value_slip
+from rbxcompose.manifest.slips import RefusedValue, value_slip
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.slips import Repair
 
@@ -13,7 +13,7 @@ KEY, VERSION = "rbx", "1"
 
 
 @value_slip("missing")
-def first_line(place: Refused, node: TreeNode) -> Repair[TreeNode] | None:
+def first_line(place: RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise it; there is a fix if the first key of the file is known, and begins its line."""
     if place.path != (KEY,) or not isinstance(node, MappingNode):
         return None

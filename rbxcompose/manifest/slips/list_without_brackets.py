@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rbxcompose.manifest.brackets import bracketed, without_brackets
-from rbxcompose.manifest.slips import Refused, value_slip
+from rbxcompose.manifest.slips import RefusedValue, value_slip
 from rbxcompose.manifest.tree import ScalarNode, SequenceNode, TreeNode
 from rbxcompose.slips import Repair
 
 
 @value_slip("list_type", "tuple_type")
-def list_without_brackets(place: Refused, node: TreeNode) -> Repair[TreeNode] | None:
+def list_without_brackets(place: RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise one item or several where a list belongs."""
     found = without_brackets(node)
     if not found or not isinstance(node, ScalarNode):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from rbxcompose.missions.language.asked import Assignment
-from rbxcompose.missions.program.messages import Message
+from rbxcompose.missions.program.messages import MessageTemplate
 from rbxcompose.missions.program.moments import Deeds
 from rbxcompose.missions.program.program import MissionNode, Program
 
@@ -17,14 +17,14 @@ def assignments(node: MissionNode) -> Iterator[Assignment]:
         yield from deeds.assignments
 
 
-def published(node: MissionNode) -> Iterator[Message]:
+def published(node: MissionNode) -> Iterator[MessageTemplate]:
     """Yield the messages that a node publishes."""
     if message := node.step.effects.published:
         yield message
     yield from (deeds.message for deeds in _deeds(node) if deeds.message)
 
 
-def called(node: MissionNode) -> Iterator[Message]:
+def called(node: MissionNode) -> Iterator[MessageTemplate]:
     """Yield the request that a node makes."""
     if request := node.step.effects.called:
         yield request

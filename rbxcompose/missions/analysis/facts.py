@@ -10,7 +10,7 @@ from rbxcompose.expressions.tree import (
     Expression,
     ExpressionError,
     ExpressionNode,
-    Field,
+    FieldAccess,
     Index,
     Number,
     Variable,
@@ -98,7 +98,7 @@ def is_simple(node: MissionNode) -> bool:
     """Tell whether the conditions of a node can always be asked."""
     # An item that is not there, or a division by zero, would be a failure.
     trees = (asked.expression.tree for asked in node.asked)
-    return not any(isinstance(part, Index | Field | Arithmetic) for tree in trees for part, _ in walk(tree))
+    return not any(isinstance(part, Index | FieldAccess | Arithmetic) for tree in trees for part, _ in walk(tree))
 
 
 def is_sure(node: MissionNode, program: Program) -> bool:
@@ -108,7 +108,7 @@ def is_sure(node: MissionNode, program: Program) -> bool:
     if others and not others <= {one.item for one in program.nodes}:
         return False
     parts = (part for asked in node.asked for part, _ in walk(asked.expression.tree))
-    return not any(isinstance(part, Index | Field) or _divides(part) for part in parts)
+    return not any(isinstance(part, Index | FieldAccess) or _divides(part) for part in parts)
 
 
 def _divides(part: ExpressionNode) -> bool:

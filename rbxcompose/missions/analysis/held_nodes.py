@@ -5,53 +5,53 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from rbxcompose.expressions.tree import Expression, ExpressionNode, Field, Index, Variable
+from rbxcompose.expressions.tree import Expression, ExpressionNode, FieldAccess, Index, Variable
 from rbxcompose.expressions.values import Value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 
 ANY = None  # stands for any entry of a list or a map
 ITEM = ""  # stands for any item of a list that a loop goes through; of a map it goes through the keys
-Key = tuple[str, ...]  # where a node stands in the data: ("chores", "kitchen", "0")
-Pattern = tuple[str | None, ...]
+NodeKey = tuple[str, ...]  # where a node stands in the data: ("chores", "kitchen", "0")
+PathPattern = tuple[str | None, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class HeldNode:
     """A value that is a node of the mission; `text` is how it is shown."""
 
-    key: Key
+    key: NodeKey
     text: str
 
     def __str__(self) -> str:
         return self.text
 
 
-def pattern_of(expression: Expression, items: Mapping[str, Pattern]) -> Pattern | None:
+def pattern_of(expression: Expression, items: Mapping[str, PathPattern]) -> PathPattern | None:
     """Return where in the data an expression looks; `items` are the patterns of the loops' items. None: nowhere."""
     return _pattern(expression.tree, items)
 
 
-def _pattern(tree: ExpressionNode, items: Mapping[str, Pattern]) -> Pattern | None:
+def _pattern(tree: ExpressionNode, items: Mapping[str, PathPattern]) -> PathPattern | None:
     match tree:
         case Variable(name=name):
             return items.get(name, (name,))
         case Index(of=operand):
             inner = _pattern(operand, items)
             return None if inner is None else (*inner, ANY)
-        case Field(of=operand, name=name):
+        case FieldAccess(of=operand, name=name):
             inner = _pattern(operand, items)
             return None if inner is None else (*inner, name)
     return None
 
 
-def matching(data: Mapping[str, TreeNode], pattern: Pattern) -> Iterator[tuple[Key, TreeNode]]:
+def matching(data: Mapping[str, TreeNode], pattern: PathPattern) -> Iterator[tuple[NodeKey, TreeNode]]:
     """Yield what stands in the data at places of a pattern, with its key."""
     name = pattern[0] or ""
     if name in data:
         yield from _below((name,), data[name], pattern[1:])
 
 
-def _below(key: Key, node: TreeNode, pattern: Pattern) -> Iterator[tuple[Key, TreeNode]]:
+def _below(key: NodeKey, node: TreeNode, pattern: PathPattern) -> Iterator[tuple[NodeKey, TreeNode]]:
     if not pattern:
         yield key, node
         return
@@ -81,7 +81,7 @@ def brief(node: TreeNode) -> str:
     return ""
 
 
-def with_held(value: Value, nodes: Mapping[Key, TreeNode], key: Key) -> Value:
+def with_held(value: Value, nodes: Mapping[NodeKey, TreeNode], key: NodeKey) -> Value:
     """Return a value of the data, at this key, with `HeldNode`s where nodes stand."""
     if key in nodes:
         return HeldNode(key, brief(nodes[key]))

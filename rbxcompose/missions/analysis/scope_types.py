@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from rbxcompose.expressions.check import Problem, check_value
+from rbxcompose.expressions.check import ExpressionProblem, check_value
 from rbxcompose.expressions.tree import Expression, Word
 from rbxcompose.expressions.types import PLACE, POSE, TEXT, UNKNOWN, Type, TypeKind
 from rbxcompose.findings import Finding, FindingKind, Span, nearest, replacement
@@ -129,6 +129,6 @@ def _no_text(word: str, span: Span, scope: NodeScope, kind: FindingKind) -> Find
     return kind.at(span, message, help=f"a text needs quotes: write '\"{word}\"'", fix=fix)
 
 
-def _at(problem: Problem, names: Iterable[tuple[str, int]]) -> str:
+def _at(problem: ExpressionProblem, names: Iterable[tuple[str, int]]) -> str:
     """Return the name that stands exactly where a problem begins."""
     return next((name for name, start in names if start == problem.start), "")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from rbxcompose.missions.program.machines import States
+from rbxcompose.missions.program.machines import MachineStates
 from rbxcompose.missions.program.program import MissionNode, Program
 
 Leads = Mapping[str, frozenset[str]]  # the states and ends that each state leads to, by its name
 
 
-def transitions(program: Program) -> Iterator[tuple[States, list[MissionNode], Leads]]:
+def transitions(program: Program) -> Iterator[tuple[MachineStates, list[MissionNode], Leads]]:
     """Yield each machine, its states in the order of the text, and where each leads to."""
     for node in program.nodes:
         if node.step.states:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from rbxcompose.config import Place
 from rbxcompose.missions.analysis.facts import Constants, goal_place, items_of, number_of
-from rbxcompose.missions.program.answers import Flow
+from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import ROOT, MissionNode, Program
 
 MOST_STEPS = 2_000  # of a mission that are gone through; loops in loops would take for ever
@@ -72,11 +72,11 @@ class Ways:
         if not node.children:
             return here, number_of(node.step.lasts, constants) or 0.0
         match node.step.flow:
-            case Flow.IN_TURN:
+            case NodeFlow.IN_TURN:
                 return self._in_turn(node, here, constants)
-            case Flow.PER_ITEM:
+            case NodeFlow.PER_ITEM:
                 return self._loop(node, here, constants)
-            case Flow.ONE_OF:
+            case NodeFlow.ONE_OF:
                 for child in node.children:
                     self.go(child, None, constants)
         return None, 0.0

@@ -11,7 +11,7 @@ from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.language.argument_types import check_written
-from rbxcompose.missions.language.asked import Argument
+from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.program.program import Skill
 
 STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
@@ -57,7 +57,7 @@ def _missing(view: View, skill: Skill) -> Iterator[Finding]:
         yield wrong_argument.at(view.node.span, message, help=help_text)
 
 
-def _argument(view: View, skill: Skill, argument: Argument) -> Iterator[Finding]:
+def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[Finding]:
     name = argument.name or skill.main
     if not name:
         yield wrong_argument.at(argument.span, f"the skill '{skill.name}' takes no single value")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.missions.engine.engine_base import EngineBase
 from rbxcompose.missions.engine.leaf import Leaf
-from rbxcompose.missions.engine.observers import Branch, Named, Observed, Since
+from rbxcompose.missions.engine.observers import Branch, NamedObserver, Observed, Since
 from rbxcompose.missions.engine.run import Run
 from rbxcompose.missions.engine.scopes import ItemScope, MissionScope, SinceScope, new_names
 from rbxcompose.missions.engine.task import Site, Task
@@ -75,7 +75,7 @@ class Builder:
         if since:
             task = self._kept(Since(site, since, task))
         if node.name:
-            task = self._kept(Named(site, node.name, task))
+            task = self._kept(NamedObserver(site, node.name, task))
         elif branch:
             task = self._kept(Branch(site, branch, task))
         if self.engine.settings.observer:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.tree import Expression, ExpressionNode, Field, Index, Variable
+from rbxcompose.expressions.tree import Expression, ExpressionNode, FieldAccess, Index, Variable
 from rbxcompose.expressions.values import Value, is_same
 from rbxcompose.missions.engine.scopes import MissionScope
 from rbxcompose.missions.program.results import NodeFailed
@@ -26,7 +26,7 @@ def _path(tree: ExpressionNode, scope: MissionScope) -> list[Value]:
     match tree:
         case Variable(name=name):
             return [name]
-        case Field(of=of, name=name):
+        case FieldAccess(of=of, name=name):
             return [*_path(of, scope), name]
         case Index(of=of, index=index):
             return [*_path(of, scope), evaluate(Expression("", index), scope)]

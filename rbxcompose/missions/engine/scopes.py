@@ -10,7 +10,7 @@ from rbxcompose.expressions.tree import Expression, FunctionCall, Variable, walk
 from rbxcompose.expressions.values import NotArrived, Value
 
 
-class Values(Protocol):
+class RobotValues(Protocol):
     """The robot's values, as the world knows them."""
 
     def value(self, name: str, /) -> Value | NotArrived:
@@ -54,7 +54,7 @@ class RunScope:
     """What all of a mission sees; `data` is its own, and written by `set`."""
 
     def __init__(
-        self, data: dict[str, Value], inputs: Mapping[str, Value], places: Mapping[str, Place], values: Values
+        self, data: dict[str, Value], inputs: Mapping[str, Value], places: Mapping[str, Place], values: RobotValues
     ) -> None:
         self.data = data
         self._inputs = inputs

@@ -31,7 +31,7 @@ LEVELS = {"info": Level.OK, "warn": Level.WARN, "error": Level.ERROR}
 RESULTS = {"success": Level.OK, "halted": Level.OK, "failure": Level.WARN}
 
 
-class Story:
+class MissionStory:
     """Tells the story of one mission."""
 
     def __init__(self, mission: str, skills: Mapping[str, Skill]) -> None:

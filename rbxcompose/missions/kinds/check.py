@@ -22,7 +22,7 @@ class CheckTask(Task):
 
     __slots__ = ("condition",)
 
-    def __init__(self, site: Site, step: Check) -> None:
+    def __init__(self, site: Site, step: CheckStep) -> None:
         super().__init__(site)
         self.condition = step.condition
 
@@ -33,7 +33,7 @@ class CheckTask(Task):
 
 @kind("check", CheckTask)
 @dataclass(frozen=True, slots=True)
-class Check(LeafStep):
+class CheckStep(LeafStep):
     """Succeed if the condition holds, else fail.
 
     Example:

@@ -21,7 +21,7 @@ class EndTask(Task):
 
     __slots__ = ("step",)
 
-    def __init__(self, site: Site, step: End) -> None:
+    def __init__(self, site: Site, step: EndStep) -> None:
         super().__init__(site)
         self.step = step
 
@@ -38,7 +38,7 @@ class EndTask(Task):
 
 @kind("end", EndTask, {"message": "What is told about it."})
 @dataclass(frozen=True, slots=True)
-class End(Deed):
+class EndStep(Deed):
     """End the mission in which this is written, in `success` or in `failure`; what runs is halted.
 
     Where two branches of a parallel end it at one tick, failure beats success.

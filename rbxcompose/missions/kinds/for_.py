@@ -9,7 +9,7 @@ from typing import Self
 
 from rbxcompose.expressions.check import StaticScope, check
 from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.tree import Expression, Field, Index, Variable
+from rbxcompose.expressions.tree import Expression, FieldAccess, Index, Variable
 from rbxcompose.expressions.types import TEXT, UNKNOWN, Type, TypeKind
 from rbxcompose.expressions.values import NOT_ARRIVED, Located, NotArrivedError, Value
 from rbxcompose.missions.analysis.facts import constants_of
@@ -18,10 +18,10 @@ from rbxcompose.missions.engine.data_edits import without
 from rbxcompose.missions.engine.scopes import ItemScope
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Flow
+from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.families import Loop
-from rbxcompose.missions.program.look import Look
-from rbxcompose.missions.program.moments import NO_EFFECTS, Effects
+from rbxcompose.missions.program.look import NodeLook
+from rbxcompose.missions.program.moments import NO_EFFECTS, NodeEffects
 from rbxcompose.missions.program.outcomes import ANY as ANYHOW
 from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.program import NOTHING, Endings, MissionNode, Program, Target
@@ -40,7 +40,7 @@ class ForTask(Task):
     __slots__ = ("body", "did", "done", "failed", "left", "step", "taken", "view")
     saved = ("did", "done", "failed", "left", "taken")
 
-    def __init__(self, site: Site, step: For) -> None:
+    def __init__(self, site: Site, step: ForStep) -> None:
         super().__init__(site)
         if site.item is None:
             raise TypeError(f"the loop '{site.node.path}' has no item")
@@ -158,7 +158,7 @@ class ForTask(Task):
     },
 )
 @dataclass(frozen=True, slots=True)
-class For(Loop):
+class ForStep(Loop):
     """Do the body for each item, which the body sees as `$item`.
 
     Example:
@@ -177,8 +177,8 @@ class For(Loop):
     removes_done: bool
 
     has_result = True
-    flow = Flow.PER_ITEM
-    look = Look("↻")
+    flow = NodeFlow.PER_ITEM
+    look = NodeLook("↻")
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
@@ -231,11 +231,11 @@ class For(Loop):
         return frozenset({POSE}) if self.order == NEAREST else NOTHING
 
     @property
-    def effects(self) -> Effects:
+    def effects(self) -> NodeEffects:
         """Return the data that it takes its items from, if it removes those that are done."""
         if not self.removes_done:
             return NO_EFFECTS
         tree = None if isinstance(self.items, tuple) else self.items.tree
-        while isinstance(tree, Field | Index):
+        while isinstance(tree, FieldAccess | Index):
             tree = tree.of
-        return Effects(shortened=tree.name if isinstance(tree, Variable) else "")
+        return NodeEffects(shortened=tree.name if isinstance(tree, Variable) else "")

@@ -23,7 +23,7 @@ class IfTask(Task):
     __slots__ = ("branches", "condition", "index")
     saved = ("index",)
 
-    def __init__(self, site: Site, step: If) -> None:
+    def __init__(self, site: Site, step: IfStep) -> None:
         super().__init__(site)
         self.condition = step.condition
         self.branches = site.children
@@ -42,7 +42,7 @@ class IfTask(Task):
 
 @kind("if", IfTask, {"then": "What is done if the condition holds.", "else": "What is done if it does not."})
 @dataclass(frozen=True, slots=True)
-class If(Choosing):
+class IfStep(Choosing):
     """Ask the condition once, then do `then` or `else`; without a match it is skipped.
 
     Example:

@@ -23,7 +23,7 @@ class LogTask(Task):
 
     __slots__ = ("step",)
 
-    def __init__(self, site: Site, step: Log) -> None:
+    def __init__(self, site: Site, step: LogStep) -> None:
         super().__init__(site)
         self.step = step
 
@@ -35,7 +35,7 @@ class LogTask(Task):
 
 @kind("log", LogTask, {"level": "How bad it is."})
 @dataclass(frozen=True, slots=True)
-class Log(Deed):
+class LogStep(Deed):
     """Write one line; `$name` in it is filled in.
 
     Example:

@@ -9,10 +9,10 @@ from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Flow, Skipped
+from rbxcompose.missions.program.answers import NodeFlow, Skipped
 from rbxcompose.missions.program.branches import ALL, ANY, Branches, BranchResult, BranchScope, read_outcomes
 from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.look import Form, Look
+from rbxcompose.missions.program.look import Form, NodeLook
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes, either
 from rbxcompose.missions.program.program import Endings, MissionNode, Target
 from rbxcompose.missions.program.registry import kind
@@ -28,7 +28,7 @@ class ParallelTask(Task):
     __slots__ = ("branches", "children", "names", "results", "runs", "waits_for_all", "wanted")
     saved = ("names", "results", "runs", "wanted")
 
-    def __init__(self, site: Site, step: Parallel) -> None:
+    def __init__(self, site: Site, step: ParallelStep) -> None:
         super().__init__(site)
         self.children = site.children
         self.branches = step.branches
@@ -150,7 +150,7 @@ class ParallelTask(Task):
     },
 )
 @dataclass(frozen=True, slots=True)
-class Parallel(Straight):
+class ParallelStep(Straight):
     """Do several nodes at the same time; at each tick all that have not ended are ticked, then it is judged.
 
     Example:
@@ -166,8 +166,8 @@ class Parallel(Straight):
     waits_for_all: bool
 
     skipped = Skipped.WITH_ALL_INSIDE
-    flow = Flow.OPEN
-    look = Look("⇉", Form.BESIDE, has_roles=True)
+    flow = NodeFlow.OPEN
+    look = NodeLook("⇉", Form.BESIDE, has_roles=True)
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:

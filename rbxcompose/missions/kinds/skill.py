@@ -11,7 +11,7 @@ from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, Tree
 from rbxcompose.missions.engine.events import Reported, SkillEnded, SkillStarted
 from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.task import Site
-from rbxcompose.missions.language.asked import Argument
+from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.written import Getter, getter
 from rbxcompose.missions.program.families import LeafStep
@@ -32,7 +32,7 @@ class SkillTask(Leaf):
     fresh = ("arguments",)
     told = ("started",)
 
-    def __init__(self, site: Site, step: AskedSkill) -> None:
+    def __init__(self, site: Site, step: SkillStep) -> None:
         super().__init__(site)
         self.skill = site.engine.robot.skills[step.skill]
         names = [(argument.name or self.skill.main, argument.value) for argument in step.arguments]
@@ -101,11 +101,11 @@ class SkillTask(Leaf):
 
 @kind(SKILL, SkillTask, is_inner=True)
 @dataclass(frozen=True, slots=True)
-class AskedSkill(LeafStep):
+class SkillStep(LeafStep):
     """A skill by its name, with its arguments."""
 
     skill: str = field()
-    arguments: tuple[Argument, ...] = field()
+    arguments: tuple[WrittenArgument, ...] = field()
 
     waits = True
     has_result = True

@@ -23,7 +23,7 @@ class WaitTask(Task):
     __slots__ = ("deadline", "duration")
     saved = times = fresh = ("deadline",)
 
-    def __init__(self, site: Site, step: Wait) -> None:
+    def __init__(self, site: Site, step: WaitStep) -> None:
         super().__init__(site)
         self.duration = step.lasts
         self.deadline = 0.0
@@ -40,7 +40,7 @@ class WaitTask(Task):
 
 @kind("wait", WaitTask)
 @dataclass(frozen=True, slots=True)
-class Wait(LeafStep):
+class WaitStep(LeafStep):
     """Succeed after a time; it goes on with the rest when the mission was cut short meanwhile.
 
     Example:

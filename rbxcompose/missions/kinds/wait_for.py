@@ -24,7 +24,7 @@ class WaitForTask(Task):
 
     __slots__ = ("watched",)
 
-    def __init__(self, site: Site, step: WaitFor) -> None:
+    def __init__(self, site: Site, step: WaitForStep) -> None:
         super().__init__(site)
         self.watched = Watched.of(step.condition)
 
@@ -48,7 +48,7 @@ class WaitForTask(Task):
 
 @kind("wait_for", WaitForTask)
 @dataclass(frozen=True, slots=True)
-class WaitFor(LeafStep):
+class WaitForStep(LeafStep):
     """Succeed as soon as the condition holds; `timeout` bounds it.
 
     Example:

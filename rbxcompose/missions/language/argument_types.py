@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.expressions.text import Slot, parse_template
+from rbxcompose.expressions.text import TextSlot, parse_template
 from rbxcompose.expressions.tree import ExpressionError
 from rbxcompose.expressions.types import UNKNOWN, Type, TypeKind
 from rbxcompose.findings import Finding, FindingKind
@@ -21,7 +21,7 @@ def check_written(view: View, scalar: ScalarNode, wanted: Type, kind: FindingKin
             yield from view.typed(expression_of(scalar), wanted, scalar, kind)
             return
         for slot in parse_template(scalar.text).parts:
-            if isinstance(slot, Slot):
+            if isinstance(slot, TextSlot):
                 part = ScalarNode(slot.value.text, inner_span(scalar, slot.start, slot.end))
                 yield from view.typed(slot.value, UNKNOWN, part, kind)
     except ExpressionError as error:

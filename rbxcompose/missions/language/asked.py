@@ -33,7 +33,7 @@ class Assignment:
 
 
 @dataclass(frozen=True, slots=True)
-class Argument:
+class WrittenArgument:
     """An argument of a skill or a mission as written; what it means depends on that. The main one has no name."""
 
     name: str

@@ -39,26 +39,26 @@ class Takes(StrEnum):
     OTHER = "other"
 
 
-class Slot(NamedTuple):
+class KeySlot(NamedTuple):
     """What the value of a key takes; `choices` are words that may stand in its place."""
 
     takes: Takes
     choices: tuple[str, ...] = ()
 
 
-STEP = Slot(Takes.STEP)
+STEP = KeySlot(Takes.STEP)
 # What stands below each place, by its key. What the keys of a step take, its kind and its modifiers tell.
-BELOW: Mapping[Takes, Mapping[str, Slot]] = {
-    Takes.MISSION: {"do": STEP, "machine": Slot(Takes.MACHINE), "interrupts": Slot(Takes.INTERRUPTS)},
-    Takes.INTERRUPTS: {EACH: Slot(Takes.INTERRUPT)},
-    Takes.INTERRUPT: {"do": STEP, "afterwards": Slot(Takes.AFTERWARDS)},
+BELOW: Mapping[Takes, Mapping[str, KeySlot]] = {
+    Takes.MISSION: {"do": STEP, "machine": KeySlot(Takes.MACHINE), "interrupts": KeySlot(Takes.INTERRUPTS)},
+    Takes.INTERRUPTS: {EACH: KeySlot(Takes.INTERRUPT)},
+    Takes.INTERRUPT: {"do": STEP, "afterwards": KeySlot(Takes.AFTERWARDS)},
     Takes.STEPS: {EACH: STEP},
     Takes.BRANCHES: {EACH: STEP},
     Takes.CASES: {EACH: STEP},
-    Takes.MACHINE: {"states": Slot(Takes.STATES)},
-    Takes.STATES: {EACH: Slot(Takes.STATE)},
-    Takes.STATE: {"do": STEP, "machine": Slot(Takes.MACHINE), "next": Slot(Takes.NEXT)},
-    Takes.HOOK: {"set": Slot(Takes.ASSIGNMENTS)},
+    Takes.MACHINE: {"states": KeySlot(Takes.STATES)},
+    Takes.STATES: {EACH: KeySlot(Takes.STATE)},
+    Takes.STATE: {"do": STEP, "machine": KeySlot(Takes.MACHINE), "next": KeySlot(Takes.NEXT)},
+    Takes.HOOK: {"set": KeySlot(Takes.ASSIGNMENTS)},
 }
 
 
@@ -66,8 +66,8 @@ BELOW: Mapping[Takes, Mapping[str, Slot]] = {
 class Words:
     """The words that mean something in a mission: of the language, and the skills of the robot as far as known."""
 
-    kinds: Mapping[str, Mapping[str, Slot]]  # what the keys of each kind of step take, its own word among them
-    modifiers: Mapping[str, Slot]  # of any step, `name` among them
+    kinds: Mapping[str, Mapping[str, KeySlot]]  # what the keys of each kind of step take, its own word among them
+    modifiers: Mapping[str, KeySlot]  # of any step, `name` among them
     skills: Collection[str] = ()
 
     def is_step(self, word: str) -> bool:

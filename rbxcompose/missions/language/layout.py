@@ -8,7 +8,7 @@ from functools import cache
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode
-from rbxcompose.missions.language.grammar import BELOW, Slot, Takes, Words
+from rbxcompose.missions.language.grammar import BELOW, KeySlot, Takes, Words
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
 from rbxcompose.missions.program.registry import StepType, kinds
@@ -41,7 +41,7 @@ class _Asking(NodeReader):
 
     def __init__(self, key: str) -> None:
         super().__init__(MappingNode(), key, 0, Nobody())
-        self.slots: dict[str, Slot] = {}
+        self.slots: dict[str, KeySlot] = {}
 
     def has(self, key: str) -> bool:
         """Say yes, so that everything is asked for."""
@@ -49,7 +49,7 @@ class _Asking(NodeReader):
 
     def take(self, key: str, takes: Takes = Takes.OTHER, choices: tuple[str, ...] = ()) -> TreeNode | None:
         """Note what a key takes; what it is asked for first says most of it."""
-        self.slots.setdefault(key, Slot(takes, choices))
+        self.slots.setdefault(key, KeySlot(takes, choices))
         return None
 
 
@@ -58,7 +58,7 @@ def words(skills: frozenset[str] = frozenset()) -> Words:
     return _words(_known(), skills)
 
 
-def step_slots(kind: str) -> Mapping[str, Slot]:
+def step_slots(kind: str) -> Mapping[str, KeySlot]:
     """Return what the keys of a step of a kind take, with its modifiers; of a skill, if it is of none."""
     return _step_slots(_known(), kind)
 
@@ -69,24 +69,24 @@ def _known() -> tuple[StepType, ...]:
 
 
 @cache
-def _kind_slots(known: tuple[StepType, ...]) -> Mapping[str, Mapping[str, Slot]]:
+def _kind_slots(known: tuple[StepType, ...]) -> Mapping[str, Mapping[str, KeySlot]]:
     """Return what the keys of each kind of step take, its word among them."""
     found = {}
     for kind in known:
         asking = _Asking(kind.name)
         kind.read(asking)
-        found[kind.name] = {key: asking.slots.get(key, Slot(Takes.OTHER)) for key in (kind.name, *kind.options)}
+        found[kind.name] = {key: asking.slots.get(key, KeySlot(Takes.OTHER)) for key in (kind.name, *kind.options)}
     return found
 
 
 @cache
-def _modifier_slots() -> Mapping[str, Slot]:
+def _modifier_slots() -> Mapping[str, KeySlot]:
     """Return what the keys of all modifiers take, those of states among them."""
-    found: dict[str, Slot] = {"name": Slot(Takes.OTHER)}
+    found: dict[str, KeySlot] = {"name": KeySlot(Takes.OTHER)}
     for name, cls in modifiers().items():
         asking = _Asking(name)
         cls.read(asking, name)
-        found |= {key: asking.slots.get(key, Slot(Takes.OTHER)) for key in (name, *cls.keys)}
+        found |= {key: asking.slots.get(key, KeySlot(Takes.OTHER)) for key in (name, *cls.keys)}
     return found
 
 
@@ -96,11 +96,11 @@ def _words(known: tuple[StepType, ...], skills: frozenset[str]) -> Words:
 
 
 @cache
-def _step_slots(known: tuple[StepType, ...], kind: str) -> Mapping[str, Slot]:
+def _step_slots(known: tuple[StepType, ...], kind: str) -> Mapping[str, KeySlot]:
     return {**_words(known, frozenset()).modifiers, **_kind_slots(known).get(kind, {})}
 
 
 @cache
-def state_slots() -> Mapping[str, Slot]:
+def state_slots() -> Mapping[str, KeySlot]:
     """Return what the keys of a state take, with its modifiers."""
     return {**_modifier_slots(), **BELOW[Takes.STATE]}

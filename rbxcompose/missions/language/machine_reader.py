@@ -12,7 +12,7 @@ from rbxcompose.missions.language.grammar import Takes, is_told
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.value_reader import WORDS
 from rbxcompose.missions.program.history import read_history
-from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS, Next, States
+from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS, MachineStates, Next
 from rbxcompose.missions.program.statuses import FAILURE, NAMES, SUCCESS
 
 BODIES = ("do", "machine")
@@ -20,11 +20,11 @@ STATE_KEYS = (*BODIES, "on_enter", "on_exit", "next")
 RESULTS = (NAMES[SUCCESS], NAMES[FAILURE])
 
 
-def read_machine(reader: NodeReader) -> tuple[States, str]:
+def read_machine(reader: NodeReader) -> tuple[MachineStates, str]:
     """Read the map below `machine`: the first state, the states and ends; and the history."""
     value = reader.map_of(reader.key, "'start' and 'states' below it", Takes.MACHINE)
     if value is None:
-        return States(), NO_HISTORY
+        return MachineStates(), NO_HISTORY
     inner = reader.inside(value, MACHINE_KEYS, "a machine")
     states = value.get("states")
     names: tuple[str, ...] = ()
@@ -44,7 +44,7 @@ def read_machine(reader: NodeReader) -> tuple[States, str]:
     if "start" not in value:
         reader.add(codes.MISSING.at(reader.span, "a machine needs 'start': the state in which it begins"))
     history = read_history(inner)
-    return States(start.text if start else "", names, ends, start.span if start else None), history
+    return MachineStates(start.text if start else "", names, ends, start.span if start else None), history
 
 
 def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:

@@ -11,11 +11,11 @@ from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.asked import Argument, Asked, Assignment
+from rbxcompose.missions.language.asked import Asked, Assignment, WrittenArgument
 from rbxcompose.missions.language.grammar import Takes, is_told
 from rbxcompose.missions.language.spans import expression_of
 from rbxcompose.missions.language.value_reader import Nodes, ValueReader, read_expression
-from rbxcompose.missions.program.messages import Message, Shape, Written
+from rbxcompose.missions.program.messages import MessageTemplate, TemplateShape, WrittenValue
 from rbxcompose.missions.program.moments import DEEDS, LEVELS, OPTIONS, Deeds, Moments
 
 
@@ -91,13 +91,13 @@ class NodeReader(ValueReader):
         reader.condition(key)
         return reader.asked[0] if reader.asked else None
 
-    def message(self, target: str, body: str) -> Message:
+    def message(self, target: str, body: str) -> MessageTemplate:
         """Read where a message goes, and what is in it."""
         scalar = self.scalar(target, "the name of a topic or a service")
         value = self.mapping.get(body)
         shape = None if value is None else self._shape(value)
         keys = {} if value is None else dict(_keys_of(value))
-        return Message(scalar or ScalarNode("", self.key_span(target)), shape, keys)
+        return MessageTemplate(scalar or ScalarNode("", self.key_span(target)), shape, keys)
 
     def moments(self, keys: Iterable[str]) -> Moments:
         """Read hooks: what is set, logged or published at some moments."""
@@ -121,7 +121,7 @@ class NodeReader(ValueReader):
         self.asked.extend(inner.asked)
         return deeds
 
-    def _shape(self, node: TreeNode) -> Shape:
+    def _shape(self, node: TreeNode) -> TemplateShape:
         match node:
             case MappingNode(entries=entries):
                 return {name: self._shape(entry.value) for name, entry in entries.items()}
@@ -132,7 +132,7 @@ class NodeReader(ValueReader):
                     expression = expression_of(node)
                 except ExpressionError:
                     expression = None
-                return Written(node, self._quiet_template(node), expression)
+                return WrittenValue(node, self._quiet_template(node), expression)
 
     def _quiet_template(self, scalar: ScalarNode) -> Template:
         try:
@@ -199,15 +199,15 @@ class NodeReader(ValueReader):
         self.asked.extend(replace(asked, is_assigned=True) for asked in inner.asked)
         return tuple(read)
 
-    def arguments(self) -> tuple[Argument, ...]:
+    def arguments(self) -> tuple[WrittenArgument, ...]:
         """Read the arguments of a skill: one value, or a map of several."""
         match self.mapping.get(self.key):
             case MappingNode(entries=entries):
-                return tuple(Argument(name, entry.value, entry.key.span) for name, entry in entries.items())
+                return tuple(WrittenArgument(name, entry.value, entry.key.span) for name, entry in entries.items())
             case ScalarNode(text="", plain=True) | None:
                 return ()
             case value:
-                return (Argument("", value, value.span),)
+                return (WrittenArgument("", value, value.span),)
 
 
 def _keys_of(node: TreeNode, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Span]]:

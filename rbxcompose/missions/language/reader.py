@@ -10,7 +10,7 @@ from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Finding, Related, Report, Span
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.analysis.held_nodes import ITEM, Pattern, matching, pattern_of, with_held
+from rbxcompose.missions.analysis.held_nodes import ITEM, PathPattern, matching, pattern_of, with_held
 from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.language.grammar import LEVELS, Takes, long_form
 from rbxcompose.missions.language.header import read_data, read_inputs, read_rate
@@ -95,7 +95,7 @@ class _Reader:
         self.repairs = repairs
         data = root.get("data")
         self.data = {name: entry.value for name, entry in data.entries.items()} if isinstance(data, MappingNode) else {}
-        self.patterns: dict[str, Pattern] = {}  # where in the data the items of loops stand
+        self.patterns: dict[str, PathPattern] = {}  # where in the data the items of loops stand
         self.found: dict[tuple[str, ...], TreeNode] = {}  # the nodes in the data
         self.nodes: list[program.MissionNode | None] = []
         self.names: dict[str, Span] = {}

@@ -12,7 +12,7 @@ from rbxcompose.missions.language.grammar import (
     EACH,
     LEVELS,
     GrammarPlace,
-    Slot,
+    KeySlot,
     Takes,
     Words,
     is_empty,
@@ -37,14 +37,14 @@ class Repairs:
 
     def mission(self, root: MappingNode) -> MappingNode:
         """Return the tree of a mission without slips."""
-        found = self._node(Slot(Takes.MISSION), ScalarNode("", root.span), root, 0)
+        found = self._node(KeySlot(Takes.MISSION), ScalarNode("", root.span), root, 0)
         return found if isinstance(found, MappingNode) else root
 
     def step(self, node: TreeNode, depth: int) -> TreeNode:
         """Return a step without slips that stands within `depth` others."""
-        return self._node(Slot(Takes.STEP), ScalarNode("", node.span), node, depth)
+        return self._node(KeySlot(Takes.STEP), ScalarNode("", node.span), node, depth)
 
-    def _node(self, slot: Slot, key: ScalarNode, node: TreeNode, depth: int) -> TreeNode:
+    def _node(self, slot: KeySlot, key: ScalarNode, node: TreeNode, depth: int) -> TreeNode:
         is_step = slot.takes is Takes.STEP
         if is_step and (depth == LEVELS or is_empty(node)):
             return node
@@ -62,7 +62,7 @@ class Repairs:
 
         return with_children(node, below) if slots else node
 
-    def _below(self, takes: Takes, node: TreeNode) -> Mapping[str, Slot]:
+    def _below(self, takes: Takes, node: TreeNode) -> Mapping[str, KeySlot]:
         """Return what stands below a node, by key."""
         if takes is Takes.STATE:
             return state_slots()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from rbxcompose.expressions.text import Slot, Template, parse_template
+from rbxcompose.expressions.text import Template, TextSlot, parse_template
 from rbxcompose.expressions.tree import Expression, ExpressionError, Number
 from rbxcompose.expressions.types import COUNT, FLAG, UNKNOWN, Type, quantity_of
 from rbxcompose.findings import Finding, Span
@@ -155,7 +155,7 @@ class ValueReader:
         except ExpressionError as error:
             self.nodes.add(codes.NO_EXPRESSION.at(inner_span(scalar, error.start, error.end), error.message))
             return Template("", ())
-        slots = (part for part in template.parts if isinstance(part, Slot))
+        slots = (part for part in template.parts if isinstance(part, TextSlot))
         self.asked.extend(Asked(slot.value, UNKNOWN, _part_of(scalar, slot)) for slot in slots)
         return template
 
@@ -194,5 +194,5 @@ class ValueReader:
 _FLOW_HELP = "inside '{}', commas and colons divide: put quotes round the condition, or write it in block style"
 
 
-def _part_of(scalar: ScalarNode, slot: Slot) -> ScalarNode:
+def _part_of(scalar: ScalarNode, slot: TextSlot) -> ScalarNode:
     return ScalarNode(f"${slot.path}", inner_span(scalar, slot.start, slot.end))

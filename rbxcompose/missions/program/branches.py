@@ -47,7 +47,7 @@ class Branches:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class BranchChoice:
     """What is asked, and the value of each case, in the order of the children."""
 
     asked: Expression

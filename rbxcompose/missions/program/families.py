@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from rbxcompose.expressions.check import StaticScope
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import Type
-from rbxcompose.missions.program.answers import Flow, Skipped
-from rbxcompose.missions.program.look import PLAIN, Form, Look
-from rbxcompose.missions.program.moments import NO_EFFECTS, Effects
+from rbxcompose.missions.program.answers import NodeFlow, Skipped
+from rbxcompose.missions.program.look import PLAIN, Form, NodeLook
+from rbxcompose.missions.program.moments import NO_EFFECTS, NodeEffects
 from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.possible import Possibility, skipped, started
 from rbxcompose.missions.program.program import MissionNode, RobotNames, Step
@@ -22,7 +22,7 @@ class LeafStep(Step):
     __slots__ = ()
     skipped = Skipped.NEVER
     comes_again = False
-    flow = Flow.IN_TURN
+    flow = NodeFlow.IN_TURN
     look = PLAIN
 
     def endless(self, ends: Outcomes) -> None:
@@ -54,7 +54,7 @@ class Deed(LeafStep):
     lasts = None
 
 
-class Group(Step):
+class GroupStep(Step):
     """A node that does nothing by itself: what is done is done by those inside, which see what it sees."""
 
     __slots__ = ()
@@ -74,7 +74,7 @@ class Group(Step):
         return False
 
     @property
-    def effects(self) -> Effects:
+    def effects(self) -> NodeEffects:
         """Return that it has none."""
         return NO_EFFECTS
 
@@ -84,7 +84,7 @@ class Group(Step):
         return False
 
 
-class Straight(Group):
+class Straight(GroupStep):
     """A group that goes once through what is inside; tests need not see more of it than that."""
 
     __slots__ = ()
@@ -104,7 +104,7 @@ class Straight(Group):
         yield from ()
 
 
-class Loop(Group):
+class Loop(GroupStep):
     """A group that comes back to what is inside, or does nothing at all."""
 
     __slots__ = ()
@@ -123,8 +123,8 @@ class Choosing(Straight):
 
     __slots__ = ()
     skipped = Skipped.PERHAPS
-    flow = Flow.ONE_OF
-    look = Look(form=Form.BESIDE, has_roles=True)
+    flow = NodeFlow.ONE_OF
+    look = NodeLook(form=Form.BESIDE, has_roles=True)
 
     @property
     @abstractmethod

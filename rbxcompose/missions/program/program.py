@@ -16,14 +16,14 @@ from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.missions.engine.resume_points import NO_HISTORY
-from rbxcompose.missions.language.asked import Argument, Asked
+from rbxcompose.missions.language.asked import Asked, WrittenArgument
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Advice, Counted, Flow, Skipped
-from rbxcompose.missions.program.branches import Branches, Choice
-from rbxcompose.missions.program.look import Look
-from rbxcompose.missions.program.machines import Next, States
+from rbxcompose.missions.program.answers import Advice, Counted, NodeFlow, Skipped
+from rbxcompose.missions.program.branches import BranchChoice, Branches
+from rbxcompose.missions.program.look import NodeLook
+from rbxcompose.missions.program.machines import MachineStates, Next
 from rbxcompose.missions.program.modifier import Modifier
-from rbxcompose.missions.program.moments import Effects
+from rbxcompose.missions.program.moments import NodeEffects
 from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.possible import Possibility
 
@@ -164,7 +164,7 @@ class Step(ABC):
 
     @property
     @abstractmethod
-    def effects(self) -> Effects:
+    def effects(self) -> NodeEffects:
         """Return what it does by itself."""
 
     @property
@@ -174,12 +174,12 @@ class Step(ABC):
 
     @property
     @abstractmethod
-    def flow(self) -> Flow:
+    def flow(self) -> NodeFlow:
         """Return how it goes through those inside."""
 
     @property
     @abstractmethod
-    def look(self) -> Look:
+    def look(self) -> NodeLook:
         """Return how it is drawn."""
 
     # Capabilities: what only some kinds have.
@@ -209,7 +209,7 @@ class Step(ABC):
         return None
 
     @property
-    def arguments(self) -> tuple[Argument, ...]:
+    def arguments(self) -> tuple[WrittenArgument, ...]:
         """Return what it gives to its skill or mission."""
         return ()
 
@@ -244,7 +244,7 @@ class Step(ABC):
         return None
 
     @property
-    def choice(self) -> Choice | None:
+    def choice(self) -> BranchChoice | None:
         """Return by which value it chooses one of its children."""
         return None
 
@@ -254,7 +254,7 @@ class Step(ABC):
         return None
 
     @property
-    def states(self) -> States | None:
+    def states(self) -> MachineStates | None:
         """Return the states that its children are."""
         return None
 
