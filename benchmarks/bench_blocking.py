@@ -16,7 +16,7 @@ from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
 from rbxcompose.runtime.process_group.host import Host
-from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk import Component, Config, In, component
 from rbxcompose.testing import instance
@@ -74,7 +74,7 @@ class _Group:
     types: tuple[str, ...]
 
     def run(self) -> list[float]:
-        clock, scheduler, inbox = MonotonicClock(), Scheduler(), Inbox()
+        clock, scheduler, inbox = MonotonicClock(), Scheduler(), CallbackInbox()
         transport = ZenohTransport(open_peer(f"tcp/127.0.0.1:{PORT}"), inbox.put)
         bus = Bus(scheduler, clock, transport=transport, log=lambda owner, text: None)
         parts = tuple(instance(name, name) for name in self.types)
@@ -108,7 +108,7 @@ def _late(made: Any) -> list[float]:
 
 def _feed() -> None:
     clock, scheduler = MonotonicClock(), Scheduler()
-    inbox = Inbox()
+    inbox = CallbackInbox()
     transport = ZenohTransport(open_peer(f"tcp/127.0.0.1:{PORT}"), inbox.put)
     bus = Bus(scheduler, clock, transport=transport, log=lambda owner, text: None)
     fast = bus.publisher("feeder", "/fast", Float64, Qos.EVENT)

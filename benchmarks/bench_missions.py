@@ -14,7 +14,7 @@ from rbxcompose.expressions.types import TYPES
 from rbxcompose.expressions.values import NotArrived, Value
 from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
@@ -140,7 +140,7 @@ def _reading() -> Row:
 def _program(text: str) -> Program:
     root, findings = read_text(text, "mission.yaml")
     report = Report(list(findings))
-    program = read_program(root, report) if isinstance(root, Tree) else None
+    program = read_program(root, report) if isinstance(root, MappingNode) else None
     if program is not None:
         report.extend(check_program(program, ROBOT))
     if program is None or report.has_errors:

@@ -29,7 +29,7 @@ from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
 from rbxcompose.runtime.process_group.host import Host
-from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.testing.bench import instance
 
@@ -47,7 +47,7 @@ class Ours:
     """A process as the runtime has it: one thread that turns the scheduler, woken by what arrives."""
 
     def __init__(self, port: int) -> None:
-        self.clock, self.scheduler, self._inbox = MonotonicClock(), Scheduler(), Inbox()
+        self.clock, self.scheduler, self._inbox = MonotonicClock(), Scheduler(), CallbackInbox()
         self.bus = Bus(
             self.scheduler,
             self.clock,

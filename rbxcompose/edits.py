@@ -13,7 +13,7 @@ _QUOTES = "'\""
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class EditPlace:
     """Where an edit lands: offsets in the text of a file, and what is to stand there."""
 
     file: str
@@ -22,7 +22,7 @@ class Place:
     text: str
     is_guard: bool = False
 
-    def meets(self, other: Place) -> bool:
+    def meets(self, other: EditPlace) -> bool:
         """Tell whether both touch the same text, at least one of them changing it."""
         if self.file != other.file or (self.is_guard and other.is_guard):
             return False
@@ -46,7 +46,7 @@ def apply(fixes: Iterable[Fix], texts: Mapping[str, str]) -> Applied:
     """
     lines = {file: _Lines(text) for file, text in texts.items()}
     out = Applied(dict(texts))
-    taken: list[Place] = []
+    taken: list[EditPlace] = []
     for fix in dict.fromkeys(fixes):
         places = _places(fix, lines)
         if places is None:
@@ -95,7 +95,7 @@ def exact(fix: Fix | None, sources: Sources) -> Fix | None:
     return replace(fix, edits=tuple(edits))
 
 
-def _places(fix: Fix, lines: Mapping[str, _Lines]) -> list[Place] | None:
+def _places(fix: Fix, lines: Mapping[str, _Lines]) -> list[EditPlace] | None:
     """Return where all edits of a fix land, None if one of them finds another text than it expects."""
     found = [lines[edit.span.file].place(edit) if edit.span.file in lines else None for edit in fix.edits]
     places = [place for place in found if place is not None]
@@ -120,14 +120,14 @@ class _Lines:
         offset = column - 1 + (self.mark if line == 1 else 0)
         return self.starts[line - 1] + offset if 0 <= offset <= len(self.lines[line - 1]) else None
 
-    def place(self, edit: Edit) -> Place | None:
+    def place(self, edit: Edit) -> EditPlace | None:
         """Return where an edit lands: at its span or, in quotes, within them."""
         span = edit.span
         start, end = self.offset(span.line, span.column), self.offset(span.end_line, span.end_column)
         if start is None or end is None or end < start:
             return None
         there = self.text[start:end].replace("\r\n", "\n")
-        place = Place(span.file, start, end, edit.text, edit.text == edit.old)
+        place = EditPlace(span.file, start, end, edit.text, edit.text == edit.old)
         if there == edit.old:
             return place
         is_plain = not set(edit.text) & set(_QUOTES + "\\")

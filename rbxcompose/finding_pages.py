@@ -9,7 +9,7 @@ from pathlib import Path
 
 import rbxcompose
 from rbxcompose.check_runner import all_checks
-from rbxcompose.findings import KINDS, Kind
+from rbxcompose.findings import KINDS, FindingKind
 from rbxcompose.missions.analysis.check_runner import mission_checks
 
 FAMILIES = {
@@ -39,7 +39,7 @@ _DECLARES = re.compile(r"^(\w+ = kind\(|@check\()", re.MULTILINE)
 _BLOCK = re.compile(r"^```\w*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
-def all_kinds() -> dict[str, Kind]:
+def all_kinds() -> dict[str, FindingKind]:
     """Import every module that declares a kind of finding, those of installed plug-ins too, and return all by code."""
     for folder in rbxcompose.__path__:
         for module in pkgutil.walk_packages([folder], "rbxcompose."):
@@ -51,34 +51,34 @@ def all_kinds() -> dict[str, Kind]:
     return dict(sorted(KINDS.items()))
 
 
-def title_of(kind: Kind) -> str:
+def title_of(kind: FindingKind) -> str:
     """Return the first line of a kind's page."""
     return kind.doc.strip().partition("\n")[0].rstrip(".")
 
 
-def body_of(kind: Kind) -> str:
+def body_of(kind: FindingKind) -> str:
     """Return a kind's page without its title."""
     return kind.doc.strip().partition("\n")[2].strip()
 
 
-def family_of(kind: Kind) -> str:
+def family_of(kind: FindingKind) -> str:
     """Return what the kinds with the same first two digits are about."""
     return FAMILIES.get(kind.code.removeprefix("RBX")[:2], "other")
 
 
-def facts_of(kind: Kind) -> str:
+def facts_of(kind: FindingKind) -> str:
     """Return what is known of a kind, in one line: "error; keys and values; fix: automatic"."""
     fix = ["fix: automatic ('check --fix')"] if kind.is_fixable else []
     return "; ".join([kind.severity.value, family_of(kind), *fix])
 
 
-def markdown_of(kind: Kind) -> str:
+def markdown_of(kind: FindingKind) -> str:
     """Return a kind's page for the documentation."""
     body = re.sub(r"\n{3,}", "\n\n", body_of(kind))
     return f"# {kind.code}: {title_of(kind)}\n\n*{facts_of(kind)}*\n\n{body}\n"
 
 
-def text_of(kind: Kind) -> str:
+def text_of(kind: FindingKind) -> str:
     """Return a kind's page for a terminal: examples are indented instead of fenced."""
     body = _BLOCK.sub(lambda block: re.sub(r"^(?=.)", "    ", block[1], flags=re.MULTILINE).rstrip(), body_of(kind))
     return f"{kind.code}: {title_of(kind)}\n({facts_of(kind)})\n\n{body}\n"

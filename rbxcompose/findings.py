@@ -96,7 +96,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class FindingKind:
     """A kind of finding: a stable code and the text of its docs page (first line: title).
 
     `is_fixable` tells that `check --fix` cures at least some of its findings.
@@ -140,21 +140,21 @@ class Kind:
         return self.at(span, message, help=suggest(name, names, what), fix=fix)
 
 
-KINDS: dict[str, Kind] = {}  # every kind that has been imported, by code
+KINDS: dict[str, FindingKind] = {}  # every kind that has been imported, by code
 
 
-def kind(code: str, doc: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False) -> Kind:
+def kind(code: str, doc: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False) -> FindingKind:
     """Declare a kind of finding beside the code that finds it.
 
     Raises:
         ValueError: if another kind has this code.
     """
-    made = Kind(code, doc, severity, is_fixable)
+    made = FindingKind(code, doc, severity, is_fixable)
     register_kind(made)
     return made
 
 
-def register_kind(made: Kind) -> None:
+def register_kind(made: FindingKind) -> None:
     """Enter a kind into `KINDS`; a code belongs to one kind only."""
     if KINDS.setdefault(made.code, made).doc != made.doc:
         raise ValueError(f"two kinds of finding have the code {made.code}")

@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Generic, TypeVar
 
-from rbxcompose.findings import Finding, Kind, Severity, register_kind
+from rbxcompose.findings import Finding, FindingKind, Severity, register_kind
 
 S = TypeVar("S")
 MOST = 100  # findings of one rule about one subject: pairs of a thousand things are a million
 
 
 @dataclass(frozen=True, slots=True)
-class Rule(Kind, Generic[S]):
+class Rule(FindingKind, Generic[S]):
     """A kind of finding together with the function that finds it."""
 
     find: Callable[[S], Iterable[Finding]] = lambda subject: ()
@@ -46,6 +46,6 @@ def declared(find: Callable[[S], Iterable[Finding]], code: str, severity: Severi
     return made
 
 
-def belonging(find: Callable[[S], Iterable[Finding]], kind: Kind) -> Rule[S]:
+def belonging(find: Callable[[S], Iterable[Finding]], kind: FindingKind) -> Rule[S]:
     """Return a rule for a kind of finding that is declared elsewhere, since others than rules find it as well."""
     return Rule(kind.code, kind.doc, kind.severity, kind.is_fixable, find=find)

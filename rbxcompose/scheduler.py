@@ -20,7 +20,7 @@ MOST_AT_ONCE = 100_000  # events at one instant before we call it a loop that ne
 
 
 @dataclass(eq=False, slots=True)
-class Event:
+class ScheduledCallback:
     """A callback that is due; `cancel` makes it none."""
 
     callback: Callback | None
@@ -46,16 +46,16 @@ class Scheduler:
         self.on_error = on_error
         self.observe = observe
         # By time [s], owner, sequence: tuples, since comparing them is most of the work of a heap.
-        self._events: list[tuple[float, str, int, Event]] = []
+        self._events: list[tuple[float, str, int, ScheduledCallback]] = []
         self._sequence = count()
 
-    def at(self, time: float, owner: str, callback: Callback) -> Event:
+    def at(self, time: float, owner: str, callback: Callback) -> ScheduledCallback:
         """Run `callback` for `owner` once at robot time `time` [s] (at once, if that is past)."""
-        event = Event(callback)
+        event = ScheduledCallback(callback)
         heapq.heappush(self._events, (max(time, self.now), owner, next(self._sequence), event))
         return event
 
-    def post(self, owner: str, callback: Callback) -> Event:
+    def post(self, owner: str, callback: Callback) -> ScheduledCallback:
         """Run `callback` for `owner` at the present instant, after what runs now."""
         return self.at(self.now, owner, callback)
 
@@ -90,7 +90,7 @@ class Scheduler:
             self._run_one(owner, event)
         raise RuntimeError(f"more than {MOST_AT_ONCE} events at {self.now:.3f} s")
 
-    def _run_one(self, owner: str, event: Event) -> None:
+    def _run_one(self, owner: str, event: ScheduledCallback) -> None:
         callback, event.callback = event.callback, None
         if callback is None:
             return
@@ -120,7 +120,7 @@ class Periodic:
         """Stop the timer."""
         self._event.cancel()
 
-    def _schedule(self) -> Event:
+    def _schedule(self) -> ScheduledCallback:
         self._cycle += 1
         return self._scheduler.at(self._start + self._cycle * self._period, self._owner, self._run)
 

@@ -18,15 +18,15 @@ from typing import Any, Generic, TypeVar
 from rbxcompose.findings import Finding, Report
 
 Find = TypeVar("Find", bound=Callable[..., Any])
-Place = TypeVar("Place")
-Node = TypeVar("Node")
+P = TypeVar("P")
+N = TypeVar("N")
 
 
 @dataclass(frozen=True, slots=True)
-class Repair(Generic[Node]):
+class Repair(Generic[N]):
     """The node to go on with in the place of one with a slip, and what is said of the slip."""
 
-    node: Node
+    node: N
     findings: tuple[Finding, ...]
 
 
@@ -72,9 +72,7 @@ def _name(find: Callable[..., Any]) -> str:
     return find.__name__
 
 
-def repaired(
-    slips: Iterable[Callable[[Place, Node], Repair[Node] | None]], place: Place, node: Node, report: Report
-) -> Node:
+def repaired(slips: Iterable[Callable[[P, N], Repair[N] | None]], place: P, node: N, report: Report) -> N:
     """Return a node without slips, and report each of them.
 
     As soon as one has repaired the node, the others look again; each repairs it once at most, so that this ends.

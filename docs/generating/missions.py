@@ -11,15 +11,15 @@ from rbxcompose.expressions.text import Template
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.manifest.arguments import ArgumentModel
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.language.asked import Asked, Assignment
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.reader import INTERRUPT_KEYS
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program.goals import skill_of, topic_skill
-from rbxcompose.missions.program.messages import Message
+from rbxcompose.missions.program.messages import MessageTemplate
 from rbxcompose.missions.program.moments import Moments
-from rbxcompose.missions.program.registry import Kind, kinds
+from rbxcompose.missions.program.registry import StepType, kinds
 from rbxcompose.schema.mission import mission_schema
 from rbxcompose.schema.node_schema import Asking, first_line
 from rbxcompose.schema.scalars import Schema
@@ -47,7 +47,7 @@ class Told(Asking):
         super().__init__(key)
         self.words: dict[str, str] = {}
 
-    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Scalar | None:
+    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> ScalarNode | None:
         """Note a word."""
         self.words[key] = what
         return super().scalar(key, what)
@@ -72,7 +72,7 @@ class Told(Asking):
         self.words[key] = "the name of a branch"
         return super().branch(key, branches)
 
-    def name(self, key: str, what: str) -> Scalar:
+    def name(self, key: str, what: str) -> ScalarNode:
         """Note a name."""
         self.words[key] = what
         return super().name(key, what)
@@ -87,7 +87,7 @@ class Told(Asking):
         self.words[key] = "a map from values to nodes"
         return super().cases(key)
 
-    def message(self, target: str, body: str) -> Message:
+    def message(self, target: str, body: str) -> MessageTemplate:
         """Note a name and what is sent."""
         self.words[target], self.words[body] = "its name", "a map of fields, or the value of the only one"
         return super().message(target, body)
@@ -164,7 +164,7 @@ def described(properties: Mapping[str, Schema], required: list[str]) -> str:
     return table(("key", "required", "what it is"), rows)
 
 
-def of_kind(kind: Kind) -> str:
+def of_kind(kind: StepType) -> str:
     """Return what is known of a kind: what it does, its keys, an example."""
     told = told_by(kind)
     rows = [(code(key), takes(told, key), kind.options.get(key, "")) for key in told.words]
@@ -177,7 +177,7 @@ def of_kind(kind: Kind) -> str:
     )
 
 
-def told_by(kind: Kind) -> Told:
+def told_by(kind: StepType) -> Told:
     """Return what each key of a kind takes."""
     told = Told(kind.name)
     kind.read(told)

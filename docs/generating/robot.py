@@ -11,7 +11,7 @@ from docs.generating.shapes import keys_table
 from rbxcompose.config import Config
 from rbxcompose.manifest import section as files
 from rbxcompose.manifest.file_models import file_model
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import Section
@@ -26,7 +26,7 @@ def whole_page() -> str:
     """Return the page."""
     return page(
         "Robot, Part, Overlay",
-        f"## First keys\nEvery manifest begins with them.\n\n{keys_table(Header)}",
+        f"## First keys\nEvery manifest begins with them.\n\n{keys_table(ManifestHeader)}",
         *(section(one) for one in sections()),
         f"## A part\n{about(file_model(files.PART))}\n\n{example(PART, 'yaml')}",
         f"## An overlay\n{about(file_model(files.OVERLAY))}\n\n{example(OVERLAY, 'yaml')}",

@@ -16,7 +16,7 @@ from docs.generating.robot import models_below
 from docs.generating.shapes import with_default
 from rbxcompose.manifest.registry import sections as registered
 from rbxcompose.manifest.section import Section
-from rbxcompose.missions.program.registry import Kind, kinds
+from rbxcompose.missions.program.registry import StepType, kinds
 from rbxcompose.sdk.registry import PLUGINS, component_type
 
 PAGES = ("architecture.md", "language.md", "missions.md")
@@ -84,7 +84,7 @@ def nodes() -> str:
     return table(("kind", "takes", "options", "what it does"), map(of_node, kinds().values()))
 
 
-def of_node(kind: Kind) -> tuple[str, str, str, str]:
+def of_node(kind: StepType) -> tuple[str, str, str, str]:
     """Return the row of a kind."""
     told = told_by(kind)
     options = [f"{code(key)}: {words}" for key, words in told.words.items() if key != kind.name]
@@ -97,12 +97,12 @@ def steps() -> str:
     return table(("step", "what it does"), rows)
 
 
-def linked(kind: Kind) -> str:
+def linked(kind: StepType) -> str:
     """Return the name of a kind, which leads to its reference."""
     return f"[{code(kind.name)}](reference/missions.md#{kind.name})"
 
 
-def few_words(kind: Kind) -> str:
+def few_words(kind: StepType) -> str:
     """Return what the first line of a kind's file says of it."""
     return (inspect.getdoc(inspect.getmodule(kind)) or "").partition(": ")[2].partition("\n")[0].rstrip(".")
 

@@ -12,7 +12,7 @@ UNIT_TOLERANCE = 1e-2  # by how much the length of a rotation may differ from 1,
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class TransformAnswer:
     """Answer to `set`: was the transform taken, and what there is to say (a refusal, or a parent that was replaced)."""
 
     accepted: bool
@@ -42,18 +42,18 @@ class TransformTree:
         link = self._links.get(frame)
         return link.parent if link else None
 
-    def set(self, parent: str, child: str, transform: Transform3, *, stamp: float, static: bool) -> Placed:
+    def set(self, parent: str, child: str, transform: Transform3, *, stamp: float, static: bool) -> TransformAnswer:
         """Place `child` in `parent`, or refuse what would not be a tree; a later parent replaces an earlier one.
 
         `stamp` is the robot time [s] at which the transform was received. A static transform never grows old.
         """
         refusal = self._refusal(parent, child, transform)
         if refusal:
-            return Placed(False, refusal)
+            return TransformAnswer(False, refusal)
         before = self.parent_of(child)
         self._links[child] = _Link(parent, _normalised(transform), math.inf if static else stamp)
         moved = before is not None and before != parent
-        return Placed(True, f"'{child}' has moved from '{before}' to '{parent}'" if moved else "")
+        return TransformAnswer(True, f"'{child}' has moved from '{before}' to '{parent}'" if moved else "")
 
     def lookup(self, target: str, source: str) -> Transform3 | None:
         """Return the pose of frame `source` in frame `target`, or None when they are not connected."""

@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 import xxhash
 
 from rbxcompose.bus.goals import GoalState
-from rbxcompose.bus.local import Node
+from rbxcompose.bus.local import Participant
 from rbxcompose.bus.names import ActionNames
 from rbxcompose.bus.services import Client, Services
 from rbxcompose.bus.topics import Subscription, Topics
@@ -80,7 +80,7 @@ class ActionClient(Generic[G, R, F]):
     """Sends goals to an action server."""
 
     def __init__(
-        self, topics: Topics, services: Services, node: Node, name: str, action: type[Action[G, R, F]]
+        self, topics: Topics, services: Services, node: Participant, name: str, action: type[Action[G, R, F]]
     ) -> None:
         names = ActionNames.of(name)
         self._action = action

@@ -8,16 +8,16 @@ from typing import Any, Generic, TypeVar
 from rbxcompose.bus.allowance import Allowance
 from rbxcompose.bus.gate import BURST, GOALS
 from rbxcompose.bus.goals import Goal, Goals, GoalState
-from rbxcompose.bus.local import Node
+from rbxcompose.bus.local import Participant
 from rbxcompose.bus.names import ActionNames
-from rbxcompose.bus.services import Request, Server, Services
+from rbxcompose.bus.services import ServedRequest, Server, Services
 from rbxcompose.bus.topics import Publisher, Topics
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo, GoalStatus, GoalStatusArray
 from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.types import Action, Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
 from rbxcompose.qos import Qos
-from rbxcompose.scheduler import Event
+from rbxcompose.scheduler import ScheduledCallback
 
 STATUS_PERIOD = 0.1  # [s] between two publications of the states of goals in a flood of them
 LOG_PERIOD = 1.0  # [s] between two lines of the log on a flood of goals
@@ -69,7 +69,7 @@ class ActionServer(Generic[G, R, F]):
         self,
         topics: Topics,
         services: Services,
-        node: Node,
+        node: Participant,
         name: str,
         action: type[Action[G, R, F]],
         accept: Callable[[G], str],
@@ -82,11 +82,11 @@ class ActionServer(Generic[G, R, F]):
         self._name, self._action, self._accept = name, action, accept
         self._process, self._owner = node.process, node.owner
         self._goals: Goals[G, R] = Goals()
-        self._asked: dict[bytes, list[Request[Any, Any]]] = {}  # for the results of goals that have not ended
+        self._asked: dict[bytes, list[ServedRequest[Any, Any]]] = {}  # for the results of goals that have not ended
         self._may_tell = Allowance(1 / STATUS_PERIOD, BURST)
-        self._will_tell: Event | None = None
+        self._will_tell: ScheduledCallback | None = None
         self._may_log, self._unlogged = Allowance(1 / LOG_PERIOD, LOG_BURST), 0
-        self._will_log: Event | None = None
+        self._will_log: ScheduledCallback | None = None
         self._feedback = Publisher(topics, node, names.feedback, action.FeedbackMessage, Qos.STATE)
         self._status = Publisher(topics, node, names.status, GoalStatusArray, Qos.LATCHED)
         self._servers: list[Server[Any, Any]] = [
@@ -158,7 +158,7 @@ class ActionServer(Generic[G, R, F]):
         self._process.log(self._owner, f"{self._name}: {self._unlogged} more goals were refused, aborted or replaced")
         self._unlogged, self._will_log = 0, None
 
-    def _on_send(self, request: Request[Any, Any]) -> None:
+    def _on_send(self, request: ServedRequest[Any, Any]) -> None:
         response, id_ = self._action.SendGoal.Response, request.message.goal_id.uuid
         self._goals.forget(self._now)
         reason = self._accept(request.message.goal) if self._goals.find(id_) is None else "it was sent before"
@@ -180,13 +180,13 @@ class ActionServer(Generic[G, R, F]):
         else:
             self.end(goal, GoalState.ABORTED, None, "replaced by a newer goal")
 
-    def _on_cancel(self, request: Request[CancelGoal.Request, CancelGoal.Response]) -> None:
+    def _on_cancel(self, request: ServedRequest[CancelGoal.Request, CancelGoal.Response]) -> None:
         info = request.message.goal_info
         code, goals = self._goals.cancel(info.goal_id.uuid, to_nanoseconds(info.stamp))
         self._tell_status()
         request.reply(CancelGoal.Response(return_code=code, goals_canceling=tuple(map(_info, goals))))
 
-    def _on_get_result(self, request: Request[Any, Any]) -> None:
+    def _on_get_result(self, request: ServedRequest[Any, Any]) -> None:
         self._goals.forget(self._now)
         goal = self._goals.find(request.message.goal_id.uuid)
         if goal is None:
@@ -201,7 +201,7 @@ class ActionServer(Generic[G, R, F]):
             self._log("its goal is cancelled: the client went away")
             self._tell_status()
 
-    def _reply_result(self, request: Request[Any, Any], goal: Goal[G, R]) -> None:
+    def _reply_result(self, request: ServedRequest[Any, Any], goal: Goal[G, R]) -> None:
         request.reply(self._action.GetResult.Response(status=goal.state, result=goal.result))
 
     def _tell_status(self) -> None:

@@ -8,12 +8,12 @@ from typing import Any, TypeVar
 from rbxcompose.bus.action_client import ActionClient
 from rbxcompose.bus.action_server import ActionServer
 from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import Node, Process, Refusing
+from rbxcompose.bus.local import BusProcess, Participant, Refusing
 from rbxcompose.bus.orders import OrderPublisher
-from rbxcompose.bus.services import Client, Request, Server, Services
+from rbxcompose.bus.services import Client, ServedRequest, Server, Services
 from rbxcompose.bus.tokens import publishers_pattern
 from rbxcompose.bus.topics import Publisher, Subscription, Topics
-from rbxcompose.bus.transport import Closable, Nowhere, Transport
+from rbxcompose.bus.transport import Closable, NoTransport, Transport
 from rbxcompose.bus.window import Window
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.bus.witness import Witness
@@ -51,11 +51,11 @@ class Bus:
         witness: Witness | None = None,
         log: Callable[[str, str], None],
     ) -> None:
-        self._transport = transport if transport is not None else Nowhere()
+        self._transport = transport if transport is not None else NoTransport()
         space = f"/{namespace.strip('/')}" if namespace else ""
-        self._process = Process(scheduler, clock, self._transport, WIRE_PROFILES[wire], domain, space, log)
+        self._process = BusProcess(scheduler, clock, self._transport, WIRE_PROFILES[wire], domain, space, log)
         self._topics, self._services = Topics(), Services(witness=witness)
-        self._nodes: dict[str, Node] = {}
+        self._nodes: dict[str, Participant] = {}
 
     def __len__(self) -> int:
         """Return how many publishers, subscriptions, servers and clients are declared."""
@@ -106,7 +106,7 @@ class Bus:
         owner: str,
         name: str,
         service: type[Service[Q, R]],
-        handle: Callable[[Request[Q, R]], None],
+        handle: Callable[[ServedRequest[Q, R]], None],
         *,
         waits: bool = False,
     ) -> None:
@@ -181,12 +181,12 @@ class Bus:
             self.close_owner(owner)
         self._transport.close()
 
-    def _node(self, owner: str) -> Node:
+    def _node(self, owner: str) -> Participant:
         if owner not in self._nodes:
-            self._nodes[owner] = Node(self._process, owner)
+            self._nodes[owner] = Participant(self._process, owner)
         return self._nodes[owner]
 
 
-def _kept(node: Node, end: C) -> C:
+def _kept(node: Participant, end: C) -> C:
     node.keep(end)
     return end

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from rbxcompose.bus.allowance import Allowances
 from rbxcompose.bus.attachment import AttachmentError, decode_attachment
-from rbxcompose.bus.local import Node
-from rbxcompose.bus.refusals import Refusal, Refusals
+from rbxcompose.bus.local import Participant
+from rbxcompose.bus.refusals import RefusalReason, Refusals
 from rbxcompose.bus.transport import Question
 
 REQUESTS = 1000.0  # [Hz] of one asker, for services
@@ -21,7 +21,7 @@ SOMEBODY = b""  # who asks without saying who it is
 class Gate:
     """Lets in what each asker may ask. It is called in threads of the transport and wakes nobody for the rest."""
 
-    def __init__(self, node: Node, name: str, rate: float, put: Callable[[Question], None]) -> None:
+    def __init__(self, node: Participant, name: str, rate: float, put: Callable[[Question], None]) -> None:
         """Hand at most `rate` requests a second [Hz] of each asker to `put`; `name` is what findings call it."""
         self.owner, self.name = node.owner, name
         self.refusals = Refusals()
@@ -39,7 +39,7 @@ class Gate:
         if self._allowances.takes(asker, self._clock.now()):
             self._put(question)
         else:
-            self.refusals.add(Refusal.TOO_MANY)
+            self.refusals.add(RefusalReason.TOO_MANY)
             question.fail(f"more than {self._rate:g} requests a second")
 
     def close(self) -> None:

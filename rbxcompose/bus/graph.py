@@ -14,7 +14,7 @@ _WIRE = WireProfile("tokens")
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class Kind:
+class WireType:
     """What the two ends of a wire must agree in: the ROS type and its hash."""
 
     type: str
@@ -22,25 +22,25 @@ class Kind:
 
 
 @dataclass(frozen=True, slots=True)
-class End:
+class GraphEnd:
     """A publisher, subscription, server or client. `qos` is None if its token tells something that we cannot read."""
 
     node: str
-    kind: Kind
+    kind: WireType
     gid: bytes
     qos: RosQos | None
 
 
 @dataclass(frozen=True, slots=True)
-class Name:
+class GraphName:
     """A topic, service or action: who gives (publishers, servers), and who takes (subscriptions, clients)."""
 
     name: str
-    givers: tuple[End, ...]
-    takers: tuple[End, ...]
+    givers: tuple[GraphEnd, ...]
+    takers: tuple[GraphEnd, ...]
 
     @property
-    def kinds(self) -> list[Kind]:
+    def kinds(self) -> list[WireType]:
         """Return all types with their hashes: those of who gives first, as they count more."""
         given = sorted({end.kind for end in self.givers})
         return given + sorted({end.kind for end in self.takers} - set(given))
@@ -70,9 +70,9 @@ class Graph:
     """All that was on the bus at one moment, sorted by name. The parts of actions are also topics and services."""
 
     nodes: Sequence[str]
-    topics: Sequence[Name]
-    services: Sequence[Name]
-    actions: Sequence[Name]
+    topics: Sequence[GraphName]
+    services: Sequence[GraphName]
+    actions: Sequence[GraphName]
 
     @classmethod
     def of(cls, keys: Iterable[str]) -> Graph:
@@ -87,42 +87,45 @@ class Graph:
         )
 
 
-def find(names: Iterable[Name], wanted: str) -> Name | None:
+def find(names: Iterable[GraphName], wanted: str) -> GraphName | None:
     """Return the one of that name, with or without its leading slash."""
     full = f"/{wanted.lstrip('/')}"
     return next((one for one in names if one.name == full), None)
 
 
-def _named(ends: Iterable[EndpointToken], giving: EntityKind, taking: EntityKind) -> list[Name]:
-    givers: dict[str, list[End]] = {}
-    takers: dict[str, list[End]] = {}
+def _named(ends: Iterable[EndpointToken], giving: EntityKind, taking: EntityKind) -> list[GraphName]:
+    givers: dict[str, list[GraphEnd]] = {}
+    takers: dict[str, list[GraphEnd]] = {}
     for token in ends:
         if token.kind in (giving, taking):
             (givers if token.kind is giving else takers).setdefault(token.name, []).append(_end(token))
-    return [Name(name, tuple(givers.get(name, ())), tuple(takers.get(name, ()))) for name in sorted({*givers, *takers})]
+    return [
+        GraphName(name, tuple(givers.get(name, ())), tuple(takers.get(name, ()))) for name in sorted({*givers, *takers})
+    ]
 
 
-def _actions(ends: Iterable[EndpointToken]) -> list[Name]:
+def _actions(ends: Iterable[EndpointToken]) -> list[GraphName]:
     """Return the actions: each is told by the service to which goals are sent."""
     sending = [token for token in ends if token.name.endswith(_SEND_GOAL)]
     return [
-        Name(one.name.removesuffix(_SEND_GOAL), _as_action(one.givers), _as_action(one.takers))
+        GraphName(one.name.removesuffix(_SEND_GOAL), _as_action(one.givers), _as_action(one.takers))
         for one in _named(sending, EntityKind.SERVER, EntityKind.CLIENT)
     ]
 
 
-def _as_action(ends: Iterable[End]) -> tuple[End, ...]:
+def _as_action(ends: Iterable[GraphEnd]) -> tuple[GraphEnd, ...]:
     return tuple(
-        End(end.node, Kind(end.kind.type.removesuffix("_SendGoal"), end.kind.hash), end.gid, end.qos) for end in ends
+        GraphEnd(end.node, WireType(end.kind.type.removesuffix("_SendGoal"), end.kind.hash), end.gid, end.qos)
+        for end in ends
     )
 
 
-def _end(token: EndpointToken) -> End:
+def _end(token: EndpointToken) -> GraphEnd:
     try:
         qos = _WIRE.read_qos(token.qos)
     except ValueError:
         qos = None
-    return End(_node(token.node), Kind(ros_type(token.dds_type), token.type_hash), gid(token.key), qos)
+    return GraphEnd(_node(token.node), WireType(ros_type(token.dds_type), token.type_hash), gid(token.key), qos)
 
 
 def _node(token: NodeToken) -> str:

@@ -57,7 +57,7 @@ class Refusing(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Process:
+class BusProcess:
     """What all ends of a process have in common."""
 
     scheduler: Scheduler
@@ -81,10 +81,10 @@ class Endpoint:
     gid: bytes
 
 
-class Node:
+class Participant:
     """A component as a participant: it announces itself, and what it declared is closed with it."""
 
-    def __init__(self, process: Process, owner: str) -> None:
+    def __init__(self, process: BusProcess, owner: str) -> None:
         self.process = process
         self.owner = owner
         self._token = NodeToken(process.domain, process.transport.session, next(process.ids), owner, process.namespace)

@@ -7,7 +7,7 @@ from functools import partial
 from typing import TypeVar
 
 from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import Node
+from rbxcompose.bus.local import Participant
 from rbxcompose.bus.tokens import EndpointToken, EntityKind, gid, parse_token, session_of
 from rbxcompose.bus.topics import Publisher, Topics
 from rbxcompose.msgs.types import Message
@@ -23,7 +23,7 @@ class OrderPublisher(Publisher[M]):
     """
 
     def __init__(
-        self, topics: Topics, node: Node, topic: str, message: type[M], qos: Qos, servers: Collection[str]
+        self, topics: Topics, node: Participant, topic: str, message: type[M], qos: Qos, servers: Collection[str]
     ) -> None:
         super().__init__(topics, node, topic, message, qos)
         self._servers = frozenset(servers)

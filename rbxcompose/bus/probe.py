@@ -15,7 +15,7 @@ def probe_key(robot: str) -> str:
     return admin_key(robot, "probe")
 
 
-class Heard(Enum):
+class ProbeResult(Enum):
     """What became of a probe by the time when the next one is due."""
 
     ANSWER = auto()  # of anybody: the session carries data
@@ -40,14 +40,14 @@ class Probe:
         """Tell whether the last probe was missed, so that the next one goes to all; else whoever is near will do."""
         return self._misses > 0
 
-    def judge(self, heard: Heard, *, is_router_up: bool) -> bool:
+    def judge(self, heard: ProbeResult, *, is_router_up: bool) -> bool:
         """Take what became of a probe; return whether the session is stuck, to be opened anew.
 
         After a renewal that did not help, twice as many misses are waited for.
         """
-        if heard is Heard.ANSWER:
+        if heard is ProbeResult.ANSWER:
             self._misses, self._bound = 0, MISSES
-        elif heard is Heard.NOTHING or (self._expects_router and is_router_up):
+        elif heard is ProbeResult.NOTHING or (self._expects_router and is_router_up):
             self._misses += 1
         if self._misses < self._bound:
             return False

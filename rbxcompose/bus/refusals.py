@@ -6,7 +6,7 @@ from enum import StrEnum
 from itertools import count
 
 
-class Refusal(StrEnum):
+class RefusalReason(StrEnum):
     """Why a message is refused; the words complete the sentence `12 messages were refused: ...`."""
 
     TOO_MANY = "too many at once"
@@ -20,11 +20,11 @@ class Refusals:
     """Counts refusals. `add` may be called by any thread, all else only by the scheduler's."""
 
     def __init__(self) -> None:
-        self._numbers = {reason: count(1) for reason in Refusal}  # `next` is one step even with several threads
-        self._counted = dict.fromkeys(Refusal, 0)
-        self._told = dict.fromkeys(Refusal, 0)
+        self._numbers = {reason: count(1) for reason in RefusalReason}  # `next` is one step even with several threads
+        self._counted = dict.fromkeys(RefusalReason, 0)
+        self._told = dict.fromkeys(RefusalReason, 0)
 
-    def add(self, reason: Refusal) -> None:
+    def add(self, reason: RefusalReason) -> None:
         """Count one more."""
         self._counted[reason] = next(self._numbers[reason])
 
@@ -33,15 +33,15 @@ class Refusals:
         """Return how many messages have been refused."""
         return sum(self._counted.values())
 
-    def news(self) -> dict[Refusal, int]:
+    def news(self) -> dict[RefusalReason, int]:
         """Return how many were refused since the last call, by reason."""
         counted = dict(self._counted)
-        new = {reason: counted[reason] - self._told[reason] for reason in Refusal}
+        new = {reason: counted[reason] - self._told[reason] for reason in RefusalReason}
         self._told = counted
         return {reason: number for reason, number in new.items() if number > 0}
 
 
-def sentence(name: str, news: dict[Refusal, int], what: str = "message") -> str:
+def sentence(name: str, news: dict[RefusalReason, int], what: str = "message") -> str:
     """Say what has been refused on a topic, or at a service."""
     total = sum(news.values())
     messages = f"1 {what} was" if total == 1 else f"{total} {what}s were"

@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Arrival, Closable, Question, RemotePublisher, Transport
+from rbxcompose.bus.transport import (
+    LONGEST_WAIT,
+    Arrival,
+    Closable,
+    Question,
+    RemotePublisher,
+    Transport,
+    TransportReply,
+)
 from rbxcompose.qos import Qos
 
 RENEWED = "the session on the bus was opened anew"
@@ -71,7 +79,7 @@ class RenewableTransport:
         key: str,
         payload: bytes,
         attachment: bytes,
-        answered: Callable[[Answer], None],
+        answered: Callable[[TransportReply], None],
         *,
         of_all: bool = True,
         within: float = LONGEST_WAIT,
@@ -165,14 +173,14 @@ class _Publisher(_Entry):
 
 
 class _Request(_Entry):
-    def __init__(self, entries: Entries, declare: Declare, answered: Callable[[Answer], None]) -> None:
+    def __init__(self, entries: Entries, declare: Declare, answered: Callable[[TransportReply], None]) -> None:
         super().__init__(entries, declare)
         self._answered = answered
 
     def detach(self) -> None:
         super().detach()
         self._entries.pop(self, None)  # it may have been carried out: asking again is the caller's decision
-        self._answered(Answer(error=RENEWED))
+        self._answered(TransportReply(error=RENEWED))
 
 
 class _Watch(_Entry):

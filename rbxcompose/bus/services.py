@@ -13,14 +13,14 @@ from rbxcompose.bus.attachment import Attachment, decode_attachment
 from rbxcompose.bus.classes import SERVICE_QOS
 from rbxcompose.bus.gate import REQUESTS, Gate
 from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import Node, Registry
+from rbxcompose.bus.local import Participant, Registry
 from rbxcompose.bus.tokens import EntityKind, gid, session_of
-from rbxcompose.bus.transport import Answer, Closable, Question
-from rbxcompose.bus.witness import Call, Witness
+from rbxcompose.bus.transport import Closable, Question, TransportReply
+from rbxcompose.bus.witness import Witness, WitnessedCall
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.requests import Refused
-from rbxcompose.scheduler import Event
+from rbxcompose.scheduler import ScheduledCallback
 from rbxcompose.sdk.bound import Reply
 
 Q = TypeVar("Q", bound=Message)
@@ -30,7 +30,7 @@ LONGEST_QUEUE = 100  # requests that wait for a server
 LOST = "the server went away"
 
 
-Answered = Callable[[Reply[R]], None]
+WhenAnswered = Callable[[Reply[R]], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,15 +42,15 @@ class Services:
     witness: Witness | None = None
 
 
-class Request(Generic[Q, R]):
+class ServedRequest(Generic[Q, R]):
     """A request as its server sees it; it is answered once, now or later."""
 
-    def __init__(self, message: Q, client: bytes, sequence: int, answer: Answered[R]) -> None:
+    def __init__(self, message: Q, client: bytes, sequence: int, answer: WhenAnswered[R]) -> None:
         self.message = message
         self.client = client  # GID
         self.sequence = sequence  # among those of its client
-        self.witness: Answered[R] | None = None  # hears the answer first
-        self._answer: Answered[R] | None = answer
+        self.witness: WhenAnswered[R] | None = None  # hears the answer first
+        self._answer: WhenAnswered[R] | None = answer
 
     @property
     def is_open(self) -> bool:
@@ -79,10 +79,10 @@ class Server(Generic[Q, R]):
     def __init__(
         self,
         services: Services,
-        node: Node,
+        node: Participant,
         name: str,
         service: type[Service[Q, R]],
-        handle: Callable[[Request[Q, R]], None],
+        handle: Callable[[ServedRequest[Q, R]], None],
         client_left: Callable[[bytes], None] | None = None,
         *,
         waits: bool = False,
@@ -94,9 +94,9 @@ class Server(Generic[Q, R]):
         self.malformed = 0  # requests that could not be read
         self._services, self._process, self._owner, self._service = services, node.process, node.owner, service
         self._handle, self._client_left = handle, client_left
-        self._open: list[Request[Q, R]] = []
+        self._open: list[ServedRequest[Q, R]] = []
         post, transport = self._process.scheduler.post, self._process.transport
-        self._inbox: Inbox[Request[Q, R] | Question] = Inbox(node.owner, LONGEST_QUEUE, self._take, post)
+        self._inbox: Inbox[ServedRequest[Q, R] | Question] = Inbox(node.owner, LONGEST_QUEUE, self._take, post)
         self._left: Inbox[bytes] = Inbox(node.owner, None, self._leave, post)
         if waits:
             self._inbox.hold()
@@ -110,7 +110,7 @@ class Server(Generic[Q, R]):
         services.servers.add(self.route, self)
         self._tell_clients()
 
-    def ask(self, request: Request[Q, R]) -> None:
+    def ask(self, request: ServedRequest[Q, R]) -> None:
         """Queue a request of this process; it is handled at the same instant."""
         self._inbox.put(request, self._process.scheduler.post)
 
@@ -141,8 +141,8 @@ class Server(Generic[Q, R]):
         if self._client_left is not None:
             self._client_left(client)
 
-    def _take(self, item: Request[Q, R] | Question) -> None:
-        request = item if isinstance(item, Request) else self._read(item)
+    def _take(self, item: ServedRequest[Q, R] | Question) -> None:
+        request = item if isinstance(item, ServedRequest) else self._read(item)
         if request is not None:
             self._open = [earlier for earlier in self._open if earlier.is_open]
             self._open.append(request)
@@ -156,11 +156,11 @@ class Server(Generic[Q, R]):
                 request.fail(f"{type(error).__name__}: {error}")
                 raise
 
-    def _read(self, question: Question) -> Request[Q, R] | None:
+    def _read(self, question: Question) -> ServedRequest[Q, R] | None:
         try:
             asker = decode_attachment(question.attachment)
             message, answer = decode(self._service.Request, question.payload), partial(self._answer, question, asker)
-            return Request(message, asker.gid, asker.sequence, answer)
+            return ServedRequest(message, asker.gid, asker.sequence, answer)
         except ValueError as error:
             question.fail(f"malformed request: {error}")
             self.malformed += 1
@@ -168,8 +168,12 @@ class Server(Generic[Q, R]):
                 self._process.log(self._owner, f"dropped a request to {self.route[0]}: {error}")
             return None
 
-    def _tell(self, witness: Witness, request: Request[Q, R], reply: Reply[R]) -> None:
-        witness(Call(self._owner, self.route[0], self._service, request.client, request.sequence, True, reply.response))
+    def _tell(self, witness: Witness, request: ServedRequest[Q, R], reply: Reply[R]) -> None:
+        witness(
+            WitnessedCall(
+                self._owner, self.route[0], self._service, request.client, request.sequence, True, reply.response
+            )
+        )
 
     def _answer(self, question: Question, asker: Attachment, reply: Reply[R]) -> None:
         if reply.response is None:
@@ -183,9 +187,9 @@ class Server(Generic[Q, R]):
 class _Waiting(Generic[R]):
     """A request that was sent and not answered yet."""
 
-    then: Answered[R]
+    then: WhenAnswered[R]
     servers: frozenset[str] = frozenset()  # tokens of the servers in other processes that were asked
-    timer: Event | None = None
+    timer: ScheduledCallback | None = None
     remote: Closable | None = None
 
     def forget(self) -> None:
@@ -198,7 +202,7 @@ class _Waiting(Generic[R]):
 class Client(Generic[Q, R]):
     """Asks a service. A server of the same process is preferred; replies come by the scheduler."""
 
-    def __init__(self, services: Services, node: Node, name: str, service: type[Service[Q, R]]) -> None:
+    def __init__(self, services: Services, node: Participant, name: str, service: type[Service[Q, R]]) -> None:
         endpoint = node.endpoint(EntityKind.CLIENT, name, service, SERVICE_QOS)
         self.route, self.gid = endpoint.route, endpoint.gid
         self._services, self._process, self._owner = services, node.process, node.owner
@@ -224,7 +228,7 @@ class Client(Generic[Q, R]):
         """Have `changed` called whenever a server comes to be known, and when none is known any more."""
         self._watchers.append(changed)
 
-    def __call__(self, request: Q, then: Answered[R], /, *, timeout: float = 5.0) -> None:
+    def __call__(self, request: Q, then: WhenAnswered[R], /, *, timeout: float = 5.0) -> None:
         """Send `request`; `then` gets the reply, or an error after `timeout` [s] or if there is no server."""
         sequence = next(self._sequence)
         waiting = self._waiting[sequence] = _Waiting(then, frozenset(self._servers))
@@ -232,10 +236,12 @@ class Client(Generic[Q, R]):
             late = partial(self._end, sequence, Reply(None, f"no reply within {timeout:g} s"))
             waiting.timer = self._process.scheduler.at(self._process.scheduler.now + timeout, self._owner, late)
         if self._services.witness is not None:
-            self._services.witness(Call(self._owner, self.route[0], self._service, self.gid, sequence, False, request))
+            self._services.witness(
+                WitnessedCall(self._owner, self.route[0], self._service, self.gid, sequence, False, request)
+            )
         if local := self._services.servers.at(self.route):
             waiting.servers = frozenset()
-            local[0].ask(Request(request, self.gid, sequence, partial(self._answered, sequence)))
+            local[0].ask(ServedRequest(request, self.gid, sequence, partial(self._answered, sequence)))
         elif self._servers:
             source = Attachment(sequence, self._process.clock.stamp(), self.gid)
             waiting.remote = self._process.transport.ask(
@@ -262,7 +268,7 @@ class Client(Generic[Q, R]):
     def _answered(self, sequence: int, reply: Reply[R]) -> None:
         self._inbox.put(partial(self._end, sequence, reply), self._process.scheduler.post)
 
-    def _answered_from_afar(self, sequence: int, answer: Answer) -> None:
+    def _answered_from_afar(self, sequence: int, answer: TransportReply) -> None:
         self._inbox.put(partial(self._read, sequence, answer), self._process.transport.wake)
 
     def _server_changed(self, token: str, is_there: bool) -> None:
@@ -286,7 +292,7 @@ class Client(Generic[Q, R]):
             for watcher in self._watchers:
                 watcher(self._was_available)
 
-    def _read(self, sequence: int, answer: Answer) -> None:
+    def _read(self, sequence: int, answer: TransportReply) -> None:
         if answer.error:
             self._end(sequence, Reply(None, answer.error))
             return

@@ -12,11 +12,11 @@ from rbxcompose.bus.allowance import Allowances
 from rbxcompose.bus.attachment import Attachment, AttachmentError, decode_attachment
 from rbxcompose.bus.classes import expects_speech, most_per_second, queue_depth, ros_qos
 from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import Node, Registry
-from rbxcompose.bus.refusals import Refusal, Refusals
+from rbxcompose.bus.local import Participant, Registry
+from rbxcompose.bus.refusals import RefusalReason, Refusals
 from rbxcompose.bus.tokens import EntityKind
 from rbxcompose.bus.transport import Arrival, Closable
-from rbxcompose.bus.writers import Reader
+from rbxcompose.bus.writers import TopicReader
 from rbxcompose.msgs.cdr import CdrError, CdrLengthError, decode, encode
 from rbxcompose.msgs.finite import NotFiniteError, require_finite
 from rbxcompose.msgs.types import Message
@@ -47,7 +47,7 @@ class Topics:
 class Publisher(Generic[M]):
     """Publishes one message per call."""
 
-    def __init__(self, topics: Topics, node: Node, topic: str, message: type[M], qos: Qos) -> None:
+    def __init__(self, topics: Topics, node: Participant, topic: str, message: type[M], qos: Qos) -> None:
         endpoint = node.endpoint(EntityKind.PUBLISHER, topic, message, ros_qos(qos))
         self.route, self.gid = endpoint.route, endpoint.gid
         self.kept: Delivery[M] | None = None  # the last message of a latched topic
@@ -94,7 +94,7 @@ class Subscription(Generic[M]):
     def __init__(
         self,
         topics: Topics,
-        node: Node,
+        node: Participant,
         topic: str,
         message: type[M],
         qos: Qos,
@@ -152,13 +152,13 @@ class Subscription(Generic[M]):
         return self._inbox.dropped
 
     @property
-    def reader(self) -> Reader:
+    def reader(self) -> TopicReader:
         """Return what is asked of who publishes the topic elsewhere."""
         self.catch_up()
         type_hash = self._process.wire.hash_of(self._message)
         is_part_of_an_action = "/_" in self.route[0]  # nobody speaks there as long as there is no goal
         speaks = expects_speech(self._qos) and not is_part_of_an_action
-        return Reader(self.owner, self.route, type_hash, self._arrived, speaks)
+        return TopicReader(self.owner, self.route, type_hash, self._arrived, speaks)
 
     def listen(self) -> None:
         """Receive from now on what other processes send."""
@@ -204,10 +204,10 @@ class Subscription(Generic[M]):
         try:
             source = decode_attachment(arrival.attachment)
         except AttachmentError:
-            self.refusals.add(Refusal.ATTACHMENT)
+            self.refusals.add(RefusalReason.ATTACHMENT)
             return False
         if not allowances.takes(source.gid, now):
-            self.refusals.add(Refusal.TOO_MANY)
+            self.refusals.add(RefusalReason.TOO_MANY)
             return False
         return True
 
@@ -231,16 +231,16 @@ class Subscription(Generic[M]):
             return None
         return Delivery(message, source)
 
-    def _refuse(self, reason: Refusal, detail: str) -> None:
+    def _refuse(self, reason: RefusalReason, detail: str) -> None:
         self.refusals.add(reason)
         if not self._has_complained:
             self._has_complained = True
             self._process.log(self.owner, f"dropped a message on {self.route[0]}: {detail}")
 
 
-_REASONS: dict[type[ValueError], Refusal] = {
-    AttachmentError: Refusal.ATTACHMENT,
-    CdrLengthError: Refusal.LENGTH,
-    CdrError: Refusal.CONTENT,
-    NotFiniteError: Refusal.NOT_FINITE,
+_REASONS: dict[type[ValueError], RefusalReason] = {
+    AttachmentError: RefusalReason.ATTACHMENT,
+    CdrLengthError: RefusalReason.LENGTH,
+    CdrError: RefusalReason.CONTENT,
+    NotFiniteError: RefusalReason.NOT_FINITE,
 }

@@ -50,7 +50,7 @@ class Question(Arrival, Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class TransportReply:
     """What became of a request: a payload, or an error."""
 
     payload: bytes = b""
@@ -96,7 +96,7 @@ class Transport(Protocol):
         key: str,
         payload: bytes,
         attachment: bytes,
-        answered: Callable[[Answer], None],
+        answered: Callable[[TransportReply], None],
         *,
         of_all: bool = True,
         within: float = LONGEST_WAIT,
@@ -120,7 +120,7 @@ class Transport(Protocol):
         ...
 
 
-class Nowhere:
+class NoTransport:
     """The transport of a process that is alone: it reaches nobody and nobody reaches it."""
 
     session = "0"
@@ -130,15 +130,15 @@ class Nowhere:
         """Refuse: without other processes nothing arrives."""
         raise RuntimeError(f"something arrived for '{owner}' from nowhere")
 
-    def publisher(self, key: str, qos: Qos) -> Nowhere:
+    def publisher(self, key: str, qos: Qos) -> NoTransport:
         """Declare a publisher without subscribers."""
         return self
 
-    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Nowhere:
+    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> NoTransport:
         """Receive nothing."""
         return self
 
-    def serve(self, key: str, asked: Callable[[Question], None]) -> Nowhere:
+    def serve(self, key: str, asked: Callable[[Question], None]) -> NoTransport:
         """Receive no requests."""
         return self
 
@@ -147,19 +147,19 @@ class Nowhere:
         key: str,
         payload: bytes,
         attachment: bytes,
-        answered: Callable[[Answer], None],
+        answered: Callable[[TransportReply], None],
         *,
         of_all: bool = True,
         within: float = LONGEST_WAIT,
-    ) -> Nowhere:
+    ) -> NoTransport:
         """Refuse: no token of a server was ever seen."""
         raise RuntimeError(f"no server of {key} can be reached")
 
-    def announce(self, token: str) -> Nowhere:
+    def announce(self, token: str) -> NoTransport:
         """Show a token to nobody."""
         return self
 
-    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Nowhere:
+    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> NoTransport:
         """See no tokens."""
         return self
 

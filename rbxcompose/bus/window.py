@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from rbxcompose.bus.gate import QUESTIONS, Gate
 from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import Node
+from rbxcompose.bus.local import Participant
 from rbxcompose.bus.transport import Closable, Question
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Refused
@@ -25,7 +25,7 @@ GRACE = 2.0  # [s] after a question in which somebody counts as listening: the t
 class Window:
     """Tells news to those who listen; `answer` returns the whole as data for JSON, or raises Refused."""
 
-    def __init__(self, node: Node, key: str, answer: Callable[[], object]) -> None:
+    def __init__(self, node: Participant, key: str, answer: Callable[[], object]) -> None:
         process, transport = node.process, node.process.transport
         self._source = f"{transport.session}/{next(process.ids)}"
         self._clock, self._answer = process.clock, answer

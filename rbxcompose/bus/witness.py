@@ -10,7 +10,7 @@ from rbxcompose.msgs.types import Message, Service
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class WitnessedCall:
     """A request, or the reply to one, as it leaves `node`."""
 
     node: str  # the client's for a request, the server's for a reply
@@ -22,4 +22,4 @@ class Call:
     message: Message | None  # None: a reply without a response, since the request was refused or failed
 
 
-Witness = Callable[[Call], None]
+Witness = Callable[[WitnessedCall], None]

@@ -12,7 +12,7 @@ SILENCE = 5.0  # [s] after which a publisher of a state, or of something latched
 
 
 @dataclass(frozen=True, slots=True)
-class Writer:
+class TopicWriter:
     """A publisher in another process, and since when it is known [s]."""
 
     token: EndpointToken
@@ -20,7 +20,7 @@ class Writer:
 
 
 @dataclass(frozen=True, slots=True)
-class Reader:
+class TopicReader:
     """A subscription of this process as far as its writers matter; `arrived` [s] is when a message came last."""
 
     owner: str
@@ -35,7 +35,7 @@ class Writers:
 
     def __init__(self, session: str) -> None:
         self._session = session
-        self._by_topic: dict[str, dict[str, Writer]] = {}
+        self._by_topic: dict[str, dict[str, TopicWriter]] = {}
 
     def heard(self, key: str, now: float, *, is_there: bool) -> None:
         """Take a token that came or went."""
@@ -46,13 +46,13 @@ class Writers:
             return
         known = self._by_topic.setdefault(token.name, {})
         if is_there:
-            known.setdefault(key, Writer(token, now))
+            known.setdefault(key, TopicWriter(token, now))
         else:
             known.pop(key, None)
         if not known:
             del self._by_topic[token.name]
 
-    def trouble(self, reader: Reader, now: float, started: float) -> str:
+    def trouble(self, reader: TopicReader, now: float, started: float) -> str:
         """Say why `reader` gets nothing at `now` from a writer of its topic; empty if all is well.
 
         Silence counts from `started` [s], when the whole robot had become active.
@@ -73,10 +73,10 @@ class Writers:
         names = " and ".join(dict.fromkeys(f"'{_name(writer)}'" for writer in writers))
         return f"'{reader.owner}' has heard nothing on {topic} for {now - since:.0f} s, though {names} publishes it"
 
-    def _of(self, topic: str) -> list[Writer]:
+    def _of(self, topic: str) -> list[TopicWriter]:
         known = self._by_topic.get(topic, {})
         return [known[key] for key in sorted(known)]
 
 
-def _name(writer: Writer) -> str:
+def _name(writer: TopicWriter) -> str:
     return f"{writer.token.node.namespace}/{writer.token.node.name}".removeprefix("/")

@@ -12,7 +12,7 @@ from zenoh.handlers import Callback
 from rbxcompose.bus.classes import SERVICE_SENDING, Sending, sending
 from rbxcompose.bus.inbox import Post
 from rbxcompose.bus.threads import keep_attached
-from rbxcompose.bus.transport import EXPIRED, LONGEST_WAIT, Answer, Arrival, Closable, Question, RemotePublisher
+from rbxcompose.bus.transport import EXPIRED, LONGEST_WAIT, Arrival, Closable, Question, RemotePublisher, TransportReply
 from rbxcompose.qos import Qos
 
 HEARTBEAT = 0.5  # [s] after a latched message, its sequence number is told again
@@ -75,7 +75,7 @@ class ZenohTransport:
         key: str,
         payload: bytes,
         attachment: bytes,
-        answered: Callable[[Answer], None],
+        answered: Callable[[TransportReply], None],
         *,
         of_all: bool = True,
         within: float = LONGEST_WAIT,
@@ -83,7 +83,7 @@ class ZenohTransport:
         """Send a request. An answer or an error comes once the server has one or is gone; closing forgets it."""
         token = zenoh.CancellationToken()
         # The query ends with `drop`: after an answer that is nothing new, without one the server is gone.
-        handler = _direct(lambda reply: answered(_answer(reply)), lambda: answered(Answer(error=GONE)))
+        handler = _direct(lambda reply: answered(_answer(reply)), lambda: answered(TransportReply(error=GONE)))
         self._session.get(
             key,
             handler,
@@ -206,11 +206,11 @@ class _Asked:
         self._token.cancel()  # type: ignore[no-untyped-call]
 
 
-def _answer(reply: zenoh.Reply) -> Answer:
+def _answer(reply: zenoh.Reply) -> TransportReply:
     if reply.ok is not None:
-        return Answer(reply.ok.payload.to_bytes())
+        return TransportReply(reply.ok.payload.to_bytes())
     error = reply.err.payload.to_string() if reply.err is not None else GONE
-    return Answer(error=EXPIRED if error == ZENOH_EXPIRED else error)
+    return TransportReply(error=EXPIRED if error == ZENOH_EXPIRED else error)
 
 
 def _direct(callback: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Callback[Any]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
-from rbxcompose.expressions.tree import Call, Expression, ExpressionError, Index, Number, Variable, walk
+from rbxcompose.expressions.tree import Expression, ExpressionError, FunctionCall, Index, Number, Variable, walk
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.language.spans import expression_of, inner_span
 from rbxcompose.missions.program.program import Program
 from rbxcompose.model.charge import constants
@@ -39,7 +39,7 @@ def beyond_list(robot: Robot) -> Iterator[Finding]:
     for mission in robot.missions.values():
         known = constants(mission)
         for scalar, expression in _expressions(mission.program):
-            if any(isinstance(tree, Call) and tree.function == "count" for tree, _ in walk(expression.tree)):
+            if any(isinstance(tree, FunctionCall) and tree.function == "count" for tree, _ in walk(expression.tree)):
                 continue  # it asks how long the list is before it takes the item
             for tree, _ in walk(expression.tree):
                 match tree:
@@ -55,12 +55,12 @@ def beyond_list(robot: Robot) -> Iterator[Finding]:
                             )
 
 
-def _expressions(program: Program) -> Iterator[tuple[Scalar, Expression]]:
+def _expressions(program: Program) -> Iterator[tuple[ScalarNode, Expression]]:
     """Yield all expressions of a mission, the arguments of its skills included."""
     yield from ((asked.scalar, asked.expression) for _, asked in program.asked())
     for node in program.nodes:
         for argument in node.step.arguments:
-            if isinstance(argument.value, Scalar):
+            if isinstance(argument.value, ScalarNode):
                 try:
                     yield argument.value, expression_of(argument.value)
                 except ExpressionError:

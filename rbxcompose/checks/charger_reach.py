@@ -36,18 +36,18 @@ def charger_reach(robot: Robot) -> Iterator[Finding]:
         reach: 20 cm
     ```
     """
-    drivers = [(part, one.tolerance) for part, one in robot.declared(Navigates) if one.tolerance]
+    drivers = [(component, one.tolerance) for component, one in robot.declared(Navigates) if one.tolerance]
     if not drivers:
         return
     driver, tolerance = min(drivers, key=lambda one: one[1].value)
-    for part, charges in robot.declared(Charges):
+    for component, charges in robot.declared(Charges):
         reach = charges.reach
         if reach and charges.place and reach.value < tolerance.value:
-            here, there = (part, reach.field), (driver, tolerance.field)
+            here, there = (component, reach.field), (driver, tolerance.field)
             changes = [f"'{name}' {how}" for name, how in ((here[1], "larger"), (there[1], "smaller")) if name]
             yield charger_reach.at(
                 setting_span(robot, here, there),
-                f"'{part.name}' charges within {format_quantity(reach.value, LENGTH)} of the dock, "
+                f"'{component.name}' charges within {format_quantity(reach.value, LENGTH)} of the dock, "
                 f"but '{driver.name}' may end {format_quantity(tolerance.value, LENGTH)} away from it",
                 help=f"make {', or '.join(changes)}" if changes else OTHER_TYPE,
                 related=[Related(setting_span(robot, there), f"its '{there[1]}'" if there[1] else "drives there")],

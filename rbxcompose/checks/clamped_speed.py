@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rbxcompose.check_runner import check
-from rbxcompose.findings import Finding, Kind, Related, Severity
-from rbxcompose.model.flow import OTHER_TYPE, Drive, Flow, setting_span
+from rbxcompose.findings import Finding, FindingKind, Related, Severity
+from rbxcompose.model.flow import OTHER_TYPE, Drive, MessageFlow, setting_span
 from rbxcompose.model.robot import Robot
 from rbxcompose.sdk.capabilities import Setting
 from rbxcompose.units import ANGULAR_SPEED, SPEED, Dimension, format_quantity
@@ -74,7 +74,7 @@ class Excess:
             return f"make '{self.limit.field}' of '{self.drive.base.name}' at least {self.shown(self.wanted)}"
         return OTHER_TYPE
 
-    def finding(self, robot: Robot, kind: Kind, what: str) -> Finding:
+    def finding(self, robot: Robot, kind: FindingKind, what: str) -> Finding:
         """Return the finding; `what` the base does about it."""
         driver, base, name = self.drive.driver, self.drive.base, self.limit.field
         there = (base, name)
@@ -89,7 +89,7 @@ class Excess:
 
 def excesses(robot: Robot) -> Iterator[Excess]:
     """Yield the speeds and turn rates above the limits of the base that they are for."""
-    for one in Flow(robot).drives():
+    for one in MessageFlow(robot).drives():
         wants, has = one.commands, one.drives
         speeds = (wants.max_speed, has.max_speed, SPEED), (wants.max_turn_rate, has.max_turn_rate, ANGULAR_SPEED)
         for wanted, limit, dimension in speeds:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
-from rbxcompose.model.flow import OTHER_TYPE, Flow, period_of, setting_span
+from rbxcompose.model.flow import OTHER_TYPE, MessageFlow, period_of, setting_span
 from rbxcompose.model.robot import Robot
 from rbxcompose.sdk.capabilities import Drives
 from rbxcompose.units import TIME, format_quantity
@@ -34,11 +34,11 @@ def command_timeout(robot: Robot) -> Iterator[Finding]:
         command_timeout: 0.5 s
     ```
     """
-    flow = Flow(robot)
+    flow = MessageFlow(robot)
     for base, drives in robot.declared(Drives):
         allowed = drives.stops_after
         for source in flow.fed_by(base, drives.commands) if allowed else ():
-            period = period_of(robot.parts[source.instance])
+            period = period_of(robot.components[source.instance])
             if allowed and period is not None and allowed.value <= period:
                 yield command_timeout.at(
                     setting_span(robot, (base, allowed.field)),
@@ -47,5 +47,5 @@ def command_timeout(robot: Robot) -> Iterator[Finding]:
                     help=f"make it several times as long: '{format_quantity(10 * period, TIME)}'"
                     if allowed.field
                     else OTHER_TYPE,
-                    related=[Related(robot.part_span(source.instance), "sends the commands")],
+                    related=[Related(robot.component_span(source.instance), "sends the commands")],
                 )

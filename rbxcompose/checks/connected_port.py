@@ -32,9 +32,9 @@ def connected_port(robot: Robot) -> Iterator[Finding]:
     ```
     """
     for name, entry in robot.manifest.components.items():
-        if name not in robot.parts:
+        if name not in robot.components:
             continue
-        ports = [end.name for end in robot.parts[name].ends if not isinstance(end.port, Looks)]
+        ports = [end.name for end in robot.components[name].ends if not isinstance(end.port, Looks)]
         for port in entry.options.connect:
             if port not in ports:
                 yield connected_port.misspelt(

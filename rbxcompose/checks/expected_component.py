@@ -33,7 +33,7 @@ def expected_component(robot: Robot) -> Iterator[Finding]:
           expected: [charger]
     ```
     """
-    known = {*robot.parts, *robot.written}
+    known = {*robot.components, *robot.written}
     for name, analyzer in robot.manifest.diagnostics.analyzers.items():
         for index, expected in enumerate(analyzer.expected):
             if expected.partition(": ")[0] not in known:

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from rbxcompose.check_runner import check
-from rbxcompose.composition.history import Step
+from rbxcompose.composition.history import HistoryStep
 from rbxcompose.composition.overlay import SET
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.model.robot import Robot
 
 
@@ -38,7 +38,7 @@ def idle_overlay(robot: Robot) -> Iterator[Finding]:
     """
     for before, after, path in changes(robot):
         match before.node, after.node:
-            case Scalar(text=old, plain=was_plain), Scalar(text=new, plain=is_plain):
+            case ScalarNode(text=old, plain=was_plain), ScalarNode(text=new, plain=is_plain):
                 if (old, was_plain) == (new, is_plain):
                     yield idle_overlay.at(
                         after.span,
@@ -48,7 +48,7 @@ def idle_overlay(robot: Robot) -> Iterator[Finding]:
                     )
 
 
-def changes(robot: Robot) -> Iterator[tuple[Step, Step, str]]:
+def changes(robot: Robot) -> Iterator[tuple[HistoryStep, HistoryStep, str]]:
     """Yield what one layer wrote in the place of what a layer before it wrote, with its path; `--set` may repeat."""
     for path in robot.manifest.history.paths:
         for before, after in pairwise(robot.manifest.history.of(path)):

@@ -42,8 +42,8 @@ def instance_topics(robot: Robot) -> Iterator[Finding]:
     for part in robot.manifest.parts.values():
         told = {
             end.topic: end.port.topic
-            for name in part.components & robot.parts.keys()
-            for end in robot.parts[name].ends
+            for name in part.components & robot.components.keys()
+            for end in robot.components[name].ends
             if isinstance(end.port, Out) and not is_command(end)
         }
         for topic, short in sorted(told.items()):

@@ -45,7 +45,7 @@ def long_timeout(robot: Robot) -> Iterator[Finding]:
     """
     for mux, entry in robot.manifest.muxes.items():
         for name, one in entry.inputs.items():
-            end = robot.parts[mux].end(name)
+            end = robot.components[mux].end(name)
             if end and isinstance(end.port, In) and end.port.qos is Qos.COMMAND and one.timeout > LONGEST:
                 yield long_timeout.at(
                     robot.value("muxes", mux, "inputs", name, "timeout"),

@@ -70,7 +70,7 @@ def missing(robot: Robot, source: str) -> Wrong | None:
         if surely_meant(component, set(valid)) is None:
             help_text += "; without 'from' the input is open to the outside"
         return Wrong(message, help_text, component, valid)
-    part = robot.parts.get(component)
+    part = robot.components.get(component)
     if part is None:
         return None  # it is there, but broken: that is said at its own place
     outputs = [end.name for end in part.ends if isinstance(end.port, Out)]
@@ -85,7 +85,7 @@ def missing(robot: Robot, source: str) -> Wrong | None:
 def unclear(robot: Robot, mux: str, source: str) -> Wrong | None:
     """Return what is wrong with the source of an input that does not say which of several outputs is meant."""
     component, _, port = source.partition(".")
-    part = robot.parts.get(component)
+    part = robot.components.get(component)
     if part is None or port:
         return None
     outputs = [end for end in part.ends if isinstance(end.port, Out)]

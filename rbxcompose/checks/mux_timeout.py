@@ -42,14 +42,14 @@ def mux_timeout(robot: Robot) -> Iterator[Finding]:
     """
     for mux, entry in robot.manifest.muxes.items():
         for name, source in entry.inputs.items():
-            part = robot.parts.get((source.source or "").partition(".")[0])
-            period = period_of(part) if part else None
-            if part and period is not None and source.timeout < 2 * period - 1e-9:
+            component = robot.components.get((source.source or "").partition(".")[0])
+            period = period_of(component) if component else None
+            if component and period is not None and source.timeout < 2 * period - 1e-9:
                 when = "before" if source.timeout <= period else "when one message is late before"
                 yield mux_timeout.at(
                     robot.value("muxes", mux, "inputs", name, "timeout"),
-                    f"input '{name}' of mux '{mux}' times out {when} '{part.name}' sends its next message",
+                    f"input '{name}' of mux '{mux}' times out {when} '{component.name}' sends its next message",
                     label=f"it sends every {format_quantity(period, TIME)}",
                     help=f"make it several times as long: '{format_quantity(10 * period, TIME)}'",
-                    related=[Related(robot.part_span(part.name), "the source")],
+                    related=[Related(robot.component_span(component.name), "the source")],
                 )

@@ -38,7 +38,7 @@ def mux_type(robot: Robot) -> Iterator[Finding]:
     """
     for mux, entry in robot.manifest.muxes.items():
         for name, one in entry.inputs.items():
-            own = robot.parts[mux].end(name)
+            own = robot.components[mux].end(name)
             component = (one.source or "").partition(".")[0]
             for writer in robot.writers.get(own.topic, ()) if own else ():
                 if own and writer.instance == component and writer.type_name != own.type_name:
@@ -46,5 +46,5 @@ def mux_type(robot: Robot) -> Iterator[Finding]:
                         robot.value("muxes", mux, "inputs", name, "from"),
                         f"input '{name}' of mux '{mux}' takes {writer.type_name}, but the mux forwards {own.type_name}",
                         help=f"take an output of type {own.type_name}",
-                        related=[Related(robot.part_span(component), "the source")],
+                        related=[Related(robot.component_span(component), "the source")],
                     )

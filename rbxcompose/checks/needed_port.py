@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.model.robot import Part, Robot
-from rbxcompose.model.wires import End
+from rbxcompose.model.robot import Robot, RobotComponent
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Serves, ServesAction
@@ -43,38 +43,40 @@ def needed_port(robot: Robot) -> Iterator[Finding]:
     """
     given = {(type(end.port), end.topic) for end in robot.ends}
     lost = {end.type_name for ends in robot.writers.values() for end in ends if is_unheard(robot, end)}
-    for part in robot.parts.values():
-        if part.declared(RunsMissions):
+    for component in robot.components.values():
+        if component.declared(RunsMissions):
             continue  # its values may come from outside, and its skills are those that are there
-        needed = [end for end in part.ends if type(end.port) in SERVED_BY and not getattr(end.port, "is_open", False)]
+        needed = [
+            end for end in component.ends if type(end.port) in SERVED_BY and not getattr(end.port, "is_open", False)
+        ]
         missing = [end for end in needed if (SERVED_BY[type(end.port)], end.topic) not in given]
         # A command that goes nowhere is told where it leaves.
         ends = [end for end in missing if not (_is_command(end) and end.type_name in lost)]
         if ends:
-            yield _finding(robot, part, ends)
+            yield _finding(robot, component, ends)
 
 
-def is_unheard(robot: Robot, end: End) -> bool:
+def is_unheard(robot: Robot, end: PortEnd) -> bool:
     """Tell whether commands leave at this end and nobody hears them."""
     return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND and end.topic not in robot.readers
 
 
-def _is_command(end: End) -> bool:
+def _is_command(end: PortEnd) -> bool:
     return isinstance(end.port, In) and end.port.qos is Qos.COMMAND
 
 
-def _finding(robot: Robot, part: Part, ends: list[End]) -> Finding:
+def _finding(robot: Robot, component: RobotComponent, ends: list[PortEnd]) -> Finding:
     names = " and ".join(f"'{end.topic}'" for end in ends)
     near = [(end, other) for end in ends for other in robot.ends if _fits(end, other)]
     fix = ", ".join(f"{end.name}: {other.topic.strip('/')}" for end, other in near)
     return needed_port.at(
         robot.end_span(ends[0]),
-        f"'{part.name}' needs {names}, which nobody in the robot gives",
+        f"'{component.name}' needs {names}, which nobody in the robot gives",
         help=f"connect it: 'connect: {{{fix}}}'" if fix else "add the component that gives it",
         related=[Related(robot.end_span(other), f"'{other.topic}' is of this type") for _, other in near],
     )
 
 
-def _fits(end: End, other: End) -> bool:
+def _fits(end: PortEnd, other: PortEnd) -> bool:
     is_another = other.instance != end.instance  # what listens to itself gets nothing
     return is_another and type(other.port) is SERVED_BY[type(end.port)] and other.type_name == end.type_name

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity, Span
 from rbxcompose.model.flow import is_written, setting_span
-from rbxcompose.model.robot import Part, Robot
-from rbxcompose.model.wires import End
+from rbxcompose.model.robot import Robot, RobotComponent
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.sdk.capabilities import WritesFrame
 
 STATIC = "_static"  # ends the topic of transforms that never change; both topics tell one tree
@@ -54,34 +54,38 @@ def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
             timeout: 0.5 s
     ```
     """
-    first: dict[tuple[str, str], Writer] = {}
-    for one in sorted(_writers(robot), key=lambda one: one.part.name in robot.written):
+    first: dict[tuple[str, str], FrameWriter] = {}
+    for one in sorted(_writers(robot), key=lambda one: one.component.name in robot.written):
         other = first.setdefault((one.end.topic.removesuffix(STATIC), one.frame.child.value), one)
-        if other.part is not one.part:
-            name = one.part.name
+        if other.component is not one.component:
+            name = one.component.name
             yield one_frame_two_writers.at(
                 one.span(robot),
-                f"'{name}' and '{other.part.name}' both write the pose of the frame '{one.frame.child.value}'",
+                f"'{name}' and '{other.component.name}' both write the pose of the frame '{one.frame.child.value}'",
                 help=f"leave one of them out, or take another topic: 'connect: {{{one.end.name}: {name}/tf}}'",
-                related=[Related(other.span(robot), "the other one")] if other.part.name in robot.written else [],
+                related=[Related(other.span(robot), "the other one")] if other.component.name in robot.written else [],
             )
 
 
 @dataclass(frozen=True, slots=True)
-class Writer:
-    """A part that writes a frame, and the end where it does."""
+class FrameWriter:
+    """A component that writes a frame, and the end where it does."""
 
-    part: Part
+    component: RobotComponent
     frame: WritesFrame
-    end: End
+    end: PortEnd
 
     def span(self, robot: Robot) -> Span:
-        """Return the place of the frame's name if it is written down, else that of what brings the part."""
-        part, field = self.part, self.frame.child.field
-        return setting_span(robot, (part, field)) if is_written(robot, part, field) else robot.entry_span(part.name)
+        """Return the place of the frame's name if it is written down, else that of what brings the component."""
+        component, field = self.component, self.frame.child.field
+        return (
+            setting_span(robot, (component, field))
+            if is_written(robot, component, field)
+            else robot.entry_span(component.name)
+        )
 
 
-def _writers(robot: Robot) -> Iterator[Writer]:
-    for part, frame in robot.declared(WritesFrame):
-        if end := part.end(frame.transforms):
-            yield Writer(part, frame, end)
+def _writers(robot: Robot) -> Iterator[FrameWriter]:
+    for component, frame in robot.declared(WritesFrame):
+        if end := component.end(frame.transforms):
+            yield FrameWriter(component, frame, end)

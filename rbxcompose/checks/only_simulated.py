@@ -26,10 +26,10 @@ def only_simulated(robot: Robot) -> Iterator[Finding]:
     """
     if robot.manifest.is_simulated:
         return
-    for part in robot.parts.values():
-        if part.cls.simulated:
+    for component in robot.components.values():
+        if component.cls.simulated:
             yield only_simulated.at(
-                robot.value(*part.path, "type"),
-                f"'{part.name}' exists only in simulation: '{part.type_name}'",
+                robot.value(*component.path, "type"),
+                f"'{component.name}' exists only in simulation: '{component.type_name}'",
                 help="run it without '--real', or take a type that drives the real thing",
             )

@@ -9,7 +9,7 @@ from rbxcompose.check_runner import check
 from rbxcompose.composition.robot_manifest import About, IncludedPart
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wires import End, resolve
+from rbxcompose.model.wires import PortEnd, resolve
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Serves, ServesAction
 
 WIRES: tuple[tuple[type[Port[Any]], type[Port[Any]]], ...] = ((Out, In), (Calls, Serves), (CallsAction, ServesAction))
@@ -62,7 +62,7 @@ def own_instances(part: IncludedPart) -> frozenset[str]:
     return part.components | part.muxes
 
 
-def is_type(end: End, written: str) -> bool:
+def is_type(end: PortEnd, written: str) -> bool:
     """Tell whether an end has the type that a part writes: `geometry_msgs/Twist`."""
     return short(end.type_name) == short(written)
 
@@ -73,12 +73,12 @@ def short(type_name: str) -> str:
     return f"{package}/{name.rpartition('/')[-1]}"
 
 
-def _at(robot: Robot, topic: str) -> list[End]:
+def _at(robot: Robot, topic: str) -> list[PortEnd]:
     absolute = resolve(topic, robot.manifest.bus.namespace or "")
     return [end for end in robot.ends if end.topic == absolute]
 
 
-def _answers(own: Iterable[End]) -> tuple[type[Port[Any]], ...]:
+def _answers(own: Iterable[PortEnd]) -> tuple[type[Port[Any]], ...]:
     """Return what may stand at the other ends of the wires of these."""
     pairs = [*WIRES, *(wire[::-1] for wire in WIRES)]
     return tuple({other for end in own for one, other in pairs if isinstance(end.port, one)})

@@ -10,7 +10,7 @@ from rbxcompose.composition.robot_manifest import About, Claim
 from rbxcompose.findings import Finding, Related
 from rbxcompose.manifest.tree import at
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wires import End, resolve
+from rbxcompose.model.wires import PortEnd, resolve
 from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 
 
@@ -43,8 +43,8 @@ def part_provides(robot: Robot) -> Iterator[Finding]:
     ```
     """
     for part in robot.manifest.parts.values():
-        ends = [end for name in own_instances(part) & robot.parts.keys() for end in robot.parts[name].ends]
-        if (part.components & robot.written) - robot.parts.keys():
+        ends = [end for name in own_instances(part) & robot.components.keys() for end in robot.components[name].ends]
+        if (part.components & robot.written) - robot.components.keys():
             continue  # one of its components has mistakes, which are said at their own places
         for claim in part.claims:
             if claim.about is not About.NEED and (what := _lacking(robot, claim, ends)):
@@ -52,12 +52,12 @@ def part_provides(robot: Robot) -> Iterator[Finding]:
                 yield part_provides.at(part.span, message, related=[Related(claim.span, "promised here")])
 
 
-def _serves(end: End, skill: str) -> bool:
+def _serves(end: PortEnd, skill: str) -> bool:
     is_serving = isinstance(end.port, Serves | ServesAction | ServesTopic)
     return is_serving and end.topic.rpartition("/")[-1] == skill
 
 
-def _lacking(robot: Robot, claim: Claim, ends: list[End]) -> str:
+def _lacking(robot: Robot, claim: Claim, ends: list[PortEnd]) -> str:
     """Return what a part promises and does not have, in words; nothing if it keeps its promise."""
     match claim.about:
         case About.VALUE if at(robot.manifest.root, ("values", claim.name)) is None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import In
@@ -39,7 +39,7 @@ def past_the_mux(robot: Robot) -> Iterator[Finding]:
         muxes = {end.instance for end in inputs}
         for end in ends:
             if muxes and end.instance not in muxes and isinstance(end.port, In) and end.port.qos is Qos.COMMAND:
-                mux, own = robot.parts[inputs[0].instance], inputs[0]
+                mux, own = robot.components[inputs[0].instance], inputs[0]
                 yield past_the_mux.at(
                     robot.end_span(end),
                     f"'{end.instance}' listens to '{topic}', past the mux '{mux.name}'",
@@ -48,8 +48,8 @@ def past_the_mux(robot: Robot) -> Iterator[Finding]:
                 )
 
 
-def _output(robot: Robot, end: End) -> str:
+def _output(robot: Robot, end: PortEnd) -> str:
     """Return the topic to which a mux forwards what comes in at this end; nothing if it is no input of a mux."""
-    mux = robot.parts[end.instance]
+    mux = robot.components[end.instance]
     muxed = (mux.end(one.output) for one in mux.declared(Forwards) if end.name in one.inputs)
     return next((output.port.topic for output in muxed if output), "")

@@ -8,11 +8,11 @@ from rbxcompose.check_runner import check
 from rbxcompose.expressions.tree import ExpressionError, Variable
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.findings import Finding, Related, Span, suggest
-from rbxcompose.manifest.tree import Mapping, Scalar, Sequence, at
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, at
 from rbxcompose.missions.analysis.effects import replaced, written
 from rbxcompose.missions.analysis.facts import Constants
 from rbxcompose.missions.language.spans import expression_of
-from rbxcompose.missions.program.program import Node, Program
+from rbxcompose.missions.program.program import MissionNode, Program
 from rbxcompose.model.charge import constants
 from rbxcompose.model.robot import Robot
 
@@ -68,23 +68,23 @@ def _shortened(program: Program) -> Constants:
 def _place_of(program: Program, datum: str, text: str) -> Span:
     """Return where a text stands in a datum; the name of the datum, if it is not found."""
     match at(program.root, ("data", datum)):
-        case Mapping(entries=entries) if text in entries:
+        case MappingNode(entries=entries) if text in entries:
             return entries[text].key.span
-        case Sequence(items=items):
-            spans = (item.span for item in items if isinstance(item, Scalar) and item.text == text)
+        case SequenceNode(items=items):
+            spans = (item.span for item in items if isinstance(item, ScalarNode) and item.text == text)
             return next(spans, program.data[datum].span)
-        case Scalar(span=span):
+        case ScalarNode(span=span):
             return span
     return program.data[datum].span
 
 
-def _goals(robot: Robot, program: Program) -> Iterator[tuple[Node, str]]:
+def _goals(robot: Robot, program: Program) -> Iterator[tuple[MissionNode, str]]:
     """Yield each skill that gets a pose by `$name` alone, with that name."""
     for node in program.nodes:
         skill = robot.skills[node.skill].skill if node.skill in robot.skills else None
         for argument in node.step.arguments if skill else ():
             wanted = skill.arguments.get(argument.name or skill.main) if skill else None
-            if wanted is None or wanted.kind is not TypeKind.POSE or not isinstance(argument.value, Scalar):
+            if wanted is None or wanted.kind is not TypeKind.POSE or not isinstance(argument.value, ScalarNode):
                 continue
             try:
                 tree = expression_of(argument.value).tree
@@ -94,7 +94,7 @@ def _goals(robot: Robot, program: Program) -> Iterator[tuple[Node, str]]:
                 yield node, tree.name
 
 
-def _texts(program: Program, node: Node, name: str, known: Constants) -> Iterator[tuple[str, str]]:
+def _texts(program: Program, node: MissionNode, name: str, known: Constants) -> Iterator[tuple[str, str]]:
     """Yield the texts that `$name` can be at a node, each with the datum that it stands in."""
     above = node
     while above.parent is not None:

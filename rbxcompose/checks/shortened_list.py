@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.checks.idle_overlay import changes
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.manifest.tree import Node, Scalar, Sequence
+from rbxcompose.manifest.tree import ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.walk import REPLACE
 from rbxcompose.model.robot import Robot
 
@@ -55,14 +55,14 @@ def dropped(robot: Robot) -> set[str]:
     return {word for before, after, _ in changes(robot) for word in lost(before.node, after.node)}
 
 
-def lost(before: Node | None, after: Node | None) -> list[str]:
+def lost(before: TreeNode | None, after: TreeNode | None) -> list[str]:
     """Return the words of a list that are in the new one no more, if that has something new and no `!replace`."""
-    if not isinstance(after, Sequence) or after.tag == REPLACE:
+    if not isinstance(after, SequenceNode) or after.tag == REPLACE:
         return []
     old, new = _words(before), _words(after)
     return [word for word in old if word not in new] if new.keys() - old.keys() else []
 
 
-def _words(node: Node | None) -> dict[str, None]:
-    items = node.items if isinstance(node, Sequence) else ()
-    return dict.fromkeys(item.text for item in items if isinstance(item, Scalar))
+def _words(node: TreeNode | None) -> dict[str, None]:
+    items = node.items if isinstance(node, SequenceNode) else ()
+    return dict.fromkeys(item.text for item in items if isinstance(item, ScalarNode))

@@ -10,7 +10,7 @@ from rbxcompose.composition.robot_file import MISSION
 from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.files import files_named
 from rbxcompose.manifest.reader import read_file
-from rbxcompose.manifest.tree import Mapping, Scalar
+from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.model.robot import Robot
 
 _ENDING = ".yaml"
@@ -54,5 +54,5 @@ def _files(places: Iterable[Span], start: str) -> list[str]:
 
 def _is_mission(file: Path) -> bool:
     root, _ = read_file(file, str(file), {})
-    written = root.get("kind") if isinstance(root, Mapping) else None
-    return isinstance(written, Scalar) and written.text == MISSION
+    written = root.get("kind") if isinstance(root, MappingNode) else None
+    return isinstance(written, ScalarNode) and written.text == MISSION

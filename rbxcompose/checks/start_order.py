@@ -31,20 +31,20 @@ def start_order(robot: Robot) -> Iterator[Finding]:
         starts_after: [battery]
     ```
     """
-    after = {name: part.starts_after for name, part in robot.parts.items()}
-    for name, part in robot.parts.items():
-        for index, other in enumerate(part.starts_after):
-            if other not in robot.parts and other not in robot.written:
+    after = {name: component.starts_after for name, component in robot.components.items()}
+    for name, component in robot.components.items():
+        for index, other in enumerate(component.starts_after):
+            if other not in robot.components and other not in robot.written:
                 yield start_order.misspelt(
-                    robot.value(*part.path, "starts_after", index),
+                    robot.value(*component.path, "starts_after", index),
                     f"'{name}' starts after a component that the robot does not have: '{other}'",
                     other,
-                    robot.parts,
+                    robot.components,
                     "components of this robot",
                 )
     if cycle := cycle_of(after):
         yield start_order.at(
-            robot.value(*robot.parts[cycle[0]].path, "starts_after"),
+            robot.value(*robot.components[cycle[0]].path, "starts_after"),
             f"the start order goes round in a circle: {' after '.join([*cycle, cycle[0]])}",
             help="leave one of them out",
         )

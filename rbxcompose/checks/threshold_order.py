@@ -38,13 +38,14 @@ def threshold_order(robot: Robot) -> Iterator[Finding]:
         error: 20 %
     ```
     """
-    for part, drains in robot.declared(Drains):
+    for component, drains in robot.declared(Drains):
         warn, error = drains.warn, drains.error
         if warn and error and warn.value < error.value:
-            here, there = (part, warn.field), (part, error.field)
+            here, there = (component, warn.field), (component, error.field)
             yield threshold_order.at(
                 setting_span(robot, here, there),
-                f"'{part.name}' can never warn: it is in error below {format_quantity(error.value, RATIO)} already, "
+                f"'{component.name}' can never warn: "
+                f"it is in error below {format_quantity(error.value, RATIO)} already, "
                 f"and warns below {format_quantity(warn.value, RATIO)}",
                 help=f"'{warn.field or 'warn'}' must be above '{error.field or 'error'}'",
                 related=[Related(setting_span(robot, there, here), "in error below this")],

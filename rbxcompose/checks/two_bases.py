@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.sdk.capabilities import Drives
 
 
@@ -47,6 +47,6 @@ def two_bases(robot: Robot) -> Iterator[Finding]:
             )
 
 
-def _moves(robot: Robot, end: End) -> bool:
+def _moves(robot: Robot, end: PortEnd) -> bool:
     """Tell whether the robot moves by what comes in at this end."""
-    return any(end.name == one.commands for one in robot.parts[end.instance].declared(Drives))
+    return any(end.name == one.commands for one in robot.components[end.instance].declared(Drives))

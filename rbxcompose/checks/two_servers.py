@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 
 
@@ -48,14 +48,14 @@ def two_servers(robot: Robot) -> Iterator[Finding]:
         other = first.setdefault(end.topic, end.instance)
         if other != end.instance:
             yield two_servers.at(
-                robot.part_span(end.instance),
+                robot.component_span(end.instance),
                 f"'{end.instance}' and '{other}' both serve '{end.topic}'",
                 label="this one",
                 help=f"give one of them another name: 'connect: {{{end.name}: ...}}'",
-                related=[Related(robot.part_span(other), "and this one")],
+                related=[Related(robot.component_span(other), "and this one")],
             )
 
 
-def _answers(end: End) -> bool:
+def _answers(end: PortEnd) -> bool:
     """Tell whether who asks there waits for an answer; an order of which nobody tells the end may go to several."""
     return isinstance(end.port, Serves | ServesAction) or (isinstance(end.port, ServesTopic) and bool(end.port.ends))

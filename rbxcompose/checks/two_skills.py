@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.sdk.ports import ServesAction, ServesTopic
 
 
@@ -37,7 +37,7 @@ def two_skills(robot: Robot) -> Iterator[Finding]:
           recharge: recharge_spare
     ```
     """
-    first: dict[str, End] = {}
+    first: dict[str, PortEnd] = {}
     for end in robot.ends:
         if not isinstance(end.port, ServesAction | ServesTopic):
             continue

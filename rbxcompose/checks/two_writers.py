@@ -9,13 +9,13 @@ from rbxcompose.check_runner import check
 from rbxcompose.checks.mux_source import missing
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wires import End
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import Out
 
 
-def is_command(end: End) -> bool:
+def is_command(end: PortEnd) -> bool:
     """Tell whether commands leave at this end."""
     return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND
 
@@ -64,21 +64,21 @@ def two_writers(robot: Robot) -> Iterator[Finding]:
         mux = robot.manifest.muxes.get(topic.strip("/"))
         if mux and any(one.source and missing(robot, one.source) for one in mux.inputs.values()):
             continue  # the mux was to take one of them, and its mistake is said at its own place
-        writers = sorted(ends, key=lambda end: robot.part_span(end.instance))
+        writers = sorted(ends, key=lambda end: robot.component_span(end.instance))
         first, *others = writers
         for other in others:
             yield two_writers.at(
-                robot.part_span(other.instance),
+                robot.component_span(other.instance),
                 f"'{other.instance}' and '{first.instance}' both write commands on '{topic}'",
                 label="this one",
                 help=_remedy(robot, topic, writers, (first.instance, other.instance)),
-                related=[Related(robot.part_span(first.instance), "and this one")],
+                related=[Related(robot.component_span(first.instance), "and this one")],
             )
 
 
-def _remedy(robot: Robot, topic: str, writers: Iterable[End], both: tuple[str, str]) -> str:
+def _remedy(robot: Robot, topic: str, writers: Iterable[PortEnd], both: tuple[str, str]) -> str:
     """Return how two of the writers get along: in the mux that is a writer too, or else in a new one."""
-    mux = next((one.instance for one in writers if robot.parts[one.instance].declared(Forwards)), None)
+    mux = next((one.instance for one in writers if robot.components[one.instance].declared(Forwards)), None)
     if mux is None:
         return f"put both into a mux: 'muxes: {{{topic.strip('/')}: ...}}' with an input 'from:' each"
     missing = " and ".join(f"'from: {name}'" for name in both if name != mux)

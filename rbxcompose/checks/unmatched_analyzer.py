@@ -31,10 +31,10 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
           match: [battery]
     ```
     """
-    known = {*robot.parts, *robot.written}
+    known = {*robot.components, *robot.written}
     for name, analyzer in robot.manifest.diagnostics.analyzers.items():
         for index, pattern in enumerate(analyzer.match):
-            if pattern not in known and not any(Analyzer((pattern,)).matches(part) for part in known):
+            if pattern not in known and not any(Analyzer((pattern,)).matches(component) for component in known):
                 yield unmatched_analyzer.misspelt(
                     robot.value("diagnostics", "analyzers", name, "match", index),
                     f"analyzer '{name}' matches no component with '{pattern}'",

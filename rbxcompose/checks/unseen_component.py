@@ -47,9 +47,9 @@ def unseen_component(robot: Robot) -> Iterator[Finding]:
     groups = [Analyzer(one.match, one.expected) for one in analyzers.values()]
     seen = {*dropped(robot), *(name for group in groups for name in (*group.match, *group.expected))}
     for name in robot.written - seen if groups else ():
-        if name in robot.parts and not any(group.matches(name) for group in groups):
+        if name in robot.components and not any(group.matches(name) for group in groups):
             yield unseen_component.at(
-                robot.part_span(name),
+                robot.component_span(name),
                 f"no analyzer matches '{name}'",
                 help=f"put it into the 'match' of one of them: {', '.join(analyzers)}",
             )

@@ -37,12 +37,14 @@ def value_source(robot: Robot) -> Iterator[Finding]:
 
 def _missing(robot: Robot, name: str, source: str) -> Wrong | None:
     component, dot, port = source.partition(".")
-    part = robot.parts.get(component)
+    part = robot.components.get(component)
     if part is None:
         if component in robot.written:
             return None  # it is there, but broken: that is said at its own place
         message = f"comes from a component that the robot does not have: '{component}'"
-        return Wrong(message, suggest(component, robot.parts, "components of this robot"), component, robot.parts)
+        return Wrong(
+            message, suggest(component, robot.components, "components of this robot"), component, robot.components
+        )
     outputs = [end.name for end in part.ends if isinstance(end.port, Out)]
     if name in robot.values:
         return None  # also the level of a group of the diagnostics

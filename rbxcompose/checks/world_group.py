@@ -33,11 +33,13 @@ def world_group(robot: Robot) -> Iterator[Finding]:
         type: go_to
     ```
     """
-    for part in robot.parts.values():
-        if part.process == part.cls.process or WORLD not in (part.process, part.cls.process):
+    for component in robot.components.values():
+        if component.process == component.cls.process or WORLD not in (component.process, component.cls.process):
             continue
-        if part.cls.process == WORLD:
-            message = f"'{part.name}' is simulated and belongs into the group 'world', not into '{part.process}'"
+        if component.cls.process == WORLD:
+            message = (
+                f"'{component.name}' is simulated and belongs into the group 'world', not into '{component.process}'"
+            )
         else:
-            message = f"'{part.name}' is no part of the simulated world, but runs in its group"
-        yield world_group.at(robot.value(*part.path, "process"), message, help="leave 'process' out")
+            message = f"'{component.name}' is no part of the simulated world, but runs in its group"
+        yield world_group.at(robot.value(*component.path, "process"), message, help="leave 'process' out")

@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 @dataclass(slots=True)
-class Checked:
+class CheckedRobots:
     """What was found in all robots together; `fine` are the plans of those that can run."""
 
     report: Report = field(default_factory=Report)
@@ -63,8 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
     return FINDINGS if is_wrong else 0
 
 
-def _check(wanted: Targets, arguments: argparse.Namespace) -> Checked:
-    checked = Checked()
+def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
+    checked = CheckedRobots()
     for robot in wanted.robots:
         checked.add(compiled(robot, arguments))
     for robot in wanted.users:
@@ -78,10 +78,10 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> Checked:
     return checked
 
 
-def _check_tests(tests: list[str], checked: Checked) -> None:
-    from rbxcompose.mission_tests.reader import Reading  # only tests need it
+def _check_tests(tests: list[str], checked: CheckedRobots) -> None:
+    from rbxcompose.mission_tests.reader import TrialReader  # only tests need it
 
-    reading, found = Reading(os.environ), Report()
+    reading, found = TrialReader(os.environ), Report()
     for path in tests:
         trial, report = reading.read(Path(path).resolve())
         found.extend(report)
@@ -91,7 +91,7 @@ def _check_tests(tests: list[str], checked: Checked) -> None:
     checked.sources.update(reading.sources)
 
 
-def _written(checked: Checked, form: str) -> str:
+def _written(checked: CheckedRobots, form: str) -> str:
     if any(checked.report) or form not in FOR_PEOPLE:
         return renderer(form)(checked.report, checked.sources, has_colour(sys.stdout))
     lines = [f"{plan.robot} is fine: {extent(len(plan.instances), len(plan.groups))}" for plan in checked.fine]

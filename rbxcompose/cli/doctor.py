@@ -13,15 +13,15 @@ import sys
 import time
 
 from rbxcompose.cli.bus.entities import add_json_option
-from rbxcompose.cli.bus.guest import Guest, Heard
+from rbxcompose.cli.bus.guest import Guest, HeardMessage
 from rbxcompose.cli.bus.messages import to_json
 from rbxcompose.cli.bus.place import place_of
 from rbxcompose.cli.output.console import FINDINGS, has_colour, refuse, tell, tell_report
 from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, find_robot, robots_up
 from rbxcompose.compiler import compile_robot
 from rbxcompose.doctor import machine
-from rbxcompose.doctor.facts import Bus, Facts, Running
-from rbxcompose.doctor.registry import Answer, examine_all, has_errors
+from rbxcompose.doctor.facts import BusFacts, HostFacts, RunningRobot
+from rbxcompose.doctor.registry import ExaminationResult, examine_all, has_errors
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.model.robot import Robot
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     if path is not None and file is None:
         return FINDINGS
     running = [_running(folder) for folder in folders]
-    facts = Facts(
+    facts = HostFacts(
         running=running,
         file=file,
         python=platform.python_version(),
@@ -90,18 +90,18 @@ def _described(path: str) -> Robot | None:
     return compilation.robot
 
 
-def _running(folder: RobotFolder) -> Running:
+def _running(folder: RobotFolder) -> RunningRobot:
     try:
         state = folder.read_state()
     except BrokenStateError as error:
-        return Running(folder, None, str(error))
+        return RunningRobot(folder, None, str(error))
     if state is None:
-        return Running(folder, None, "it has gone")
+        return RunningRobot(folder, None, "it has gone")
     robot = compile_robot(state.file, environment=os.environ).robot if os.path.exists(state.file) else None
-    return Running(folder, state, "", robot, _bus(folder))
+    return RunningRobot(folder, state, "", robot, _bus(folder))
 
 
-def _bus(folder: RobotFolder) -> Bus | None:
+def _bus(folder: RobotFolder) -> BusFacts | None:
     """Listen for a moment; None if there is no bus to be reached, which others tell."""
     try:
         with Guest(place_of(folder)) as guest:
@@ -109,7 +109,7 @@ def _bus(folder: RobotFolder) -> Bus | None:
             nodes = {end.gid: end.node for topic in graph.topics for end in topic.givers}
             ages: dict[str, float] = {}
 
-            def heard(message: Heard) -> None:
+            def heard(message: HeardMessage) -> None:
                 age = time.time() - (guest.clock.now() - message.time) - message.stamp / _NANOSECONDS
                 node = nodes.get(message.sender)
                 if node is not None and message.stamp:
@@ -119,12 +119,12 @@ def _bus(folder: RobotFolder) -> Bus | None:
                 if all(end.qos is not None and not end.qos.is_transient_local for end in topic.givers):
                     guest.listen(topic, heard)
             guest.run(lambda: False, _LISTENING)
-            return Bus(graph, ages)
+            return BusFacts(graph, ages)
     except NotDoneError:
         return None
 
 
-def _text(answers: list[Answer]) -> str:
+def _text(answers: list[ExaminationResult]) -> str:
     """Return what is fine, then the findings."""
     width = max(len(one.examination) for one in answers)
     lines = [f"ok  {one.examination:<{width}}  {one.told}" for one in answers if isinstance(one.told, str)]

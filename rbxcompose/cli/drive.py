@@ -13,7 +13,7 @@ import select
 import sys
 from collections.abc import Iterable
 
-from rbxcompose.bus.graph import Name
+from rbxcompose.bus.graph import GraphName
 from rbxcompose.bus.topics import Publisher
 from rbxcompose.cli.bus.dead_man import PERIOD, DeadMan, Velocity, is_end, keys
 from rbxcompose.cli.bus.entities import NO_NAME, NOBODY, add_timeout_option, positive, visit
@@ -81,7 +81,7 @@ def _drive(guest: Guest, arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _input(topics: Iterable[Name], wanted: str | None) -> str:
+def _input(topics: Iterable[GraphName], wanted: str | None) -> str:
     """Return the topic that takes the keyboard's commands; a robot with a namespace has it below that."""
     taking = [one.name for one in topics if one.takers and Twist.TYPE in one.types]
     fitting = [name for name in taking if name.endswith(_INPUT)] if wanted is None else [f"/{wanted.lstrip('/')}"]

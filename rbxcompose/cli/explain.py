@@ -10,7 +10,7 @@ import json
 
 from rbxcompose.cli.output.console import misused, tell
 from rbxcompose.finding_pages import all_kinds, body_of, family_of, text_of, title_of
-from rbxcompose.findings import Kind, suggest
+from rbxcompose.findings import FindingKind, suggest
 
 _PREFIX = "RBX"
 
@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _listed(kinds: dict[str, Kind]) -> str:
+def _listed(kinds: dict[str, FindingKind]) -> str:
     lines = []
     family = ""
     for kind in kinds.values():
@@ -48,12 +48,12 @@ def _listed(kinds: dict[str, Kind]) -> str:
     return "\n".join(lines[1:])
 
 
-def _as_json(what: Kind | list[Kind]) -> str:
+def _as_json(what: FindingKind | list[FindingKind]) -> str:
     data = [_data(kind) for kind in what] if isinstance(what, list) else _data(what)
     return json.dumps(data, indent=2, ensure_ascii=False)
 
 
-def _data(kind: Kind) -> dict[str, object]:
+def _data(kind: FindingKind) -> dict[str, object]:
     return {
         "code": kind.code,
         "title": title_of(kind),

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 
 from rbxcompose.cli.output.console import has_colour, refuse, tell
 from rbxcompose.cli.robots.lookup import NOT_UP, NotDoneError, add_robot_option, find_robot, known_state
-from rbxcompose.cli.robots.story import Story
+from rbxcompose.cli.robots.story import StoryWriter
 from rbxcompose.findings import suggest
 from rbxcompose.levels import LOG_LEVELS
 from rbxcompose.runtime.folder import RobotFolder, base_folder
@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
         _know(names, folder, sources)
     except NotDoneError as error:
         return refuse(error.finding)
-    story = Story(names or sources, colour=has_colour(sys.stdout))
+    story = StoryWriter(names or sources, colour=has_colour(sys.stdout))
 
     def wanted(records: Iterable[Record]) -> list[Record]:
         least = LOG_LEVELS[arguments.level]

@@ -10,7 +10,7 @@ import argparse
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from rbxcompose.bus.graph import Name
+from rbxcompose.bus.graph import GraphName
 from rbxcompose.bus.services import Client
 from rbxcompose.cli.bus.entities import (
     NO_NAME,
@@ -27,7 +27,7 @@ from rbxcompose.cli.bus.place import add_bus_options
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping as MappingNode
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs import registry
@@ -73,7 +73,7 @@ class _Nodes:
 
     def __init__(self, guest: Guest, timeout: float) -> None:
         self._guest, self._timeout = guest, timeout
-        self._services: Mapping[str, Name] = {one.name: one for one in guest.graph().services if one.givers}
+        self._services: Mapping[str, GraphName] = {one.name: one for one in guest.graph().services if one.givers}
         self.names = sorted(name.removesuffix(_GET) for name in self._services if name.endswith(_GET))
 
     def find(self, wanted: str) -> str:

@@ -40,8 +40,8 @@ from rbxcompose.recording.files import PART
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import NotARecordingError, RecordingReader
 from rbxcompose.recording.schedule import playlist
-from rbxcompose.recording.summary import Summary, summary_of
-from rbxcompose.recording.topics import Selection, Topic, by_name, is_replayable
+from rbxcompose.recording.summary import RecordingSummary, summary_of
+from rbxcompose.recording.topics import RecordedTopic, Selection, by_name, is_replayable
 from rbxcompose.regular_files import NotRegularError, open_regular
 
 _PAUSE = 0.05  # [s] before a recording begins anew
@@ -101,7 +101,7 @@ def _misused(arguments: argparse.Namespace) -> str:
     return "--write needs --into" if arguments.write and not arguments.into else ""
 
 
-def _look_through(path: Path) -> Summary:
+def _look_through(path: Path) -> RecordingSummary:
     with _opened(path) as reader:
         summary = summary_of(reader.messages())
     if reader.damage:
@@ -125,7 +125,7 @@ def _opened(path: Path) -> Iterator[RecordingReader]:
         raise NotDoneError(finding) from error
 
 
-def _replay(arguments: argparse.Namespace, path: Path, summary: Summary) -> int:
+def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary) -> int:
     topics = _chosen(summary, selection_of(arguments))
     if not topics or arguments.start > summary.duration:
         why = "no topic that was chosen can be replayed" if not topics else f"it lasts {summary.duration:.1f} s"
@@ -147,7 +147,7 @@ def _replay(arguments: argparse.Namespace, path: Path, summary: Summary) -> int:
     return 0
 
 
-def _sent_already(guest: Guest, topics: list[Topic]) -> Finding | None:
+def _sent_already(guest: Guest, topics: list[RecordedTopic]) -> Finding | None:
     """Return the finding for topics that somebody else sends now, None if there are none."""
     chosen = {one.name for one in topics}
     names = [one.name for one in guest.graph().topics if one.givers and one.name in chosen]
@@ -158,7 +158,7 @@ def _sent_already(guest: Guest, topics: list[Topic]) -> Finding | None:
     return SENT_ALREADY.at(None, message, help="choose others with '--topics', or replay beside them with '--over'")
 
 
-def _chosen(summary: Summary, wanted: Selection) -> list[Topic]:
+def _chosen(summary: RecordingSummary, wanted: Selection) -> list[RecordedTopic]:
     """Return the topics to publish and tell which others were wanted."""
     topics = sorted((one for one in summary.counts if wanted.takes(one)), key=lambda one: one.name)
     unfit = [one.name for one in topics if not is_replayable(one)]
@@ -171,7 +171,7 @@ def _chosen(summary: Summary, wanted: Selection) -> list[Topic]:
     return [one for one in topics if one.name not in {*unfit, *commands}]
 
 
-def _play(path: Path, player: Player, topics: list[Topic], arguments: argparse.Namespace, guest: Guest) -> int:
+def _play(path: Path, player: Player, topics: list[RecordedTopic], arguments: argparse.Namespace, guest: Guest) -> int:
     """Publish the recording once and return how many messages that were."""
     chosen = set(topics)
     count = 0
@@ -184,7 +184,7 @@ def _play(path: Path, player: Player, topics: list[Topic], arguments: argparse.N
     return count
 
 
-def _put(player: Player, message: Recorded, chosen: set[Topic]) -> int:
+def _put(player: Player, message: Recorded, chosen: set[RecordedTopic]) -> int:
     if message.topic not in chosen:
         return 0
     player.put(message)
@@ -196,12 +196,12 @@ def _wait(until: float, guest: Guest) -> bool:
     return not guest.run(lambda: guest.is_interrupted, until - guest.clock.now())
 
 
-def _text(path: Path, summary: Summary) -> str:
+def _text(path: Path, summary: RecordingSummary) -> str:
     head = f"{plain(str(path))}: {summary.messages:,} messages, {summary.duration:.3f} s"
     return f"{head}\n{count_table(summary.counts)}" if summary.counts else head
 
 
-def _fields(summary: Summary) -> dict[str, object]:
+def _fields(summary: RecordingSummary) -> dict[str, object]:
     topics = [
         {"name": one.name, "type": one.type, "class": one.qos.value, "encoding": one.encoding, "messages": number}
         for one, number in sorted(by_name(summary.counts).items(), key=lambda item: (item[0].name, item[0].type))

@@ -20,8 +20,8 @@ from rbxcompose.manifest.files import shown_name
 from rbxcompose.mission_tests.coverage import Coverage
 from rbxcompose.mission_tests.finding_files import tests_of
 from rbxcompose.mission_tests.junit import junit
-from rbxcompose.mission_tests.reader import Reading, Written
-from rbxcompose.mission_tests.report import Outcome, Teller, as_json, coverage_text
+from rbxcompose.mission_tests.reader import TrialReader, WrittenTrial
+from rbxcompose.mission_tests.report import FileOutcome, Teller, as_json, coverage_text
 from rbxcompose.mission_tests.runner import run_trial
 
 HERE = Path("missions")
@@ -47,8 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
     files = tests_of(arguments.paths)
     if not files:
         return misused("test", f"no tests ('kind: Test') in {', '.join(map(str, arguments.paths))}")
-    reading, coverage, teller = Reading(os.environ), Coverage(), Teller(has_colour(sys.stdout))
-    outcomes: list[Outcome] = []
+    reading, coverage, teller = TrialReader(os.environ), Coverage(), Teller(has_colour(sys.stdout))
+    outcomes: list[FileOutcome] = []
     unreadable = Report()
     for file in files:
         began = time.perf_counter()
@@ -69,26 +69,26 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if all(one.passed for one in outcomes) else FINDINGS
 
 
-def _outcome(written: Written, reading: Reading, began: float) -> Outcome:
+def _outcome(written: WrittenTrial, reading: TrialReader, began: float) -> FileOutcome:
     trial = reading.understand(written)
     compiled = time.perf_counter()
     shown, findings = shown_name(written.path), tuple(written.report)
     if trial is None:
-        return Outcome(shown, written.name, findings, took=compiled - began)
-    return Outcome(shown, written.name, findings, run_trial(trial), time.perf_counter() - compiled)
+        return FileOutcome(shown, written.name, findings, took=compiled - began)
+    return FileOutcome(shown, written.name, findings, run_trial(trial), time.perf_counter() - compiled)
 
 
-def _tell(outcome: Outcome, teller: Teller, verbose: bool) -> None:
+def _tell(outcome: FileOutcome, teller: Teller, verbose: bool) -> None:
     tell(teller.line(outcome))
     if outcome.verdict and (verbose or not outcome.passed):
         tell(teller.trace(outcome.verdict))
 
 
-def _findings(reading: Reading, outcomes: Sequence[Outcome]) -> Report:
+def _findings(reading: TrialReader, outcomes: Sequence[FileOutcome]) -> Report:
     return Report([*reading.report, *reading.summed_up(finding for one in outcomes for finding in one.findings)])
 
 
-def _finish(outcomes: Sequence[Outcome], coverage: Coverage, teller: Teller, arguments: argparse.Namespace) -> None:
+def _finish(outcomes: Sequence[FileOutcome], coverage: Coverage, teller: Teller, arguments: argparse.Namespace) -> None:
     if arguments.junit:
         arguments.junit.write_text(junit(outcomes), encoding="utf-8")
     if arguments.json:

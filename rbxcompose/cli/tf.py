@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 from rbxcompose.body.transforms import TransformTree
-from rbxcompose.bus.graph import Name
+from rbxcompose.bus.graph import GraphName
 from rbxcompose.cli.bus.entities import (
     NO_NAME,
     NOBODY,
@@ -20,10 +20,10 @@ from rbxcompose.cli.bus.entities import (
     hertz,
     visit,
 )
-from rbxcompose.cli.bus.guest import Guest, Heard
+from rbxcompose.cli.bus.guest import Guest, HeardMessage
 from rbxcompose.cli.bus.messages import shown, to_json
 from rbxcompose.cli.bus.place import add_bus_options
-from rbxcompose.cli.bus.topic_echo import Reader
+from rbxcompose.cli.bus.topic_echo import EchoReader
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.geometry import Transform3, yaw_of
 from rbxcompose.msgs.tf2_msgs import TFMessage
@@ -71,11 +71,11 @@ class _Frames:
         """Tell whether all who publish have been heard."""
         return not self._waiting
 
-    def _listen(self, topic: Name) -> None:
-        reader, is_static = Reader(topic), topic.name.endswith("_static")
+    def _listen(self, topic: GraphName) -> None:
+        reader, is_static = EchoReader(topic), topic.name.endswith("_static")
         self._guest.listen(topic, lambda heard: self._heard(reader, heard, is_static))
 
-    def _heard(self, reader: Reader, heard: Heard, is_static: bool) -> None:
+    def _heard(self, reader: EchoReader, heard: HeardMessage, is_static: bool) -> None:
         self._waiting.discard(heard.sender)
         message = reader.read(heard)
         for link in message.transforms if isinstance(message, TFMessage) else ():

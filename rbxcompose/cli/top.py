@@ -18,7 +18,7 @@ from rbxcompose.cli.bus.place import place_of
 from rbxcompose.cli.output.console import has_colour, refuse, tell
 from rbxcompose.cli.output.terminal import full_screen, raw, show
 from rbxcompose.cli.robots.lookup import NOT_UP, NotDoneError, add_robot_option, find_robot
-from rbxcompose.cli.robots.picture import Picture, lines_of
+from rbxcompose.cli.robots.picture import RobotPicture, lines_of
 from rbxcompose.cli.robots.sampler import Sampler
 
 _PERIOD = 1.0  # [s] between two looks
@@ -78,7 +78,7 @@ def _live(guest: Guest, sampler: Sampler) -> int:
                 return 0
 
 
-def _sampled(sampler: Sampler) -> Picture:
+def _sampled(sampler: Sampler) -> RobotPicture:
     picture = sampler.sample()
     if picture is None:
         raise NotDoneError(NOT_UP.at(None, "the robot has gone down"))

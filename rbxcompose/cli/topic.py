@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from rbxcompose.bus.graph import End
+from rbxcompose.bus.graph import GraphEnd
 from rbxcompose.cli.bus.entities import (
     add_count_options,
     add_json_option,
@@ -85,7 +85,7 @@ def _show(guest: Guest, arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _qos(end: End) -> str:
+def _qos(end: GraphEnd) -> str:
     if end.qos is None:
         return "unknown quality of service"
     reliability = "reliable" if end.qos.is_reliable else "best effort"

@@ -11,8 +11,8 @@ from pydantic import InstanceOf, WithJsonSchema
 
 from rbxcompose.executive import broadcast
 from rbxcompose.executive.arrivals import Arrivals
-from rbxcompose.executive.mission_run import PATIENCE, Running
-from rbxcompose.executive.missions import Missions
+from rbxcompose.executive.mission_run import PATIENCE, MissionRun
+from rbxcompose.executive.missions import RunningMissions
 from rbxcompose.executive.ports import EVENTS, ports_for
 from rbxcompose.executive.requests import (
     CancelMission,
@@ -35,7 +35,7 @@ from rbxcompose.executive.world import RobotWorld
 from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
-from rbxcompose.missions.engine.logbook import INPUTS, Record
+from rbxcompose.missions.engine.logbook import INPUTS, LogRecord
 from rbxcompose.missions.engine.world import World
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.results import Result
@@ -140,7 +140,7 @@ class Mission(Component[MissionConfig]):
     def configure(self) -> None:
         """Nothing has arrived and nothing runs."""
         self.arrivals, self.desks = Arrivals(self.config.values), Desks(self)
-        self.missions = Missions(self.config, self.world, self.story, self.publish)
+        self.missions = RunningMissions(self.config, self.world, self.story, self.publish)
         self.broadcast = broadcast.Broadcast(self.config.programs, self.context.window)
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
         self.kept: dict[str, RunMission] = {}  # by which people began missions that still run
@@ -168,7 +168,7 @@ class Mission(Component[MissionConfig]):
         except Refused as refusal:  # it was begun by a person before
             self.warn(f"mission {name} does not start: {refusal}")
 
-    def begin(self, name: str, inputs: Mapping[str, str] = NO_INPUTS, state: str = "") -> Running:
+    def begin(self, name: str, inputs: Mapping[str, str] = NO_INPUTS, state: str = "") -> MissionRun:
         """Begin a mission; a robot that is stopped holds it until the resume.
 
         Raises:
@@ -182,7 +182,7 @@ class Mission(Component[MissionConfig]):
         self.look_soon()
         return one
 
-    def hold_back(self, one: Running) -> None:
+    def hold_back(self, one: MissionRun) -> None:
         """Let a mission begin at the resume only."""
         one.is_paused = True
         self.tell(f"mission {one.name} is held until it is resumed")
@@ -216,7 +216,7 @@ class Mission(Component[MissionConfig]):
             self.plan(min(wakes))
         self.broadcast.tell(self.missions)
 
-    def turn(self, one: Running) -> list[float]:
+    def turn(self, one: MissionRun) -> list[float]:
         """Do what is due of a mission; return when it wants to be woken [s], if it does."""
         if one.engine.status == IDLE and (missing := one.missing()):
             return self.wait(one, ", ".join(missing))
@@ -228,7 +228,7 @@ class Mission(Component[MissionConfig]):
         due = one.next_wake()
         return [due] if due is not None else []
 
-    def wait(self, one: Running, missing: str) -> list[float]:
+    def wait(self, one: MissionRun, missing: str) -> list[float]:
         """Tell what a mission waits for before it begins; return when to look again [s]."""
         self.show(Level.OK, f"waiting for {missing}")
         if one.loses_patience(self.now):
@@ -343,7 +343,7 @@ class Mission(Component[MissionConfig]):
         """Return records of the log."""
         return self.missions.since(request.after)
 
-    def hold_running(self, one: Running, why: str) -> str:
+    def hold_running(self, one: MissionRun, why: str) -> str:
         """Hold a mission and return what is told of it."""
         one.pause(self.now)
         self.broadcast.tell(self.missions)
@@ -364,7 +364,7 @@ class Mission(Component[MissionConfig]):
         several = len(self.missions.names) > 1
         self.context.log(level, f"{mission}: {text}" if several and not text.startswith("mission ") else text)
 
-    def publish(self, record: Record) -> None:
+    def publish(self, record: LogRecord) -> None:
         """Publish a record of the log, unless it only tells what came in."""
         if record["event"] not in INPUTS:
             self.bound[port_name(PUBLISHES, EVENTS)](String(data=json.dumps(record)))

@@ -9,7 +9,7 @@ from pydantic import Field
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.std_msgs import Empty
 from rbxcompose.msgs.types import Message
-from rbxcompose.mux.core import MuxCore, Source
+from rbxcompose.mux.core import MuxCore, MuxSource
 from rbxcompose.sdk import Capability, Component, Config, Forwards, Frequency, In, Level, Out, Port, Time, component
 
 LOCK = "lock_"  # begins the port of a lock, which no input may be named like
@@ -77,10 +77,10 @@ class Mux(Component[MuxConfig]):
         """Build the core; a mux that comes back while the robot is stopped comes back closed."""
         zero = registry.message(self.config.message)()
         self.core: MuxCore[Message] = MuxCore(
-            {name: Source(one.priority, one.timeout) for name, one in self.config.inputs.items()},
+            {name: MuxSource(one.priority, one.timeout) for name, one in self.config.inputs.items()},
             zero=zero,
             is_zero=lambda message: message == zero,
-            locks={name: Source(one.priority, one.timeout) for name, one in self.config.locks.items()},
+            locks={name: MuxSource(one.priority, one.timeout) for name, one in self.config.locks.items()},
             stopped=self.context.is_stopped,
         )
         self.told: object = None

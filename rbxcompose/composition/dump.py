@@ -8,7 +8,7 @@ import os
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path as FilePath
+from pathlib import Path
 
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.config import Secret
@@ -17,13 +17,13 @@ from rbxcompose.manifest.library import PREFIX, library_root
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.section import ROBOT
-from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar, Sequence
+from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.printable import FORBIDDEN, escaped
 from rbxcompose.references import FILE
 from rbxcompose.units import UNITS, Dimension, Quantity, UnitError, format_quantity, to_si
 
-Note = Callable[[Path, Node], str]
+Note = Callable[[KeyPath, TreeNode], str]
 
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z0-9_]+)*")
 _PLAIN = re.compile(r"(?!- |-$|---|\.\.\.)[\w./+-](?:[^\n:#]|:(?! |$)|(?<! )#)*(?<! )")
@@ -38,20 +38,20 @@ def dump_robot(manifest: RobotManifest, note: Note = lambda path, node: "") -> s
     return dump(_in_one_file(manifest), note)
 
 
-def dump(root: Mapping, note: Note = lambda path, node: "") -> str:
+def dump(root: MappingNode, note: Note = lambda path, node: "") -> str:
     """Return a filled tree as YAML in block style; `note` gives the comment behind a value."""
     return "".join(f"{line}\n" for line in _mapping(root, (), "", note))
 
 
-def _in_one_file(manifest: RobotManifest) -> Mapping:
+def _in_one_file(manifest: RobotManifest) -> MappingNode:
     """Return the tree with each file that it names as the robot's own file would name it."""
 
-    def named(kind: str, node: Node) -> Node:
-        if kind != FILE or not isinstance(node, Scalar):
+    def named(kind: str, node: TreeNode) -> TreeNode:
+        if kind != FILE or not isinstance(node, ScalarNode):
             return node
         writer = manifest.contents.documents.writer(node.span, manifest.path)
         file = resolve(str(to_plain(node)), writer, node.span)
-        return Scalar(_path_from(manifest.path, file), node.span) if isinstance(file, FilePath) else node
+        return ScalarNode(_path_from(manifest.path, file), node.span) if isinstance(file, Path) else node
 
     entries = dict(manifest.root.entries)
     for section in sections(ROBOT):
@@ -61,39 +61,39 @@ def _in_one_file(manifest: RobotManifest) -> Mapping:
     return replace(manifest.root, entries=entries)
 
 
-def _path_from(robot: FilePath, file: FilePath) -> str:
+def _path_from(robot: Path, file: Path) -> str:
     if file.is_relative_to(library_root()) and not file.is_relative_to(project_of(robot)):
         return PREFIX + file.relative_to(library_root()).as_posix()
     return os.path.relpath(file, robot.parent)
 
 
-def _lines(node: Node, path: Path, begin: str, indent: str, note: Note) -> Iterator[str]:
+def _lines(node: TreeNode, path: KeyPath, begin: str, indent: str, note: Note) -> Iterator[str]:
     """Yield the lines of a value; the first one goes behind `begin`, a key or a dash."""
     comment = note(path, node)
     behind = f"  # {comment}" if comment else ""
     match node:
-        case Scalar():
+        case ScalarNode():
             yield f"{indent}{begin} {_scalar(node)}".rstrip() + behind
-        case Mapping() if not node.entries:
+        case MappingNode() if not node.entries:
             yield f"{indent}{begin} {{}}{behind}"
-        case Sequence() if not node.items:
+        case SequenceNode() if not node.items:
             yield f"{indent}{begin} []{behind}"
-        case Mapping():
+        case MappingNode():
             yield f"{indent}{begin}{behind}"
             yield from _mapping(node, path, f"{indent}  ", note)
-        case Sequence(items=items):
+        case SequenceNode(items=items):
             yield f"{indent}{begin}{behind}"
             for index, item in enumerate(items):
                 yield from _lines(item, (*path, index), "-", f"{indent}  ", note)
 
 
-def _mapping(node: Mapping, path: Path, indent: str, note: Note) -> Iterator[str]:
+def _mapping(node: MappingNode, path: KeyPath, indent: str, note: Note) -> Iterator[str]:
     for name, entry in node.entries.items():
         key = name if _KEY.fullmatch(name) else json.dumps(name, ensure_ascii=False)
         yield from _lines(entry.value, (*path, name), f"{key}:", indent, note)
 
 
-def _scalar(scalar: Scalar) -> str:
+def _scalar(scalar: ScalarNode) -> str:
     match scalar.filled:
         case None:
             return _text(scalar.text.replace("$", "$$"), scalar.plain)
@@ -106,7 +106,7 @@ def _scalar(scalar: Scalar) -> str:
         case Secret():
             return "${secret." + scalar.filled.name + "}"
     text = scalar.text if scalar.filled is BROKEN else str(scalar.filled).replace("$", "$$")
-    is_word = bool(_KEY.fullmatch(text)) and plain_value(Scalar(text, scalar.span)) == text
+    is_word = bool(_KEY.fullmatch(text)) and plain_value(ScalarNode(text, scalar.span)) == text
     return _text(text, is_word or (scalar.filled is BROKEN and scalar.plain))
 
 

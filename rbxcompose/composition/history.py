@@ -6,17 +6,17 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Mapping, Node, Path, at
+from rbxcompose.manifest.tree import KeyPath, MappingNode, TreeNode, at
 
 ROBOT_LAYER = "the robot"
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class HistoryStep:
     """What one layer wrote: a node with its place, or None where it took the value away."""
 
     layer: str
-    node: Node | None
+    node: TreeNode | None
     span: Span
 
 
@@ -27,25 +27,25 @@ class History:
     Only what a layer added, replaced or removed as a whole is kept, so it costs no more than what was changed.
     """
 
-    _steps: dict[Path, list[tuple[int, Step]]] = field(default_factory=dict)
+    _steps: dict[KeyPath, list[tuple[int, HistoryStep]]] = field(default_factory=dict)
     _count: int = 0
 
-    def write(self, path: Path, step: Step) -> None:
+    def write(self, path: KeyPath, step: HistoryStep) -> None:
         """Keep what a layer did at `path`."""
         self._count += 1
         self._steps.setdefault(path, []).append((self._count, step))
 
     @property
-    def paths(self) -> Iterable[Path]:
+    def paths(self) -> Iterable[KeyPath]:
         """Return every path at which a layer wrote."""
         return self._steps.keys()
 
-    def of(self, path: Path) -> tuple[Step, ...]:
+    def of(self, path: KeyPath) -> tuple[HistoryStep, ...]:
         """Return every layer's value at `path`, the one that holds last; empty if no layer ever wrote there.
 
         A last step without a node tells that the value was taken away.
         """
-        found: list[Step] = []
+        found: list[HistoryStep] = []
         for step in self._all(path):
             if step.node is not None or (found and found[-1].node is not None):
                 found.append(step)
@@ -54,18 +54,20 @@ class History:
     def removed(self, section: str) -> dict[str, Span]:
         """Return the entries of a section that were there and are gone, each with the place that took it away."""
         names = {path[1] for path in self._steps if len(path) == 2 and path[0] == section}
-        names |= {name for step in self.of((section,)) if isinstance(step.node, Mapping) for name in step.node.entries}
+        names |= {
+            name for step in self.of((section,)) if isinstance(step.node, MappingNode) for name in step.node.entries
+        }
         last = {str(name): steps[-1] for name in names if (steps := self.of((section, name)))}
         return {name: step.span for name, step in last.items() if step.node is None}
 
-    def layer(self, path: Path) -> str:
+    def layer(self, path: KeyPath) -> str:
         """Return the layer whose value at `path` holds, of the nearest path above it that has one."""
         for length in range(len(path), -1, -1):
             if steps := self.of(path[:length]):
                 return steps[-1].layer
         return ""
 
-    def _all(self, path: Path) -> Iterator[Step]:
+    def _all(self, path: KeyPath) -> Iterator[HistoryStep]:
         reaching = [
             (order, step, path[length:])
             for length in range(len(path) + 1)
@@ -73,4 +75,4 @@ class History:
         ]
         for _, step, rest in sorted(reaching, key=lambda one: one[0]):
             node = at(step.node, rest) if step.node is not None else None
-            yield step if node is step.node else Step(step.layer, node, node.span if node else step.span)
+            yield step if node is step.node else HistoryStep(step.layer, node, node.span if node else step.span)

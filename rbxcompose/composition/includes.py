@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from collections.abc import Sequence as SequenceOf
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,12 +16,12 @@ from rbxcompose.findings import Finding, Related, Span, kind
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.files import resolve, shown_name
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.limits import ALL_BYTES, INCLUDE_DEPTH, INSTANCES
 from rbxcompose.manifest.registry import naming, sections
-from rbxcompose.manifest.renamer import Topic
+from rbxcompose.manifest.renamer import RenamedTopic
 from rbxcompose.manifest.section import PART, Contents, Section
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence, at, key_span, value_span
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import WRONG_TYPE
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.references import COMPONENT, VALUE
@@ -74,15 +73,15 @@ include:
 
 
 @dataclass(frozen=True, slots=True)
-class Instance:
+class PartInstance:
     """One instance of a part: what its file brings under the names of the robot, and what its arguments are given."""
 
     name: str  # its path: `arm.hand`
     file: str  # as findings show it
     span: Span  # of the entry that includes it
-    root: Mapping
-    arguments: Mapping  # the section `args` of its file
-    given: Mapping  # `with:`
+    root: MappingNode
+    arguments: MappingNode  # the section `args` of its file
+    given: MappingNode  # `with:`
     claims: tuple[Claim, ...]
 
 
@@ -90,7 +89,7 @@ class Instance:
 class _File:
     """A part's file: its tree, and what it needs and provides."""
 
-    root: Mapping
+    root: MappingNode
     claims: tuple[Claim, ...]
 
 
@@ -114,7 +113,7 @@ class Parts:
     _count: int = 0
     _size: int = 0
 
-    def instances(self, root: Mapping, path: str = "", above: tuple[_Open, ...] = ()) -> Iterator[Instance]:
+    def instances(self, root: MappingNode, path: str = "", above: tuple[_Open, ...] = ()) -> Iterator[PartInstance]:
         """Yield what `include:` of a file brings, an instance behind those that it includes itself."""
         for name, entry, read in Contents(root, self.robot, self.documents).of(include):
             opened = self._open(read, entry, above) if read else None
@@ -130,7 +129,7 @@ class Parts:
                 inside = [*self._inside(instance, file, (*above, opened)), _instance(instance, file, opened, entry)]
                 yield from self._renamed(name, read, entry.value, inside)
 
-    def _inside(self, instance: str, file: _File, above: tuple[_Open, ...]) -> Iterator[Instance]:
+    def _inside(self, instance: str, file: _File, above: tuple[_Open, ...]) -> Iterator[PartInstance]:
         """Yield what a part includes itself."""
         included = replace(file.root, entries={n: e for n, e in file.root.entries.items() if n == include.name})
         yield from self.instances(in_scope(settled(included, self.documents.report), instance), instance, above)
@@ -174,10 +173,12 @@ class Parts:
         self.is_complete &= self._files[path] is not None
         return self._files[path]
 
-    def _renamed(self, name: str, read: Include, written: Node, inside: list[Instance]) -> Iterator[Instance]:
+    def _renamed(
+        self, name: str, read: Include, written: TreeNode, inside: list[PartInstance]
+    ) -> Iterator[PartInstance]:
         """Yield an instance and what it includes under the names of the file that includes it."""
         connect = {
-            topic: Topic(new, value_span(written, ("connect", topic)), key_span(written, ("connect", topic)))
+            topic: RenamedTopic(new, value_span(written, ("connect", topic)), key_span(written, ("connect", topic)))
             for topic, new in read.connect.items()
         }
         renaming = Renaming.of(f"{name}_", connect, [instance.root for instance in inside])
@@ -197,18 +198,18 @@ class Parts:
             self.documents.report.add(finding)
 
 
-def _instance(name: str, file: _File, opened: _Open, entry: Entry) -> Instance:
+def _instance(name: str, file: _File, opened: _Open, entry: Entry) -> PartInstance:
     """Return an instance as its own file describes it."""
     scoped = in_scope(file.root, name)
-    own = {*Header.model_fields, *(one.name for one in sections(PART) if not one.is_composed)}
+    own = {*ManifestHeader.model_fields, *(one.name for one in sections(PART) if not one.is_composed)}
     given = at(entry.value, ("with",))
-    return Instance(
+    return PartInstance(
         name=name,
         file=shown_name(opened.file),
         span=opened.span,
         root=replace(scoped, entries={key: one for key, one in scoped.entries.items() if key not in own}),
         arguments=replace(scoped, entries={key: one for key, one in scoped.entries.items() if key == args.name}),
-        given=given if isinstance(given, Mapping) else Mapping({}, opened.span),
+        given=given if isinstance(given, MappingNode) else MappingNode({}, opened.span),
         claims=file.claims,
     )
 
@@ -221,22 +222,22 @@ def _circle(chain: list[_Open], span: Span) -> Finding:
     return CIRCLE.at(span, f"parts include each other in a circle: {names}", related=related)
 
 
-def in_scope(root: Mapping, scope: str) -> Mapping:
+def in_scope(root: MappingNode, scope: str) -> MappingNode:
     """Return a tree whose `${args...}` mean the arguments of the instance `scope`."""
 
-    def scoped(node: Node) -> Node:
+    def scoped(node: TreeNode) -> TreeNode:
         match node:
-            case Scalar(text=text):
+            case ScalarNode(text=text):
                 return replace(node, scope=scope) if "$" in text else node
-            case Sequence(items=items):
+            case SequenceNode(items=items):
                 return replace(node, items=tuple(map(scoped, items)))
-            case Mapping(entries=entries):
+            case MappingNode(entries=entries):
                 return replace(node, entries={name: Entry(one.key, scoped(one.value)) for name, one in entries.items()})
 
     return replace(root, entries={name: Entry(one.key, scoped(one.value)) for name, one in root.entries.items()})
 
 
-def included_parts(instances: SequenceOf[Instance]) -> dict[str, IncludedPart]:
+def included_parts(instances: Sequence[PartInstance]) -> dict[str, IncludedPart]:
     """Return the instances as the checks see them; what a part includes counts as its own."""
     found = {}
     for one in instances:
@@ -250,6 +251,6 @@ def included_parts(instances: SequenceOf[Instance]) -> dict[str, IncludedPart]:
     return found
 
 
-def _names(roots: Iterable[Mapping], those: Iterable[Section[Any, Any]]) -> frozenset[str]:
+def _names(roots: Iterable[MappingNode], those: Iterable[Section[Any, Any]]) -> frozenset[str]:
     chosen = list(those)
     return frozenset(name for root in roots for section in chosen for name in section.names_in(root))

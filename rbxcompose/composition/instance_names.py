@@ -13,9 +13,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rbxcompose.manifest.registry import naming, section_named, sections
-from rbxcompose.manifest.renamer import Topic
+from rbxcompose.manifest.renamer import RenamedTopic
 from rbxcompose.manifest.section import Section
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence, at
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, at
 from rbxcompose.references import ANYTHING, COMPONENT, PORT, TOPIC
 
 Rename = Callable[[str], str]
@@ -26,12 +26,12 @@ class Renaming:
     """How the names of one instance change; `used` are the topics of `connect` that the part has."""
 
     prefix: str
-    connect: dict[str, Topic]
+    connect: dict[str, RenamedTopic]
     own: dict[str, frozenset[str]]  # by section
     used: set[str] = field(default_factory=set)
 
     @classmethod
-    def of(cls, prefix: str, connect: dict[str, Topic], roots: Iterable[Mapping]) -> Renaming:
+    def of(cls, prefix: str, connect: dict[str, RenamedTopic], roots: Iterable[MappingNode]) -> Renaming:
         """Return the renaming for what `roots` bring: the file of a part and all that it includes."""
         trees = list(roots)
         named = [one for one in sections() if one.names and one.is_composed]
@@ -43,7 +43,7 @@ class Renaming:
         """Return the names of all that the part runs."""
         return frozenset(name for one in naming(COMPONENT) for name in self.own[one.name])
 
-    def root(self, root: Mapping) -> Mapping:
+    def root(self, root: MappingNode) -> MappingNode:
         """Return the sections of a part under their new names."""
         entries = {}
         for name, entry in root.entries.items():
@@ -61,7 +61,7 @@ class Renaming:
             return f"{self.topic(above)}/{name}"
         return topic
 
-    def written(self, topic: str) -> Topic:
+    def written(self, topic: str) -> RenamedTopic:
         """Return what gives a topic its other name: itself, or the topic that it stands below."""
         return self.connect.get(topic) or self.connect[topic.rpartition("/")[0]]
 
@@ -87,25 +87,25 @@ class Renaming:
         changed = (self.name(kind, name) for kind in (COMPONENT, *kinds))
         return next((one for one in changed if one != name), name)
 
-    def values(self, given: Mapping) -> Mapping:
+    def values(self, given: MappingNode) -> MappingNode:
         """Return the values that a part gives to one that it includes."""
         entries = {name: Entry(one.key, self.texts(one.value, self.any_name)) for name, one in given.entries.items()}
         return replace(given, entries=entries)
 
-    def texts(self, node: Node, change: Rename) -> Node:
+    def texts(self, node: TreeNode, change: Rename) -> TreeNode:
         """Return a node with every text below it changed, but for those that are filled in later."""
         match node:
-            case Scalar(text=text):
+            case ScalarNode(text=text):
                 changed = text if "${" in text else change(text)
                 return node if changed == text else replace(node, text=changed)
-            case Sequence(items=items):
+            case SequenceNode(items=items):
                 return replace(node, items=tuple(self.texts(item, change) for item in items))
-            case Mapping(entries=entries):
+            case MappingNode(entries=entries):
                 return replace(node, entries={n: Entry(e.key, self.texts(e.value, change)) for n, e in entries.items()})
 
-    def topics(self, node: Node, above: str = "") -> Node:
+    def topics(self, node: TreeNode, above: str = "") -> TreeNode:
         """Return a map whose keys are topics (below `above`, if given) with these changed; what is no map stays."""
-        if not isinstance(node, Mapping):
+        if not isinstance(node, MappingNode):
             return node
         entries = {}
         for name, entry in node.entries.items():
@@ -122,14 +122,14 @@ class Renaming:
     def _new(self, section: Section[Any, Any], name: str) -> str:
         return self.topic(name) if section.has_topics else f"{self.prefix}{name}"
 
-    def _section(self, section: Section[Any, Any], node: Node) -> Node:
+    def _section(self, section: Section[Any, Any], node: TreeNode) -> TreeNode:
         node = section.with_references(node, lambda kind, one: self.texts(one, lambda text: self.name(kind, text)))
-        if section.at and isinstance(node, Mapping):
+        if section.at and isinstance(node, MappingNode):
             return _with(node, section.at[0], lambda named: self._named(section, named))
         return self._named(section, node) if section.names else node
 
-    def _named(self, section: Section[Any, Any], node: Node) -> Node:
-        if not isinstance(node, Mapping):
+    def _named(self, section: Section[Any, Any], node: TreeNode) -> TreeNode:
+        if not isinstance(node, MappingNode):
             return node
         values = {name: section.rename(self, name, entry.value) for name, entry in node.entries.items()}
         changed = {name: Entry(entry.key, values[name]) for name, entry in node.entries.items()}
@@ -140,7 +140,7 @@ class Renaming:
         return replace(node, entries=entries)
 
 
-def topics_of(roots: Iterable[Mapping]) -> set[str]:
+def topics_of(roots: Iterable[MappingNode]) -> set[str]:
     """Return the topics that trees have, as `connect:` of an instance may name them."""
     return {
         topic
@@ -152,7 +152,7 @@ def topics_of(roots: Iterable[Mapping]) -> set[str]:
     }
 
 
-def _with(node: Mapping, key: str, change: Callable[[Node], Node]) -> Mapping:
+def _with(node: MappingNode, key: str, change: Callable[[TreeNode], TreeNode]) -> MappingNode:
     """Return a map with the value of `key` changed, if it has it."""
     if key not in node.entries:
         return node

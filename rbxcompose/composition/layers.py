@@ -6,17 +6,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rbxcompose.composition.history import ROBOT_LAYER, History, Step
-from rbxcompose.composition.includes import Instance, Parts
+from rbxcompose.composition.history import ROBOT_LAYER, History, HistoryStep
+from rbxcompose.composition.includes import PartInstance, Parts
 from rbxcompose.composition.overlay import NOTHING_TO_CHANGE, compose, join, settled
 from rbxcompose.composition.set_options import read_sets
 from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.files import find, shown_name
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.section import OVERLAY, Contents
-from rbxcompose.manifest.tree import Mapping
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.printable import plain
 from rbxcompose.sections.include import include
 from rbxcompose.sections.profiles import profiles
@@ -38,14 +38,14 @@ class Chosen:
 class Composed:
     """A robot with nothing filled in yet: its sections, its `include:`, and the instances of its parts."""
 
-    root: Mapping
-    include: Mapping
-    instances: tuple[Instance, ...]
+    root: MappingNode
+    include: MappingNode
+    instances: tuple[PartInstance, ...]
     parts: Parts
     history: History = field(default_factory=History)
 
 
-def compose_robot(root: Mapping, file: Path, chosen: Chosen, documents: Documents) -> Composed:
+def compose_robot(root: MappingNode, file: Path, chosen: Chosen, documents: Documents) -> Composed:
     """Return a robot's file with its parts below and what was chosen on top."""
     report, history = documents.report, History()
     overlays = [*_profiles(root, file, chosen.profiles, documents), *_overlays(chosen.overlays, documents)]
@@ -62,7 +62,7 @@ def compose_robot(root: Mapping, file: Path, chosen: Chosen, documents: Document
     else:
         composed = settled(own, report)
         for name, entry in composed.entries.items():
-            history.write((name,), Step(ROBOT_LAYER, entry.value, entry.value.span))
+            history.write((name,), HistoryStep(ROBOT_LAYER, entry.value, entry.value.span))
     composed = compose(composed, [(_without(tree, INCLUDE), name) for tree, name in overlays], report, history)
     if chosen.sets:
         composed = compose(composed, read_sets(chosen.sets, composed, report, documents.sources), report, history)
@@ -70,35 +70,41 @@ def compose_robot(root: Mapping, file: Path, chosen: Chosen, documents: Document
 
 
 def _include(
-    root: Mapping, overlays: list[tuple[Mapping, str]], sets: Sequence[str], history: History, documents: Documents
-) -> Mapping:
+    root: MappingNode,
+    overlays: list[tuple[MappingNode, str]],
+    sets: Sequence[str],
+    history: History,
+    documents: Documents,
+) -> MappingNode:
     """Return the section `include` as all layers have it: what it names is read before anything else is composed."""
     included = settled(only(root, INCLUDE), documents.report)
     for entry in included.entries.values():
-        history.write((INCLUDE,), Step(ROBOT_LAYER, entry.value, entry.value.span))
+        history.write((INCLUDE,), HistoryStep(ROBOT_LAYER, entry.value, entry.value.span))
     changes = [(only(tree, INCLUDE), name) for tree, name in overlays]
     included = compose(included, changes, documents.report, history)
     lines = read_sets(sets, included, documents.report, documents.sources, of_include=True)
     return compose(included, lines, documents.report, history)
 
 
-def only(root: Mapping, key: str) -> Mapping:
+def only(root: MappingNode, key: str) -> MappingNode:
     """Return a tree with nothing but one of its keys."""
     return replace(root, entries={name: entry for name, entry in root.entries.items() if name == key})
 
 
-def _without(root: Mapping, key: str) -> Mapping:
+def _without(root: MappingNode, key: str) -> MappingNode:
     return replace(root, entries={name: entry for name, entry in root.entries.items() if name != key})
 
 
-def _profiles(root: Mapping, file: Path, chosen: Sequence[str], documents: Documents) -> Iterator[tuple[Mapping, str]]:
+def _profiles(
+    root: MappingNode, file: Path, chosen: Sequence[str], documents: Documents
+) -> Iterator[tuple[MappingNode, str]]:
     """Yield the chosen profiles, in the order of the command."""
     named = Contents(root, file, documents).of(profiles)
     if chosen:
         documents.sources[PROFILE] = "\n".join(map(plain, chosen))
     for line, name in enumerate(chosen if named is not None else (), 1):
         overlay = named[name].value if named and name in named else None
-        if isinstance(overlay, Mapping):
+        if isinstance(overlay, MappingNode):
             yield overlay, f"profile '{name}'"
         else:
             span = Span(PROFILE, line, 1, line, len(name) + 1)
@@ -106,18 +112,18 @@ def _profiles(root: Mapping, file: Path, chosen: Sequence[str], documents: Docum
             documents.report.add(NOTHING_TO_CHANGE.misspelt(span, message, name, named or (), "profiles"))
 
 
-def profile_spans(root: Mapping) -> dict[str, Span]:
+def profile_spans(root: MappingNode) -> dict[str, Span]:
     """Return where each profile of a robot's file stands, from its name to its end."""
     there = root.get(profiles.name)
-    named = there.entries if isinstance(there, Mapping) else {}
+    named = there.entries if isinstance(there, MappingNode) else {}
     return {
         name: one.key.span._replace(end_line=one.value.span.end_line, end_column=one.value.span.end_column)
         for name, one in named.items()
-        if isinstance(one.value, Mapping)
+        if isinstance(one.value, MappingNode)
     }
 
 
-def _overlays(chosen: Sequence[str], documents: Documents) -> Iterator[tuple[Mapping, str]]:
+def _overlays(chosen: Sequence[str], documents: Documents) -> Iterator[tuple[MappingNode, str]]:
     """Yield the files of `-f`, in the order of the command; the header is their own."""
     for written in chosen:
         file = find(written)
@@ -125,5 +131,5 @@ def _overlays(chosen: Sequence[str], documents: Documents) -> Iterator[tuple[Map
             documents.report.add(file)
         elif (root := documents.read(file, OVERLAY)) is not None:
             documents.check(file_model(OVERLAY), root)
-            sections = {name: entry for name, entry in root.entries.items() if name not in Header.model_fields}
+            sections = {name: entry for name, entry in root.entries.items() if name not in ManifestHeader.model_fields}
             yield replace(root, entries=sections), f"overlay '{shown_name(file)}'"

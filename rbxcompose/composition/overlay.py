@@ -9,11 +9,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 from operator import is_
 
-from rbxcompose.composition.history import History, Step
+from rbxcompose.composition.history import History, HistoryStep
 from rbxcompose.findings import Related, Report, Span, correction, kind, suggest
 from rbxcompose.manifest.registry import section_named
-from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar
-from rbxcompose.manifest.tree import Sequence as NodeSequence
+from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.walk import REMOVE
 
 NOTHING_TO_CHANGE = kind(
@@ -95,8 +94,8 @@ SET = "--set"
 
 
 def compose(
-    base: Mapping, overlays: Iterable[tuple[Mapping, str]], report: Report, history: History | None = None
-) -> Mapping:
+    base: MappingNode, overlays: Iterable[tuple[MappingNode, str]], report: Report, history: History | None = None
+) -> MappingNode:
     """Return `base`, which is settled, changed by each overlay in turn; each comes with its name for findings."""
     composed = base
     for overlay, name in overlays:
@@ -104,12 +103,12 @@ def compose(
     return composed
 
 
-def join(parts: Iterable[tuple[Mapping, str, Span]], report: Report, history: History) -> Mapping:
+def join(parts: Iterable[tuple[MappingNode, str, Span]], report: Report, history: History) -> MappingNode:
     """Return what several parts bring together; each comes with its instance and the place that includes it.
 
     A part stands behind those that it includes, and may change them; what else two parts bring is a finding.
     """
-    joined = Mapping()
+    joined = MappingNode()
     for root, instance, span in parts:
         joined = _Join(instance, span, report, history).mapping(joined, _spelt_out(root), ())
     return joined
@@ -120,26 +119,26 @@ def part_layer(instance: str) -> str:
     return f"part '{instance}'"
 
 
-def settled(root: Mapping, report: Report) -> Mapping:
+def settled(root: MappingNode, report: Report) -> MappingNode:
     """Return a tree that nothing lies below: short forms written in full, and a finding for each `!remove`."""
     return _settled_map(_spelt_out(root), report)
 
 
-def _spelt_out(root: Mapping) -> Mapping:
+def _spelt_out(root: MappingNode) -> MappingNode:
     """Write the short forms of section entries in full, so that every layer can change a part of them."""
     entries = dict(root.entries)
     for name, entry in root.entries.items():
         short = section.short if (section := section_named(name)) else None
-        if short is not None and short.is_merged and isinstance(named := entry.value, Mapping):
+        if short is not None and short.is_merged and isinstance(named := entry.value, MappingNode):
             full = {key: replace(one, value=_in_full(one.value, short.key)) for key, one in named.entries.items()}
             entries[name] = replace(entry, value=replace(named, entries=full))
     return replace(root, entries=entries)
 
 
-def _in_full(value: Node, key: str) -> Node:
-    if not isinstance(value, Scalar):
+def _in_full(value: TreeNode, key: str) -> TreeNode:
+    if not isinstance(value, ScalarNode):
         return value
-    return Mapping({key: Entry(Scalar(key, value.span), value)}, value.span)
+    return MappingNode({key: Entry(ScalarNode(key, value.span), value)}, value.span)
 
 
 class _Merge:
@@ -150,20 +149,20 @@ class _Merge:
         self.report = report
         self.history = history
 
-    def mapping(self, base: Mapping, over: Mapping, path: Path) -> Mapping:
+    def mapping(self, base: MappingNode, over: MappingNode, path: KeyPath) -> MappingNode:
         entries = dict(base.entries)
         for name, entry in over.entries.items():
             self.entry(entries, entry, (*path, name))
         return replace(base, entries=entries)
 
-    def entry(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
+    def entry(self, entries: dict[str, Entry], entry: Entry, path: KeyPath) -> None:
         """Lay one entry over those of the map above it."""
         name = entry.key.text
         below = entries.get(name)
         is_gone = is_removal(entry.value)
         if below is None:
             (self._nothing_to_remove if is_gone else self._add)(entries, entry, path)
-        elif isinstance(below.value, Mapping) and isinstance(entry.value, Mapping) and not entry.value.tag:
+        elif isinstance(below.value, MappingNode) and isinstance(entry.value, MappingNode) and not entry.value.tag:
             if self.may_merge(path):
                 entries[name] = replace(below, value=self.mapping(below.value, entry.value, path))
             else:
@@ -172,34 +171,34 @@ class _Merge:
             self._clash(below, entry, path)
         elif is_gone:
             del entries[name]
-            self.history.write(path, Step(self.overlay, None, entry.key.span))
+            self.history.write(path, HistoryStep(self.overlay, None, entry.key.span))
         else:
             self._enter(entries, entry, path)
 
-    def may_merge(self, path: Path) -> bool:
+    def may_merge(self, path: KeyPath) -> bool:
         """Tell whether this layer may add to the map at `path`."""
         return True
 
-    def may_change(self, path: Path) -> bool:
+    def may_change(self, path: KeyPath) -> bool:
         """Tell whether this layer may replace or remove what is at `path`."""
         return True
 
-    def _enter(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
+    def _enter(self, entries: dict[str, Entry], entry: Entry, path: KeyPath) -> None:
         value = _settled(entry.value, self.report)
         entries[entry.key.text] = Entry(entry.key, value)
-        self.history.write(path, Step(self.overlay, value, value.span))
+        self.history.write(path, HistoryStep(self.overlay, value, value.span))
 
-    def _nothing_to_remove(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
+    def _nothing_to_remove(self, entries: dict[str, Entry], entry: Entry, path: KeyPath) -> None:
         name = entry.key.text
         where = f" in '{'.'.join(map(str, path[:-1]))}'" if path[1:] else ""
         message = f"{self.overlay} removes '{name}', which does not exist{where}"
         self.report.add(NOTHING_TO_CHANGE.misspelt(entry.key.span, message, name, entries))
 
-    def _add(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
+    def _add(self, entries: dict[str, Entry], entry: Entry, path: KeyPath) -> None:
         name = entry.key.text
         section = section_named(path[0]) if len(path) == 2 else None
         one, needed = (section.entry, section.needs) if section else ("", "")
-        if needed and isinstance(entry.value, Mapping) and needed not in entry.value:
+        if needed and isinstance(entry.value, MappingNode) and needed not in entry.value:
             message = f"{self.overlay} changes the {one} '{name}', which the robot does not have"
             help_text = suggest(name, entries, str(path[0])) or f"a new {one} needs a '{needed}:'"
             fix = correction(name, entries, entry.key.span)
@@ -207,7 +206,7 @@ class _Merge:
         else:
             self._enter(entries, entry, path)
 
-    def _clash(self, below: Entry, entry: Entry, path: Path) -> None:
+    def _clash(self, below: Entry, entry: Entry, path: KeyPath) -> None:
         """Say that this layer may not change what is at `path`."""
         raise AssertionError("an overlay may change everything")
 
@@ -220,13 +219,13 @@ class _Join(_Merge):
         self.span = span
         self.included = part_layer(f"{instance}.").removesuffix("'")  # how the layers of what it includes begin
 
-    def may_merge(self, path: Path) -> bool:
+    def may_merge(self, path: KeyPath) -> bool:
         return _is_shared(path) or self.may_change(path)
 
-    def may_change(self, path: Path) -> bool:
+    def may_change(self, path: KeyPath) -> bool:
         return self.history.layer(path).startswith(self.included)
 
-    def _clash(self, below: Entry, entry: Entry, path: Path) -> None:
+    def _clash(self, below: Entry, entry: Entry, path: KeyPath) -> None:
         name, *names = map(str, path)
         other, section = self.history.layer(path), section_named(name)
         what = f"'{names[-1]}' of '{name}'" if names else f"'{name}'"
@@ -238,43 +237,43 @@ class _Join(_Merge):
         self.report.add(TWO_PARTS.at(self.span, message, label="the second", help=help_text, related=related))
 
 
-def _is_shared(path: Path) -> bool:
+def _is_shared(path: KeyPath) -> bool:
     """Tell whether several parts may add to the map at `path`."""
     section = section_named(path[0])
     return section is not None and section.is_shared(path[1:])
 
 
-def _settled(node: Node, report: Report) -> Node:
+def _settled(node: TreeNode, report: Report) -> TreeNode:
     """Return a node without the tags of maps: nothing lies below it that they could speak of.
 
     A list keeps its `!replace`, which says that what is not in it any more was meant to go.
     """
     match node:
-        case Scalar():
+        case ScalarNode():
             return node
-        case Mapping():
+        case MappingNode():
             return _settled_map(node, report)
-        case NodeSequence(items=items):
+        case SequenceNode(items=items):
             inner = tuple(_settled(item, report) for item in items)
             return node if all(map(is_, inner, items)) else replace(node, items=inner)
 
 
-def is_removal(node: Node) -> bool:
+def is_removal(node: TreeNode) -> bool:
     """Tell whether a layer takes away what lies below it."""
-    return isinstance(node, Mapping) and node.tag == REMOVE
+    return isinstance(node, MappingNode) and node.tag == REMOVE
 
 
-def _settled_map(node: Mapping, report: Report) -> Mapping:
+def _settled_map(node: MappingNode, report: Report) -> MappingNode:
     """Return a map without tags; the same object if there are none."""
     changed: dict[str, Entry] = {}
     for name, entry in node.entries.items():
         value = entry.value
-        if isinstance(value, Scalar):
+        if isinstance(value, ScalarNode):
             continue
         if is_removal(value):
             message = f"'!remove' has nothing to remove '{name}' from"
             report.add(NOT_AN_OVERLAY.at(value.span, message, help="it belongs in a profile"))
-            changed[name] = Entry(entry.key, Scalar("", value.span, filled=BROKEN))  # so that nobody misses it
+            changed[name] = Entry(entry.key, ScalarNode("", value.span, filled=BROKEN))  # so that nobody misses it
         elif (inner := _settled(value, report)) is not value:
             changed[name] = Entry(entry.key, inner)
-    return Mapping({**node.entries, **changed}, node.span) if changed or node.tag else node
+    return MappingNode({**node.entries, **changed}, node.span) if changed or node.tag else node

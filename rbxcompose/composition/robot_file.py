@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping as AnyMapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,11 +18,11 @@ from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.fill_names import names_of
 from rbxcompose.manifest.garbage_collection import paused_collection
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.mission_data import is_moderate
 from rbxcompose.manifest.secrets import Secrets
 from rbxcompose.manifest.section import ROBOT
-from rbxcompose.manifest.tree import Mapping, Scalar
+from rbxcompose.manifest.tree import MappingNode, ScalarNode
 
 MISSION = "Mission"
 
@@ -38,7 +37,7 @@ def load_robot(
     overlays: Sequence[str] = (),
     sets: Sequence[str] = (),
     sim: bool = True,
-    environment: AnyMapping[str, str] | None = None,
+    environment: Mapping[str, str] | None = None,
 ) -> RobotManifest | None:
     """Read a robot's file with its parts, profiles, overlays and `--set` changes; mistakes go into `report`.
 
@@ -64,7 +63,7 @@ def load_robot(
 
 
 def _manifest(
-    composed: Composed, file: Path, sim: bool, environment: AnyMapping[str, str], documents: Documents
+    composed: Composed, file: Path, sim: bool, environment: Mapping[str, str], documents: Documents
 ) -> RobotManifest | None:
     if not composed.parts.is_complete:
         return None  # what a missing part was to bring would be missing everywhere
@@ -90,19 +89,19 @@ def read_mission(
     report: Report,
     sources: dict[str, str],
     sim: bool = True,
-    environment: AnyMapping[str, str] | None = None,
-) -> Mapping | None:
+    environment: Mapping[str, str] | None = None,
+) -> MappingNode | None:
     """Read a mission's file, check its header and fill in `${...}`; what it does is left as nodes."""
     documents = Documents(report, sources)
     root = documents.read(path, MISSION)
     if root is None:
         return None
-    header = {name: entry for name, entry in root.entries.items() if name in Header.model_fields}
-    documents.check(Header, replace(root, entries=header))
+    header = {name: entry for name, entry in root.entries.items() if name in ManifestHeader.model_fields}
+    documents.check(ManifestHeader, replace(root, entries=header))
     filled = fill(root, names_of(robot, sim, environment or {}), report, runs=True)
     return filled if is_moderate(filled.get("data"), "datum", report) else None
 
 
-def _name(root: Mapping) -> str:
+def _name(root: MappingNode) -> str:
     name = root.get("name")
-    return name.text if isinstance(name, Scalar) else ""
+    return name.text if isinstance(name, ScalarNode) else ""

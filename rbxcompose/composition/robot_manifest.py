@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping as AnyMapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -12,16 +12,16 @@ from rbxcompose.composition.inclusions import Inclusions
 from rbxcompose.config import Place
 from rbxcompose.findings import Span
 from rbxcompose.manifest.section import Contents
-from rbxcompose.manifest.tree import Mapping
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.sections.body import Description, body
-from rbxcompose.sections.bus import Bus, bus
+from rbxcompose.sections.bus import BusModel, bus
 from rbxcompose.sections.components import ComponentEntry, components
-from rbxcompose.sections.diagnostics import Diagnostics, diagnostics
+from rbxcompose.sections.diagnostics import DiagnosticsModel, diagnostics
 from rbxcompose.sections.missions import MissionEntry, missions
-from rbxcompose.sections.muxes import Mux, muxes
+from rbxcompose.sections.muxes import MuxModel, muxes
 from rbxcompose.sections.places import places
 from rbxcompose.sections.start import start
-from rbxcompose.sections.values import Value, values
+from rbxcompose.sections.values import ValueModel, values
 
 
 class About(StrEnum):
@@ -66,49 +66,49 @@ class RobotManifest:
     name: str
     about: str
     path: Path
-    root: Mapping  # composed and filled; the places of everything below
+    root: MappingNode  # composed and filled; the places of everything below
     is_simulated: bool
     contents: Contents
-    parts: AnyMapping[str, IncludedPart] = field(default_factory=dict)
-    profiles: AnyMapping[str, Span] = field(default_factory=dict)  # from the name to the end of what it changes
-    include: Mapping = field(default_factory=Mapping)  # composed; what it names is part of `root` already
+    parts: Mapping[str, IncludedPart] = field(default_factory=dict)
+    profiles: Mapping[str, Span] = field(default_factory=dict)  # from the name to the end of what it changes
+    include: MappingNode = field(default_factory=MappingNode)  # composed; what it names is part of `root` already
     history: History = field(default_factory=History)
     overlays: tuple[str, ...] = ()  # the files of `-f`, as findings show them
-    files: AnyMapping[str, Path] = field(default_factory=dict)  # every file that was read, by the name that is shown
+    files: Mapping[str, Path] = field(default_factory=dict)  # every file that was read, by the name that is shown
     inclusions: Inclusions = field(default_factory=Inclusions)
 
     @property
-    def components(self) -> AnyMapping[str, ComponentEntry]:
+    def components(self) -> Mapping[str, ComponentEntry]:
         """Return the components that the user wrote."""
         return self.contents.of(components)
 
     @property
-    def muxes(self) -> AnyMapping[str, Mux]:
+    def muxes(self) -> Mapping[str, MuxModel]:
         """Return the muxes."""
         return self.contents.of(muxes)
 
     @property
-    def places(self) -> AnyMapping[str, Place]:
+    def places(self) -> Mapping[str, Place]:
         """Return the places."""
         return self.contents.of(places)
 
     @property
-    def values(self) -> AnyMapping[str, Value]:
+    def values(self) -> Mapping[str, ValueModel]:
         """Return the values."""
         return self.contents.of(values)
 
     @property
-    def missions(self) -> AnyMapping[str, MissionEntry]:
+    def missions(self) -> Mapping[str, MissionEntry]:
         """Return the missions."""
         return self.contents.of(missions)
 
     @property
-    def diagnostics(self) -> Diagnostics:
+    def diagnostics(self) -> DiagnosticsModel:
         """Return how the states of components are grouped."""
         return self.contents.of(diagnostics)
 
     @property
-    def bus(self) -> Bus:
+    def bus(self) -> BusModel:
         """Return how messages travel."""
         return self.contents.of(bus)
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rbxcompose.composition.history import ROBOT_LAYER, History
-from rbxcompose.composition.includes import Instance, Parts
+from rbxcompose.composition.includes import PartInstance, Parts
 from rbxcompose.composition.layers import Composed, only
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Related, Report, Span, kind
-from rbxcompose.manifest.arguments import Argument
+from rbxcompose.manifest.arguments import DeclaredArgument
 from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.fill_names import Names, Typed, with_arguments
 from rbxcompose.manifest.section import Contents
-from rbxcompose.manifest.tree import BROKEN, Mapping
+from rbxcompose.manifest.tree import BROKEN, MappingNode
 from rbxcompose.manifest.validate import UNKNOWN_KEY
 from rbxcompose.sections.args import args
 
@@ -40,7 +40,7 @@ args:
 )
 
 
-def fill_scopes(composed: Composed, names: Names) -> tuple[Mapping, Mapping]:
+def fill_scopes(composed: Composed, names: Names) -> tuple[MappingNode, MappingNode]:
     """Return the robot's sections and its `include:` with every `${...}` filled in.
 
     The arguments' own values come first: those of the robot, then those of each instance, which are given in the scope
@@ -60,7 +60,7 @@ def fill_scopes(composed: Composed, names: Names) -> tuple[Mapping, Mapping]:
     return replace(root, entries={name: filled[name] for name in root.entries}), include
 
 
-def _own_value(name: str, declared: tuple[Argument | None, Span], history: History, report: Report) -> Typed:
+def _own_value(name: str, declared: tuple[DeclaredArgument | None, Span], history: History, report: Report) -> Typed:
     argument, span = declared
     if argument is None:
         return Typed(UNKNOWN, BROKEN)
@@ -72,7 +72,7 @@ def _own_value(name: str, declared: tuple[Argument | None, Span], history: Histo
     return Typed(argument.type, argument.read(argument.default, report), argument.default.span if is_given else None)
 
 
-def _given_values(instance: Instance, names: Names, parts: Parts) -> dict[str, Typed]:
+def _given_values(instance: PartInstance, names: Names, parts: Parts) -> dict[str, Typed]:
     """Return the values of a part's arguments: given by `with:`, else their defaults."""
     report = parts.documents.report
     declared = Contents(fill(instance.arguments, names, report), parts.robot, parts.documents).of(args)

@@ -11,7 +11,7 @@ from rbxcompose.findings import Finding, Related, kind
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.registry import broken_sections, naming, sections
 from rbxcompose.manifest.section import ROBOT, Contents, Section
-from rbxcompose.manifest.tree import Mapping, Scalar, key_span
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, key_span
 from rbxcompose.references import COMPONENT
 
 TAKEN_NAME = kind(
@@ -44,7 +44,7 @@ RESERVED = ("buses", "actuators", "joints", "controllers", "safety", "devices", 
 """The words of sections that a robot's file will have."""
 
 
-def read_sections(root: Mapping, file: Path, sim: bool, documents: Documents) -> RobotManifest:
+def read_sections(root: MappingNode, file: Path, sim: bool, documents: Documents) -> RobotManifest:
     """Return the robot that a composed and filled tree describes; entries with mistakes are left out."""
     documents.report.extend([*broken_sections(), *_taken_names(root)])
     contents = Contents(root, file, documents, sections())
@@ -61,12 +61,12 @@ def reserved_names() -> frozenset[str]:
     return frozenset((*RESERVED, *(one.name for one in sections(ROBOT))))
 
 
-def _text(root: Mapping, key: str) -> str:
+def _text(root: MappingNode, key: str) -> str:
     value = root.get(key)
-    return value.text if isinstance(value, Scalar) else ""
+    return value.text if isinstance(value, ScalarNode) else ""
 
 
-def _taken_names(root: Mapping) -> Iterator[Finding]:
+def _taken_names(root: MappingNode) -> Iterator[Finding]:
     """Yield a finding for each name of something that runs which something else has already."""
     running = list(naming(COMPONENT))
     for index, section in enumerate(running):
@@ -87,7 +87,7 @@ def _own_name(name: str, section: Section[Any, Any]) -> str:
 
 
 def _other_owner(
-    root: Mapping, name: str, section: Section[Any, Any], others: list[Section[Any, Any]]
+    root: MappingNode, name: str, section: Section[Any, Any], others: list[Section[Any, Any]]
 ) -> tuple[str, str, tuple[str, ...]] | None:
     """Return what else has a name: in words, as a label, and its path."""
     for one in sections(ROBOT):

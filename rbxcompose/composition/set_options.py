@@ -8,8 +8,8 @@ from rbxcompose.composition.overlay import NOTHING_TO_CHANGE, SET, is_removal
 from rbxcompose.findings import Report, Span, kind, suggest
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.registry import section_named, sections
-from rbxcompose.manifest.section import ROBOT, Scope
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.manifest.section import ROBOT, SetScope
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.sections.include import include
 
 BAD_SET = kind(
@@ -28,8 +28,8 @@ HEADER = ("about",)  # what it may change of the header
 
 
 def read_sets(
-    sets: Sequence[str], root: Mapping, report: Report, sources: dict[str, str], *, of_include: bool = False
-) -> list[tuple[Mapping, str]]:
+    sets: Sequence[str], root: MappingNode, report: Report, sources: dict[str, str], *, of_include: bool = False
+) -> list[tuple[MappingNode, str]]:
     """Return one overlay for each `PATH=VALUE`; together they are one source, a line for each.
 
     Those of `include` come in a run of their own, since parts are read before all else is composed.
@@ -44,7 +44,7 @@ def read_sets(
     return [(overlay, f"'{SET}'") for overlay in overlays if overlay]
 
 
-def _set_overlay(text: str, line: int, root: Mapping, report: Report) -> Mapping | None:
+def _set_overlay(text: str, line: int, root: MappingNode, report: Report) -> MappingNode | None:
     written, equals, value_text = text.partition("=")
     span = Span(SET, line, 1, line, len(written) + 1)
     names = written.strip().split(".")
@@ -59,23 +59,23 @@ def _set_overlay(text: str, line: int, root: Mapping, report: Report) -> Mapping
     if value is None:
         return None
     section = section_named(path[0]) if len(path) == 2 else None
-    if section and section.scope in (Scope.KEYS, Scope.BARE) and not is_removal(value):
+    if section and section.scope in (SetScope.KEYS, SetScope.BARE) and not is_removal(value):
         message = f"'{SET}' does not say what of '{path[1]}' to change"
         report.add(BAD_SET.at(span, message, help=f"write {SET} {path[1]}.KEY=VALUE"))
         return None
     for name in reversed(path):
-        value = Mapping({name: Entry(Scalar(name, span), value)}, span)
-    return value if isinstance(value, Mapping) else None
+        value = MappingNode({name: Entry(ScalarNode(name, span), value)}, span)
+    return value if isinstance(value, MappingNode) else None
 
 
-def _set_path(names: list[str], span: Span, root: Mapping, report: Report) -> list[str] | None:
+def _set_path(names: list[str], span: Span, root: MappingNode, report: Report) -> list[str] | None:
     """Return the path from the root, or None after a finding if it leads to nothing."""
     section = section_named(names[0]) if names[0] not in HEADER else None
-    scope = section.scope if section else Scope.NOTHING
-    if names[0] in HEADER or (section and scope is not Scope.NOTHING and not section.is_map):
+    scope = section.scope if section else SetScope.NOTHING
+    if names[0] in HEADER or (section and scope is not SetScope.NOTHING and not section.is_map):
         return names
-    if section is None or scope is Scope.NOTHING:
-        section, rest = next(one for one in sections() if one.scope is Scope.BARE), names
+    if section is None or scope is SetScope.NOTHING:
+        section, rest = next(one for one in sections() if one.scope is SetScope.BARE), names
     else:
         rest = names[1:]
     there = list(section.names_in(root))
@@ -90,21 +90,21 @@ def _set_path(names: list[str], span: Span, root: Mapping, report: Report) -> li
 
 def settable() -> list[str]:
     """Return the words that a path of `--set` may begin with, beside the names of components."""
-    return [*HEADER, *(one.name for one in sections(ROBOT) if one.scope is not Scope.NOTHING)]
+    return [*HEADER, *(one.name for one in sections(ROBOT) if one.scope is not SetScope.NOTHING)]
 
 
-def in_section(names: Sequence[str], root: Mapping) -> str:
+def in_section(names: Sequence[str], root: MappingNode) -> str:
     """Return the help for a path that begins with a name of a section, not with the section; else nothing."""
     for section in sections():
-        if section.is_map and section.scope is not Scope.NOTHING and names[0] in section.names_in(root):
+        if section.is_map and section.scope is not SetScope.NOTHING and names[0] in section.names_in(root):
             return f"did you mean '{section.name}.{'.'.join(names)}'?"
     return ""
 
 
-def _set_value(text: str, line: int, column: int, report: Report) -> Node | None:
+def _set_value(text: str, line: int, column: int, report: Report) -> TreeNode | None:
     """Read the value of a `--set`; blank lines and columns before it make its places those of the argument."""
     if not text.strip():
-        return Scalar("", Span(SET, line, column, line, column + 1))
+        return ScalarNode("", Span(SET, line, column, line, column + 1))
     node, findings = read_text("\n" * (line - 1) + " " * column + text, SET)
     report.extend(findings)
     return node

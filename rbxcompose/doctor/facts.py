@@ -13,7 +13,7 @@ from rbxcompose.runtime.processes import Process
 
 
 @dataclass(frozen=True, slots=True)
-class Bus:
+class BusFacts:
     """Who is on a robot's bus, and by how much its nodes' stamps lie in the past [s], at the least, by node."""
 
     graph: Graph
@@ -21,7 +21,7 @@ class Bus:
 
 
 @dataclass(frozen=True, slots=True)
-class Running:
+class RunningRobot:
     """A robot that is up, or what is left of one.
 
     `problem` is why its state cannot be read, `robot` what its file describes now; `bus` is None if it cannot be
@@ -32,7 +32,7 @@ class Running:
     state: RobotState | None
     problem: str = ""
     robot: Robot | None = None
-    bus: Bus | None = None
+    bus: BusFacts | None = None
 
     @property
     def name(self) -> str:
@@ -41,7 +41,7 @@ class Running:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class ResourceLimits:
     """What this user's processes may have; None is no limit. Sizes in bytes."""
 
     open_files: int | None
@@ -82,15 +82,15 @@ class Version:
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class HostFacts:
     """Everything. `file` is the robot that was named and need not be up; `processes` are titled ones of this user."""
 
-    running: Sequence[Running]
+    running: Sequence[RunningRobot]
     file: Robot | None
     python: str
     versions: Sequence[Version]
     clocks: Clocks
-    limits: Limits
+    limits: ResourceLimits
     listeners: Mapping[int, Listener]
     processes: Mapping[Process, str]
     base: Path

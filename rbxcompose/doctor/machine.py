@@ -12,7 +12,7 @@ from importlib import metadata
 from pathlib import Path
 
 import rbxcompose
-from rbxcompose.doctor.facts import Clocks, Limits, Listener, Version
+from rbxcompose.doctor.facts import Clocks, Listener, ResourceLimits, Version
 from rbxcompose.runtime.processes import Process, titled
 
 NAME = "rbxcompose"
@@ -81,9 +81,9 @@ def processes() -> dict[Process, str]:
     return {process: _title(_PROC / str(process.pid)) for process in titled(f"{NAME} ")}
 
 
-def limits() -> Limits:
+def limits() -> ResourceLimits:
     """Return what processes may have."""
-    return Limits(
+    return ResourceLimits(
         _limit(resource.RLIMIT_NOFILE), _limit(resource.RLIMIT_RTPRIO), _limit(resource.RLIMIT_MEMLOCK), _free(_SHARED)
     )
 

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rbxcompose.doctor.facts import Facts
+from rbxcompose.doctor.facts import HostFacts
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.plugins import Plugins
 
-Examine = Callable[[Facts], Iterable[str | Finding]]
+Examine = Callable[[HostFacts], Iterable[str | Finding]]
 """Yields findings, and words on what is fine."""
 
 PLUGINS = Plugins("doctor", "rbxcompose.doctor.examinations")
@@ -19,7 +19,7 @@ FINE = "ok"
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class ExaminationResult:
     """What one examination tells: words on what is fine, or a finding."""
 
     examination: str
@@ -50,13 +50,13 @@ def examination(examine: Examine) -> Examine:
     return examine
 
 
-def examine_all(facts: Facts) -> list[Answer]:
+def examine_all(facts: HostFacts) -> list[ExaminationResult]:
     """Run every examination, by name."""
     for name in PLUGINS.names():
         PLUGINS.load(name)
-    return [Answer(name, told) for name in sorted(EXAMINATIONS) for told in EXAMINATIONS[name](facts)]
+    return [ExaminationResult(name, told) for name in sorted(EXAMINATIONS) for told in EXAMINATIONS[name](facts)]
 
 
-def has_errors(answers: Sequence[Answer]) -> bool:
+def has_errors(answers: Sequence[ExaminationResult]) -> bool:
     """Tell whether anything keeps a robot from running."""
     return any(one.level == Severity.ERROR.value for one in answers)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from rbxcompose.executive.mission_run import Running
-from rbxcompose.executive.missions import Missions
+from rbxcompose.executive.mission_run import MissionRun
+from rbxcompose.executive.missions import RunningMissions
 from rbxcompose.executive.requests import ListMissions, LookAtAll
 from rbxcompose.requests import Query
 from rbxcompose.sdk.bound import Window
@@ -25,23 +25,23 @@ class Broadcast:
 
     def __init__(self, names: Iterable[str], open_window: Open) -> None:
         self._list = open_window(PATH, ListMissions())
-        self._feeds = {name: Feed(open_window(f"{PATH}/{name}", LookAtAll(name))) for name in names}
+        self._feeds = {name: MissionFeed(open_window(f"{PATH}/{name}", LookAtAll(name))) for name in names}
 
-    def tell(self, missions: Missions) -> None:
+    def tell(self, missions: RunningMissions) -> None:
         """Tell what has changed to those who watch; nothing is put together for nobody."""
         for name, one in missions.runs.items():
             self._feeds[name].tell(one)
 
 
-class Feed:
+class MissionFeed:
     """What was told last of one mission."""
 
     def __init__(self, window: Window) -> None:
         self._window = window
-        self._run: Running | None = None
+        self._run: MissionRun | None = None
         self._told: dict[str, Any] = {}
 
-    def tell(self, one: Running) -> None:
+    def tell(self, one: MissionRun) -> None:
         """Tell what is new, if anybody listens and there is something."""
         if not self._window.is_watched:
             return

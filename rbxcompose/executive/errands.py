@@ -19,15 +19,15 @@ STOP_WITHIN = 0.5  # [s] in which the stop that cancelled a goal is heard of her
 LOOK_AGAIN = 0.1  # [s] between two looks at what nothing announces
 MESSAGE = "message"  # the field of a result or an answer that gives a reason
 
-Done = Callable[[Result], None]
+WhenDone = Callable[[Result], None]
 
 
 class Errand:
     """Something on its way for one leaf; `done` is called once, unless it is halted before."""
 
-    def __init__(self, shell: Shell, done: Done) -> None:
+    def __init__(self, shell: Shell, done: WhenDone) -> None:
         self._shell = shell
-        self._done: Done | None = done
+        self._done: WhenDone | None = done
 
     def begin(self) -> None:
         """Begin; what it raises is a failure of the leaf."""
@@ -68,7 +68,7 @@ class Waiting(Errand):
 
     nobody: ClassVar[str] = "nobody serves"  # what is told of a server that is not there
 
-    def __init__(self, shell: Shell, done: Done, name: str) -> None:
+    def __init__(self, shell: Shell, done: WhenDone, name: str) -> None:
         super().__init__(shell, done)
         self.name = name
         self.is_sent = False
@@ -109,7 +109,7 @@ class Waiting(Errand):
 class GoalErrand(Waiting):
     """A goal of an action."""
 
-    def __init__(self, shell: Shell, done: Done, skill: Skill, goal: Any) -> None:
+    def __init__(self, shell: Shell, done: WhenDone, skill: Skill, goal: Any) -> None:
         super().__init__(shell, done, skill.name)
         self._skill, self._goal = skill, goal
         self._handle: SentGoal | None = None
@@ -209,7 +209,7 @@ def text_in(values: Mapping[str, Value]) -> str:
 class CallErrand(Waiting):
     """A call of a service; an answer that says `success: false` is a failure."""
 
-    def __init__(self, shell: Shell, done: Done, name: str, port: str, request: Any) -> None:
+    def __init__(self, shell: Shell, done: WhenDone, name: str, port: str, request: Any) -> None:
         super().__init__(shell, done, name)
         self._port, self._request = port, request
 

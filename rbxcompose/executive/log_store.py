@@ -7,7 +7,7 @@ import zlib
 from collections import deque
 from collections.abc import Iterator
 
-from rbxcompose.missions.engine.logbook import Record
+from rbxcompose.missions.engine.logbook import LogRecord
 
 BLOCK = 200  # records that are packed together, into about a tenth of their memory
 MOST_BLOCKS = 100
@@ -19,9 +19,9 @@ class LogStore:
     def __init__(self) -> None:
         self.written = 0  # records so far
         self._packed: deque[bytes] = deque(maxlen=MOST_BLOCKS)
-        self._new: list[Record] = []
+        self._new: list[LogRecord] = []
 
-    def append(self, record: Record) -> None:
+    def append(self, record: LogRecord) -> None:
         """Add a record, which is data for JSON."""
         self.written += 1
         self._new.append(record)
@@ -29,12 +29,12 @@ class LogStore:
             self._packed.append(zlib.compress(json.dumps(self._new).encode()))
             self._new = []
 
-    def since(self, number: int) -> list[Record]:
+    def since(self, number: int) -> list[LogRecord]:
         """Return the records that were written after so many, as far as they are kept."""
         first = self.written - len(self._new) - BLOCK * len(self._packed)
         return [one for at, one in enumerate(self._all(max(0, number - first) // BLOCK), first) if at >= number]
 
-    def _all(self, skipped: int) -> Iterator[Record]:
+    def _all(self, skipped: int) -> Iterator[LogRecord]:
         """Yield all records; those of the blocks that nobody wants are not unpacked, and stand in as empty ones."""
         for at, block in enumerate(self._packed):
             yield from ({} for _ in range(BLOCK)) if at < skipped else json.loads(zlib.decompress(block))

@@ -13,8 +13,8 @@ from rbxcompose.missions.engine import logbook
 from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Transition
-from rbxcompose.missions.engine.logbook import Logged
-from rbxcompose.missions.engine.story import Story
+from rbxcompose.missions.engine.logbook import LoggedWorld
+from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, Settings, World
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
 from rbxcompose.missions.program.results import Result
@@ -29,7 +29,7 @@ MakeWorld = Callable[[Callable[[int, Result], None], Callable[[MissionEvent], No
 Tell = Callable[[Level, str], None]
 
 
-class Running:
+class MissionRun:
     """Runs a mission in time that it is told; `tell` takes the lines of its story, `write` the records of its log."""
 
     def __init__(
@@ -49,11 +49,11 @@ class Running:
         self.end: MissionEnded | None = None
         self.began: float | None = None  # [s] of robot time
         self.patient_until: float | None = None  # [s] while it waits for values to begin with
-        self.story = Story(name, names.skills)
+        self.story = MissionStory(name, names.skills)
         self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
         self._tell, self._now = tell, 0.0
         world, self.robot = make(self._ended, self._said)
-        self.log = Logged(world, lambda record: write({"time": self._now, "mission": name, **record}))
+        self.log = LoggedWorld(world, lambda record: write({"time": self._now, "mission": name, **record}))
         self.engine = Engine(program, names, inputs, self.log, settings)
         self.claims = claims_of(self.engine.program, self.engine.robot.skills)  # parts of the robot, for itself alone
         self.mirror = Mirror(self.engine)

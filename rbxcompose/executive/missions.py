@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from rbxcompose.executive.log_store import LogStore
-from rbxcompose.executive.mission_run import MakeWorld, Running, claims_of
+from rbxcompose.executive.mission_run import MakeWorld, MissionRun, claims_of
 from rbxcompose.executive.requests import ListedMission, LogPart, PictureData, Seen
 from rbxcompose.executive.shell import Equipment
 from rbxcompose.expressions.values import Value
@@ -13,7 +13,7 @@ from rbxcompose.findings import suggest
 from rbxcompose.levels import Level
 from rbxcompose.missions.engine.entry_states import NoSuchState, start_at
 from rbxcompose.missions.engine.inputs import bind_texts
-from rbxcompose.missions.engine.logbook import Record
+from rbxcompose.missions.engine.logbook import LogRecord
 from rbxcompose.missions.engine.world import Observer, Settings
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.program import Program
@@ -24,17 +24,17 @@ from rbxcompose.requests import Refused
 Told = Callable[[str, Level, str], None]  # mission, level, line of its story
 
 
-class Missions:
+class RunningMissions:
     """The missions that run, in the order in which they began, and those that have ended, until they run again."""
 
-    def __init__(self, equipment: Equipment, make: MakeWorld, tell: Told, publish: Callable[[Record], None]) -> None:
+    def __init__(self, equipment: Equipment, make: MakeWorld, tell: Told, publish: Callable[[LogRecord], None]) -> None:
         self._equipment, self.make, self._tell, self._publish = equipment, make, tell, publish
         self.observer: Observer | None = None  # of all that begin from now on
-        self.runs: dict[str, Running] = {}
+        self.runs: dict[str, MissionRun] = {}
         self._log = LogStore()
         self._counts: dict[str, int] = {}
 
-    def __iter__(self) -> Iterator[Running]:
+    def __iter__(self) -> Iterator[MissionRun]:
         """Return those that run or are held."""
         return (one for one in list(self.runs.values()) if not one.is_over)
 
@@ -43,7 +43,7 @@ class Missions:
         """Return the names of those that run or are held."""
         return [one.name for one in self]
 
-    def run(self, name: str, given: Mapping[str, str], start: str = "") -> Running:
+    def run(self, name: str, given: Mapping[str, str], start: str = "") -> MissionRun:
         """Begin a mission with these inputs, as text; in the state `start` of its machines, if one is named.
 
         Raises:
@@ -63,7 +63,7 @@ class Missions:
         self._counts[name] = self._counts.get(name, 0) + 1
         number = self._counts[name]
         self.runs.pop(name, None)
-        self.runs[name] = Running(
+        self.runs[name] = MissionRun(
             program,
             self._equipment.names,
             inputs,
@@ -92,7 +92,9 @@ class Missions:
         engine = self._begun(name).engine
         return picture_to_data(picture_of(engine.program, engine.robot))
 
-    def running(self, name: str, what: Callable[[Running], bool] = lambda one: True, word: str = "running") -> Running:
+    def running(
+        self, name: str, what: Callable[[MissionRun], bool] = lambda one: True, word: str = "running"
+    ) -> MissionRun:
         """Return the mission of this name, or without one the only one of which `what` holds.
 
         Raises:
@@ -126,7 +128,7 @@ class Missions:
         """Return the records of the log that were written after so many."""
         return LogPart(self._log.written, self._log.since(number))
 
-    def _begun(self, name: str) -> Running:
+    def _begun(self, name: str) -> MissionRun:
         if name not in self.runs:
             raise Refused(f"mission {name} has not been running")
         return self.runs[name]
@@ -153,6 +155,6 @@ class Missions:
                 return f"{' and '.join(common)} {'is' if len(common) == 1 else 'are'} in use by {other.name}"
         return ""
 
-    def _write(self, record: Record) -> None:
+    def _write(self, record: LogRecord) -> None:
         self._log.append(record)
         self._publish(record)

@@ -7,7 +7,7 @@ from typing import Any
 
 from rbxcompose.executive.shell import CALLS, ENDS, HALTS, PAUSES, PUBLISHES, SKILL, VALUE, Equipment, port_name
 from rbxcompose.missions.engine.condition_watches import POSE
-from rbxcompose.missions.program.sources import PAUSE, SkillSource, Way
+from rbxcompose.missions.program.sources import PAUSE, SkillSource, SkillWay
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.msgs.std_srvs import SetBool
@@ -42,13 +42,13 @@ def _ports(equipment: Equipment) -> Ports:
 
 def _of_skill(name: str, source: SkillSource) -> Ports:
     match source.way:
-        case Way.SERVICE:
+        case SkillWay.SERVICE:
             yield SKILL + name, Calls(registry.service(source.action), source.topic)
-        case Way.ACTION:
+        case SkillWay.ACTION:
             yield SKILL + name, CallsAction(registry.action(source.action), source.topic)
             if source.skill.pausable:
                 yield PAUSES + name, Calls(SetBool, f"{source.topic}/{PAUSE}")
-        case Way.TOPIC:
+        case SkillWay.TOPIC:
             orders, message = source.orders, registry.message(source.action)
             yield SKILL + name, SendsOrders(message, source.topic, servers=orders.servers, qos=orders.qos)
             if (ends := orders.ends) is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from rbxcompose.executive.errands import Done, Errand
+from rbxcompose.executive.errands import Errand, WhenDone
 from rbxcompose.executive.shell import Shell
 from rbxcompose.expressions.values import Value
 from rbxcompose.missions.program.results import Result
@@ -20,7 +20,7 @@ T = TypeVar("T")
 class PythonErrand(Errand):
     """One run of a skill in Python."""
 
-    def __init__(self, shell: Shell, done: Done, declared: SkillType, arguments: Mapping[str, Value]) -> None:
+    def __init__(self, shell: Shell, done: WhenDone, declared: SkillType, arguments: Mapping[str, Value]) -> None:
         super().__init__(shell, done)
         self._declared = declared
         self._arguments = {name: _fitted(declared, name, value) for name, value in arguments.items()}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rbxcompose.executive.errands import GONE, Done, Waiting, text_in
+from rbxcompose.executive.errands import GONE, Waiting, WhenDone, text_in
 from rbxcompose.executive.shell import ENDS, HALTS, SKILL, Shell, port_name
 from rbxcompose.missions.program.goals import SUCCESS, values_of
 from rbxcompose.missions.program.results import Result
@@ -83,7 +83,7 @@ class TopicErrand(Waiting):
 
     nobody = "nobody listens to"
 
-    def __init__(self, shell: Shell, done: Done, desk: Desk, source: SkillSource, order: Any) -> None:
+    def __init__(self, shell: Shell, done: WhenDone, desk: Desk, source: SkillSource, order: Any) -> None:
         super().__init__(shell, done, source.topic)
         self._desk, self._source, self._order = desk, source, order
         self._has_begun = False

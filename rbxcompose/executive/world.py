@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from rbxcompose.executive.arrivals import Arrivals
-from rbxcompose.executive.errands import CallErrand, Done, Errand, GoalErrand
+from rbxcompose.executive.errands import CallErrand, Errand, GoalErrand, WhenDone
 from rbxcompose.executive.python_skills import PythonErrand
 from rbxcompose.executive.shell import CALLS, PUBLISHES, SKILL, Shell, port_name
 from rbxcompose.executive.topic_skills import Desks, TopicErrand
@@ -15,7 +15,7 @@ from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.program.goals import filled, goal_of, message_of
 from rbxcompose.missions.program.results import Result
-from rbxcompose.missions.program.sources import Way
+from rbxcompose.missions.program.sources import SkillWay
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.skills import skill_type
 
@@ -98,19 +98,19 @@ class RobotWorld:
         for errand in list(self._errands.values()):
             errand.look()
 
-    def _errand(self, done: Done, skill: str, arguments: Mapping[str, Value]) -> Errand:
+    def _errand(self, done: WhenDone, skill: str, arguments: Mapping[str, Value]) -> Errand:
         source = self._shell.equipment.skills[skill]
         match source.way:
-            case Way.ACTION:
+            case SkillWay.ACTION:
                 goal = goal_of(registry.action(source.action), arguments)
                 return GoalErrand(self._shell, done, source.skill, goal)
-            case Way.SERVICE:
+            case SkillWay.SERVICE:
                 request = filled(registry.service(source.action).Request, arguments)
                 return CallErrand(self._shell, done, skill, SKILL + skill, request)
-            case Way.TOPIC:
+            case SkillWay.TOPIC:
                 order = filled(registry.message(source.action), arguments)
                 return TopicErrand(self._shell, done, self._desks.of(source), source, order)
-            case Way.PYTHON:
+            case SkillWay.PYTHON:
                 return PythonErrand(self._shell, done, skill_type(skill), arguments)
 
     def _begin(self, leaf: int, errand: Errand) -> None:
@@ -121,7 +121,7 @@ class RobotWorld:
             self._errands.pop(leaf, None)
             raise
 
-    def _done(self, leaf: int) -> Done:
+    def _done(self, leaf: int) -> WhenDone:
         return partial(self._ended, leaf)
 
     def _ended(self, leaf: int, result: Result) -> None:

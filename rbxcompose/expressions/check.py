@@ -9,17 +9,17 @@ from typing import Protocol
 from rbxcompose.expressions.functions import FUNCTIONS
 from rbxcompose.expressions.tree import (
     Arithmetic,
-    Call,
     Comparison,
     Expression,
-    Field,
+    ExpressionNode,
+    FieldAccess,
     Flag,
+    FunctionCall,
     Index,
     Items,
     Junction,
     Membership,
     Minus,
-    Node,
     Not,
     Number,
     Text,
@@ -65,7 +65,7 @@ class StaticScope(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class ExpressionProblem:
     """Something wrong at `start` to `end` of an expression's text."""
 
     message: str
@@ -76,21 +76,21 @@ class Problem:
     """What can only have been meant in its place, if that is known."""
 
 
-def check(expression: Expression, scope: StaticScope) -> tuple[Type, list[Problem]]:
+def check(expression: Expression, scope: StaticScope) -> tuple[Type, list[ExpressionProblem]]:
     """Return the type of an expression, unknown where it is wrong, and what is wrong by place."""
     checker = _Checker(scope)
     found = checker.type_of(expression.tree)
     return found, checker.sorted()
 
 
-def check_value(expression: Expression, scope: StaticScope, expected: Type) -> list[Problem]:
+def check_value(expression: Expression, scope: StaticScope, expected: Type) -> list[ExpressionProblem]:
     """Return what is wrong with an expression that must give a value of the type `expected`."""
     checker = _Checker(scope)
     checker.require(expression.tree, expected)
     return checker.sorted()
 
 
-def check_condition(expression: Expression, scope: StaticScope) -> list[Problem]:
+def check_condition(expression: Expression, scope: StaticScope) -> list[ExpressionProblem]:
     """Return what is wrong with an expression that must be true or false."""
     return check_value(expression, scope, FLAG)
 
@@ -100,16 +100,16 @@ class _Checker:
 
     def __init__(self, scope: StaticScope) -> None:
         self.scope = scope
-        self.problems: list[Problem] = []
+        self.problems: list[ExpressionProblem] = []
 
-    def sorted(self) -> list[Problem]:
+    def sorted(self) -> list[ExpressionProblem]:
         return sorted(self.problems, key=lambda problem: (problem.start, problem.end))
 
-    def wrong(self, node: Node, message: str, fix: str = "", meant: str | None = "") -> Type:
-        self.problems.append(Problem(message, node.start, node.end, fix, meant or ""))
+    def wrong(self, node: ExpressionNode, message: str, fix: str = "", meant: str | None = "") -> Type:
+        self.problems.append(ExpressionProblem(message, node.start, node.end, fix, meant or ""))
         return UNKNOWN
 
-    def type_of(self, node: Node, expected: Type = UNKNOWN) -> Type:
+    def type_of(self, node: ExpressionNode, expected: Type = UNKNOWN) -> Type:
         """Return the type of a node; `expected` tells which choices a bare word may be."""
         match node:
             case Number(value=value, dimension=dimension):
@@ -127,9 +127,9 @@ class _Checker:
             case Items(items=nodes):
                 types = {self.type_of(item, expected.entry) for item in nodes}
                 return list_of(types.pop() if len(types) == 1 else UNKNOWN)
-            case Field() | Index():
+            case FieldAccess() | Index():
                 return self.part(node)
-            case Call():
+            case FunctionCall():
                 return self.call(node)
             case Minus(operand=operand):
                 return self.measured(operand)
@@ -146,7 +146,7 @@ class _Checker:
             case Arithmetic():
                 return self.arithmetic(node)
 
-    def require(self, node: Node, expected: Type) -> Type:
+    def require(self, node: ExpressionNode, expected: Type) -> Type:
         """Say what is wrong if a node is not of the type `expected`; return that type."""
         found = self.type_of(node, expected)
         if accepts(expected, found):
@@ -189,9 +189,9 @@ class _Checker:
                 fix, meant = f"did you mean '${variable}'?", f"${variable}"
         return self.wrong(node, f"unknown name '{node.name}'", fix, meant)
 
-    def part(self, node: Field | Index) -> Type:
+    def part(self, node: FieldAccess | Index) -> Type:
         whole = self.type_of(node.of)
-        if isinstance(node, Field):
+        if isinstance(node, FieldAccess):
             if whole.kind in (TypeKind.MAP, TypeKind.UNKNOWN):
                 return whole.entry
             return self.wrong(node, f"{whole.phrase} has no fields")
@@ -217,7 +217,7 @@ class _Checker:
             self.joined(node, left, right, "is compared with")
         return FLAG
 
-    def pair(self, left: Node, right: Node) -> tuple[_Typed, _Typed]:
+    def pair(self, left: ExpressionNode, right: ExpressionNode) -> tuple[_Typed, _Typed]:
         """Return two nodes with their types; a bare word may be a choice of the other one's type."""
         if isinstance(left, Word | Text):
             other = self.type_of(right)
@@ -244,7 +244,7 @@ class _Checker:
                 self.wrong(node.group, f"'in' needs a list or a map; this is {group.phrase}")
         return FLAG
 
-    def equality(self, node: Node, left: _Typed, right: _Typed) -> None:
+    def equality(self, node: ExpressionNode, left: _Typed, right: _Typed) -> None:
         if left.type.measure and right.type.measure:
             self.joined(node, left, right, "is compared with")
         elif not are_comparable(left.type, right.type):
@@ -252,7 +252,7 @@ class _Checker:
             fix = "write 'distance(a, b) < 10 cm'" if poses else ""
             self.wrong(node, f"{left.type.phrase} is compared with {right.type.phrase}", fix)
 
-    def joined(self, node: Node, left: _Typed, right: _Typed, verb: str) -> Type:
+    def joined(self, node: ExpressionNode, left: _Typed, right: _Typed, verb: str) -> Type:
         """Return the type of a sum, of the least or the greatest of two measured values."""
         one, other = left.type.measure, right.type.measure
         if not one or not other:
@@ -276,7 +276,7 @@ class _Checker:
             self.wrong(typed.node, f"this must be a number; it is {typed.type.phrase}")
         return typed.type.measure is not None
 
-    def measured(self, node: Node) -> Type:
+    def measured(self, node: ExpressionNode) -> Type:
         found = self.type_of(node)
         return found if self.is_measured(_Typed(node, found)) else UNKNOWN
 
@@ -297,7 +297,7 @@ class _Checker:
             return self.joined(node, left, right, _SUMS[node.operator])
         return _product(node.operator, left.type, right.type)
 
-    def call(self, node: Call) -> Type:
+    def call(self, node: FunctionCall) -> Type:
         name, arguments = node.function, node.arguments
         if wrong := FUNCTIONS[name].wrong_count(len(arguments)):
             self.wrong(node, f"{name}() {wrong}")
@@ -326,7 +326,7 @@ class _Checker:
                 return self.extreme(node)
         return _RESULTS[name]
 
-    def extreme(self, node: Call) -> Type:
+    def extreme(self, node: FunctionCall) -> Type:
         """Return the type of the least or the greatest of several values, or of the items of one list."""
         first, *others = node.arguments
         if others:
@@ -344,7 +344,7 @@ class _Checker:
 class _Typed:
     """A node with its type."""
 
-    node: Node
+    node: ExpressionNode
     type: Type
 
 

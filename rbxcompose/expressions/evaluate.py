@@ -12,17 +12,17 @@ from typing import TypeAlias
 from rbxcompose.expressions.functions import FUNCTIONS, items
 from rbxcompose.expressions.tree import (
     Arithmetic,
-    Call,
     Comparison,
     Expression,
-    Field,
+    ExpressionNode,
+    FieldAccess,
     Flag,
+    FunctionCall,
     Index,
     Items,
     Junction,
     Membership,
     Minus,
-    Node,
     Not,
     Number,
     Text,
@@ -36,8 +36,8 @@ from rbxcompose.expressions.values import (
     MOST_LEVELS,
     NOT_ARRIVED,
     EvaluationError,
+    NamedPose,
     NotArrivedError,
-    Place,
     Scope,
     Value,
     is_number,
@@ -45,8 +45,8 @@ from rbxcompose.expressions.values import (
 )
 from rbxcompose.units import MOST, format_number
 
-Run: TypeAlias = Callable[[Scope], Value]
-Ask: TypeAlias = Callable[[Scope], bool]
+Evaluate: TypeAlias = Callable[[Scope], Value]
+Predicate: TypeAlias = Callable[[Scope], bool]
 Measure: TypeAlias = Callable[[Scope], float]
 
 _ORDERS: Mapping[str, Callable[[float, float], bool]] = {"<": lt, "<=": le, ">": gt, ">=": ge}
@@ -87,7 +87,7 @@ def holds(expression: Expression, scope: Scope) -> bool:
         return False
 
 
-def _run(node: Node) -> Run:
+def _run(node: ExpressionNode) -> Evaluate:
     """Return what computes the value of a part of an expression."""
     match node:
         case Variable():
@@ -98,9 +98,9 @@ def _run(node: Node) -> Run:
             return _ask(node)
         case Word(name=name):
             return lambda scope: _known(scope.word, name, name, node)
-        case Field() | Index():
+        case FieldAccess() | Index():
             return _part(node)
-        case Call():
+        case FunctionCall():
             return _called(node)
         case Arithmetic():
             return _computed(node)
@@ -112,7 +112,7 @@ def _run(node: Node) -> Run:
             return lambda scope: [run(scope) for run in runs]
 
 
-def _ask(node: Node) -> Ask:
+def _ask(node: ExpressionNode) -> Predicate:
     """Return what tells whether a part of an expression is true; it may be nothing else."""
     match node:
         case Flag(value=flag):
@@ -143,7 +143,7 @@ def _is_among(sought: Value, group: list[Value]) -> bool:
     return any(is_same(sought, each) for each in group)
 
 
-def _measure(node: Node) -> Measure:
+def _measure(node: ExpressionNode) -> Measure:
     """Return what computes a part of an expression that must be a number."""
     if isinstance(node, Number):
         number = node.value
@@ -158,7 +158,7 @@ def _measure(node: Node) -> Measure:
     return measure
 
 
-def _variable(node: Variable) -> Run:
+def _variable(node: Variable) -> Evaluate:
     name = node.name
 
     def run(scope: Scope) -> Value:
@@ -173,14 +173,14 @@ def _variable(node: Variable) -> Run:
     return run
 
 
-def _known(look_up: Callable[[str], Value], name: str, shown: str, node: Node) -> Value:
+def _known(look_up: Callable[[str], Value], name: str, shown: str, node: ExpressionNode) -> Value:
     try:
         return look_up(name)
     except KeyError:
         raise EvaluationError(f"unknown name '{shown}'", node.start, node.end) from None
 
 
-def _number(value: Value, node: Node) -> float:
+def _number(value: Value, node: ExpressionNode) -> float:
     # NaN compares as false whatever is asked, so that `not` would make it true.
     if isinstance(value, float) and value == value:
         return value
@@ -189,13 +189,13 @@ def _number(value: Value, node: Node) -> float:
     raise EvaluationError("this is not a number", node.start, node.end)
 
 
-def _moderate(value: float, node: Node) -> float:
+def _moderate(value: float, node: ExpressionNode) -> float:
     if not abs(value) < MOST:
         raise EvaluationError("the result is not finite or not below 1e15", node.start, node.end)
     return value
 
 
-def _limited(value: Value, node: Node) -> Value:
+def _limited(value: Value, node: ExpressionNode) -> Value:
     if isinstance(value, str) and len(value) > LONGEST_TEXT:
         raise EvaluationError(f"the text has more than {LONGEST_TEXT:,} characters", node.start, node.end)
     if isinstance(value, list | tuple | Mapping) and len(value) > MOST_ITEMS:
@@ -203,7 +203,7 @@ def _limited(value: Value, node: Node) -> Value:
     return value
 
 
-def _limited_within(value: Value, node: Node) -> Value:
+def _limited_within(value: Value, node: ExpressionNode) -> Value:
     """Return a value; one that a mission makes larger with each round, such as `[$x, $x]`, comes to its end here."""
     level, left = [value], MOST_IN_ALL
     for _ in range(MOST_LEVELS):
@@ -222,14 +222,14 @@ def _inside(value: Value) -> Collection[Value]:
     return value if isinstance(value, list | tuple) else ()
 
 
-def _items(value: Value, node: Node) -> list[Value]:
+def _items(value: Value, node: ExpressionNode) -> list[Value]:
     try:
         return items(value)
     except ValueError as error:
         raise EvaluationError(f"'in' {error}", node.start, node.end) from None
 
 
-def _compared(node: Comparison) -> Ask:
+def _compared(node: Comparison) -> Predicate:
     if order := _ORDERS.get(node.operator):
         one, other = _measure(node.left), _measure(node.right)
         return lambda scope: order(one(scope), other(scope))
@@ -245,7 +245,7 @@ def _compared(node: Comparison) -> Ask:
     return ask
 
 
-def _computed(node: Arithmetic) -> Run:
+def _computed(node: Arithmetic) -> Evaluate:
     left, right, operation = _run(node.left), _run(node.right), _OPERATIONS[node.operator]
 
     def run(scope: Scope) -> Value:
@@ -263,23 +263,23 @@ def _computed(node: Arithmetic) -> Run:
     return run
 
 
-def _part(node: Field | Index) -> Run:
+def _part(node: FieldAccess | Index) -> Evaluate:
     of = _run(node.of)
-    if isinstance(node, Field):
+    if isinstance(node, FieldAccess):
         name = node.name
         return lambda scope: _entry(of(scope), name, node)
     index = _run(node.index)
     return lambda scope: _entry(of(scope), index(scope), node)
 
 
-def _entry(whole: Value, key: Value, node: Field | Index) -> Value:
-    if not isinstance(key, str) and isinstance(key, Place):
+def _entry(whole: Value, key: Value, node: FieldAccess | Index) -> Value:
+    if not isinstance(key, str) and isinstance(key, NamedPose):
         key = key.name
     if isinstance(whole, Mapping):
         if isinstance(key, str) and key in whole:
             return whole[key]
         raise EvaluationError(f"there is no entry '{key}'", node.start, node.end)
-    if isinstance(node, Field) or not isinstance(whole, list | tuple):
+    if isinstance(node, FieldAccess) or not isinstance(whole, list | tuple):
         raise EvaluationError("this has no entries", node.of.start, node.of.end)
     position = _number(key, node.index)
     if not (position.is_integer() and 0 <= position < len(whole)):
@@ -288,7 +288,7 @@ def _entry(whole: Value, key: Value, node: Field | Index) -> Value:
     return whole[int(position)]
 
 
-def _called(node: Call) -> Run:
+def _called(node: FunctionCall) -> Evaluate:
     function, name = FUNCTIONS[node.function], node.function
     compute, wrong = function.compute, function.wrong_count(len(node.arguments))
     if compute is None or wrong:
@@ -310,7 +310,7 @@ def _called(node: Call) -> Run:
     return run
 
 
-def _asked(node: Call, scope: Scope, wrong: str) -> Value:
+def _asked(node: FunctionCall, scope: Scope, wrong: str) -> Value:
     """Return what only the scope knows of a `$name`."""
     if wrong:
         raise EvaluationError(f"{node.function}() {wrong}", node.start, node.end)

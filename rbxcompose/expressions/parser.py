@@ -10,18 +10,18 @@ from rbxcompose.expressions.operators import OPERATORS
 from rbxcompose.expressions.tokens import KEYWORDS, Token, TokenKind, tokens
 from rbxcompose.expressions.tree import (
     Arithmetic,
-    Call,
     Comparison,
     Expression,
     ExpressionError,
-    Field,
+    ExpressionNode,
+    FieldAccess,
     Flag,
+    FunctionCall,
     Index,
     Items,
     Junction,
     Membership,
     Minus,
-    Node,
     Not,
     Number,
     Text,
@@ -130,7 +130,7 @@ class _Parser:
         message = f"an operator is missing before '{token.text}'"
         return ExpressionError(message, token.start, token.end, _FOREIGN.get(token.text, ""))
 
-    def expression(self, binding: int = 0) -> Node:
+    def expression(self, binding: int = 0) -> ExpressionNode:
         """Read operands and all operators between them that bind more strongly than `binding`."""
         self.level += 1
         if self.level > LEVELS:
@@ -146,7 +146,7 @@ class _Parser:
         self.level -= 1
         return left
 
-    def operation(self, left: Node, strength: int) -> Node:
+    def operation(self, left: ExpressionNode, strength: int) -> ExpressionNode:
         operator = self.take()
         if operator.text in ("and", "or"):
             operands = [left, self.expression(strength)]
@@ -170,7 +170,7 @@ class _Parser:
             case _:
                 return Comparison(start, end, operator.text, left, right)
 
-    def operand(self) -> Node:
+    def operand(self) -> ExpressionNode:
         token = self.take()
         match token.kind:
             case TokenKind.NUMBER if token.quantity:
@@ -185,7 +185,7 @@ class _Parser:
                 return self.symbol(token)
         raise ExpressionError("a value is missing at the end", token.start, token.end)
 
-    def symbol(self, token: Token) -> Node:
+    def symbol(self, token: Token) -> ExpressionNode:
         match token.text:
             case "true" | "false":
                 return Flag(token.start, token.end, token.text == "true")
@@ -198,7 +198,7 @@ class _Parser:
             case "(":
                 inner = self.expression()
                 self.close(")", token)
-                return self.parts(inner) if isinstance(inner, Variable | Word | Field | Index) else inner
+                return self.parts(inner) if isinstance(inner, Variable | Word | FieldAccess | Index) else inner
             case "[":
                 items, end = self.items("]", token)
                 return Items(token.start, end, items)
@@ -217,16 +217,16 @@ class _Parser:
             raise ExpressionError(message, token.start, token.end, _FOREIGN[token.text])
         return Word(token.start, token.end, token.text)
 
-    def call(self, name: Token) -> Call:
+    def call(self, name: Token) -> FunctionCall:
         if name.text not in FUNCTIONS:
             help_text = suggest(name.text, FUNCTIONS, "the functions are")
             raise ExpressionError(f"unknown function '{name.text}'", name.start, name.end, help_text)
         arguments, end = self.items(")", self.take())
-        return Call(name.start, end, name.text, arguments)
+        return FunctionCall(name.start, end, name.text, arguments)
 
-    def items(self, closing: str, opened: Token) -> tuple[tuple[Node, ...], int]:
+    def items(self, closing: str, opened: Token) -> tuple[tuple[ExpressionNode, ...], int]:
         """Read values between commas up to the closing bracket; return them and where it ends."""
-        read: list[Node] = []
+        read: list[ExpressionNode] = []
         if not self.at(closing):
             read.append(self.expression())
             while self.at(","):
@@ -234,7 +234,7 @@ class _Parser:
                 read.append(self.expression())
         return tuple(read), self.close(closing, opened).end
 
-    def parts(self, node: Node) -> Node:
+    def parts(self, node: ExpressionNode) -> ExpressionNode:
         """Read the fields and indices that follow data."""
         while self.at(".", "["):
             opened = self.take()
@@ -248,5 +248,5 @@ class _Parser:
             end = names.start - 1
             for name in names.text.split("."):
                 end += 1 + len(name)
-                node = Field(node.start, end, node, name)
+                node = FieldAccess(node.start, end, node, name)
         return node

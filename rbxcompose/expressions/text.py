@@ -11,7 +11,7 @@ from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.parser import parse
 from rbxcompose.expressions.tokens import NAME
 from rbxcompose.expressions.tree import Expression, ExpressionError, Reference
-from rbxcompose.expressions.values import LONGEST_TEXT, EvaluationError, Located, Place, Scope, Value
+from rbxcompose.expressions.values import LONGEST_TEXT, EvaluationError, Located, NamedPose, Scope, Value
 from rbxcompose.units import format_number
 
 Show: TypeAlias = Callable[[str, Value], str]
@@ -21,7 +21,7 @@ _SLOT = re.compile(rf"\$(?:(?P<dollar>\$)|(?P<path>{NAME}(?:\.{NAME})*))")
 
 
 @dataclass(frozen=True, slots=True)
-class Slot:
+class TextSlot:
     """A place in a text, from `start` to `end`, that the value of `path` fills."""
 
     path: str
@@ -35,12 +35,12 @@ class Template:
     """A text with its slots: `parts` follow each other."""
 
     text: str
-    parts: tuple[str | Slot, ...]
+    parts: tuple[str | TextSlot, ...]
 
     @property
     def names(self) -> tuple[Reference, ...]:
         """Return the names to be filled in, without '$' and fields, with their places."""
-        slots = (part for part in self.parts if isinstance(part, Slot))
+        slots = (part for part in self.parts if isinstance(part, TextSlot))
         roots = ((slot, slot.path.partition(".")[0]) for slot in slots)
         return tuple(Reference(root, slot.start, slot.start + 1 + len(root)) for slot, root in roots)
 
@@ -51,7 +51,7 @@ def parse_template(text: str) -> Template:
     Raises:
         ExpressionError: if a name in it is longer or has more fields than an expression may have.
     """
-    parts: list[str | Slot] = []
+    parts: list[str | TextSlot] = []
     end = 0
     for match in _SLOT.finditer(text):
         parts.append(text[end : match.start()])
@@ -62,9 +62,9 @@ def parse_template(text: str) -> Template:
     return Template(text, tuple(part for part in parts if part))
 
 
-def _slot(path: str, start: int, end: int) -> Slot:
+def _slot(path: str, start: int, end: int) -> TextSlot:
     try:
-        return Slot(path, parse(f"${path}"), start, end)
+        return TextSlot(path, parse(f"${path}"), start, end)
     except ExpressionError as error:
         raise ExpressionError(error.message, start, end) from None
 
@@ -86,7 +86,7 @@ def fill(template: Template, scope: Scope, show: Show | None = None) -> str:
     return "".join(filled)
 
 
-def _filled(slot: Slot, scope: Scope, show: Show) -> str:
+def _filled(slot: TextSlot, scope: Scope, show: Show) -> str:
     try:
         value = evaluate(slot.value, scope)
     except EvaluationError as error:
@@ -106,7 +106,7 @@ def show_value(name: str, value: Value) -> str:
         return ", ".join(f"{key}: {show_value(name, each)}" for key, each in value.items())
     if isinstance(value, list | tuple):
         return ", ".join(show_value(name, each) for each in value)
-    if isinstance(value, Place):
+    if isinstance(value, NamedPose):
         return value.name.replace("_", " ")
     if isinstance(value, Located):
         return f"({format_number(value.x)} m, {format_number(value.y)} m)"

@@ -68,14 +68,14 @@ class Word(_Placed):
 class Items(_Placed):
     """`[a, b]`: a list that is written out."""
 
-    items: tuple[Node, ...]
+    items: tuple[ExpressionNode, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Field(_Placed):
+class FieldAccess(_Placed):
     """`of.name`: an entry of a map."""
 
-    of: Node
+    of: ExpressionNode
     name: str
 
 
@@ -83,30 +83,30 @@ class Field(_Placed):
 class Index(_Placed):
     """`of[index]`: an entry of a list, counted from 0, or of a map."""
 
-    of: Node
-    index: Node
+    of: ExpressionNode
+    index: ExpressionNode
 
 
 @dataclass(frozen=True, slots=True)
-class Call(_Placed):
+class FunctionCall(_Placed):
     """`function(arguments)`, one of the few functions that exist."""
 
     function: str
-    arguments: tuple[Node, ...]
+    arguments: tuple[ExpressionNode, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Minus(_Placed):
     """`-operand`."""
 
-    operand: Node
+    operand: ExpressionNode
 
 
 @dataclass(frozen=True, slots=True)
 class Not(_Placed):
     """`not operand`."""
 
-    operand: Node
+    operand: ExpressionNode
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +114,8 @@ class Arithmetic(_Placed):
     """`left + right`, and `-`, `*`, `/` alike."""
 
     operator: str
-    left: Node
-    right: Node
+    left: ExpressionNode
+    right: ExpressionNode
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,16 +123,16 @@ class Comparison(_Placed):
     """`left < right`, and `<=`, `>`, `>=`, `==`, `!=` alike."""
 
     operator: str
-    left: Node
-    right: Node
+    left: ExpressionNode
+    right: ExpressionNode
 
 
 @dataclass(frozen=True, slots=True)
 class Membership(_Placed):
     """`item in group`."""
 
-    item: Node
-    group: Node
+    item: ExpressionNode
+    group: ExpressionNode
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,19 +140,19 @@ class Junction(_Placed):
     """`a and b and c`, or the same with `or`: read from the left until decided."""
 
     operator: str
-    operands: tuple[Node, ...]
+    operands: tuple[ExpressionNode, ...]
 
 
-Node: TypeAlias = (
+ExpressionNode: TypeAlias = (
     Number
     | Text
     | Flag
     | Variable
     | Word
     | Items
-    | Field
+    | FieldAccess
     | Index
-    | Call
+    | FunctionCall
     | Minus
     | Not
     | Arithmetic
@@ -162,12 +162,12 @@ Node: TypeAlias = (
 )
 
 
-def children(node: Node) -> tuple[Node, ...]:
+def children(node: ExpressionNode) -> tuple[ExpressionNode, ...]:
     """Return the nodes right below this one, in the order of the text."""
     match node:
-        case Items(items=nodes) | Call(arguments=nodes) | Junction(operands=nodes):
+        case Items(items=nodes) | FunctionCall(arguments=nodes) | Junction(operands=nodes):
             return nodes
-        case Field(of=of):
+        case FieldAccess(of=of):
             return (of,)
         case Index(of=first, index=second) | Membership(item=first, group=second):
             return (first, second)
@@ -179,7 +179,7 @@ def children(node: Node) -> tuple[Node, ...]:
             return ()
 
 
-def walk(tree: Node) -> Iterator[tuple[Node, int]]:
+def walk(tree: ExpressionNode) -> Iterator[tuple[ExpressionNode, int]]:
     """Yield each node with its level, the root's being 1, in the order of the text; needs no recursion."""
     waiting = [(tree, 1)]
     while waiting:
@@ -202,7 +202,7 @@ class Expression:
     """A text that was read; two are equal if they mean the same at the same places."""
 
     text: str
-    tree: Node
+    tree: ExpressionNode
     names: tuple[Reference, ...] = field(init=False, compare=False, repr=False)
     """`$names`: for `$data.field[0]` it is `data`."""
     words: tuple[Reference, ...] = field(init=False, compare=False, repr=False)
@@ -220,7 +220,7 @@ class Expression:
             "calls": [
                 Reference(node.function, node.start, node.start + len(node.function))
                 for node in nodes
-                if isinstance(node, Call)
+                if isinstance(node, FunctionCall)
             ],
         }.items():
             object.__setattr__(self, name, tuple(found))

@@ -40,7 +40,7 @@ class Located(Protocol):
 
 
 @runtime_checkable
-class Place(Located, Protocol):
+class NamedPose(Located, Protocol):
     """A pose with a name."""
 
     @property
@@ -101,5 +101,5 @@ def is_same(one: Value, other: Value) -> bool:
     """Tell whether two values are equal; a text equals the place of that name, a flag equals no number."""
     if isinstance(one, str) != isinstance(other, str):
         text, thing = (one, other) if isinstance(one, str) else (other, one)
-        return isinstance(thing, Place) and thing.name == text
+        return isinstance(thing, NamedPose) and thing.name == text
     return isinstance(one, bool) == isinstance(other, bool) and one == other

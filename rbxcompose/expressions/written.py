@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from rbxcompose.expressions.tree import Minus, Node, Number
+from rbxcompose.expressions.tree import ExpressionNode, Minus, Number
 from rbxcompose.expressions.types import Type
 from rbxcompose.units import DIMENSIONS, NUMBER, RATIO, Dimension, bare_number_help, example, format_number
 
 
-def _written(node: Node) -> Number | None:
+def _written(node: ExpressionNode) -> Number | None:
     """Return the number that a node writes out, None if it is something else."""
     while isinstance(node, Minus):
         node = node.operand
     return node if isinstance(node, Number) else None
 
 
-def is_bare(node: Node) -> bool:
+def is_bare(node: ExpressionNode) -> bool:
     """Tell whether a node is a number as written, without a unit."""
     number = _written(node)
     return number is not None and number.dimension == NUMBER
 
 
-def missing_unit(node: Node, dimension: Dimension) -> str:
+def missing_unit(node: ExpressionNode, dimension: Dimension) -> str:
     """Return what to write instead of a bare number, or nothing if it is understood as SI."""
     if dimension == RATIO and isinstance(node, Number):
         percentage = node.value * 100 if node.value < 1 else node.value
@@ -28,7 +28,7 @@ def missing_unit(node: Node, dimension: Dimension) -> str:
     return bare_number_help(dimension)
 
 
-def other_unit(left: tuple[Node, Type], right: tuple[Node, Type]) -> str:
+def other_unit(left: tuple[ExpressionNode, Type], right: tuple[ExpressionNode, Type]) -> str:
     """Return what a quantity that is written out has to look like beside one that is not; nothing for two alike."""
     for (written, _), (other, kind) in ((left, right), (right, left)):
         dimension = kind.dimension

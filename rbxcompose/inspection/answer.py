@@ -10,7 +10,7 @@ from rbxcompose.composition.history import ROBOT_LAYER
 from rbxcompose.composition.overlay import SET
 from rbxcompose.findings import Span
 from rbxcompose.inspection.origin import Origin, as_data
-from rbxcompose.manifest.tree import Node
+from rbxcompose.manifest.tree import TreeNode
 from rbxcompose.printable import plain
 from rbxcompose.units import UNITS, Dimension, format_number
 
@@ -32,7 +32,7 @@ class Layer:
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class ArgumentSource:
     """An argument that a value was filled in from; `below` are the layers whose values it took the place of."""
 
     name: str
@@ -42,7 +42,7 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class PathAnswer:
     """All that is known of one path; the last of `layers` holds."""
 
     path: str
@@ -51,12 +51,12 @@ class Answer:
     dimension: Dimension | None = None
     si: float | None = None
     layers: tuple[Layer, ...] = ()
-    sources: tuple[Source, ...] = ()
+    sources: tuple[ArgumentSource, ...] = ()
     is_default: bool = False
     hints: tuple[tuple[str, str], ...] = ()  # a label and a text
     place: str = ""
     body: str = ""
-    node: Node | None = None
+    node: TreeNode | None = None
 
     def text(self) -> str:
         """Return it for people."""

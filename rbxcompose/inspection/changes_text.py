@@ -7,7 +7,7 @@ from typing import Any
 
 from rbxcompose.composition.overlay import SET
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Node, Path, Sequence, at, key_span, value_span
+from rbxcompose.manifest.tree import KeyPath, SequenceNode, TreeNode, at, key_span, value_span
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.diff import Change
 from rbxcompose.printable import plain
@@ -54,7 +54,7 @@ def _reason(each: Mapping[str, str]) -> str:
 def _place(robot: Robot, component: str, reason: Mapping[str, str | None]) -> str:
     """Return where the new value stands, nothing where nobody wrote it."""
     key = str(reason["key"])
-    if component not in robot.parts or reason["after"] is None:
+    if component not in robot.components or reason["after"] is None:
         return ""
     root, path, least = _source(robot, component, key)
     path = _indexed(root, path)
@@ -64,9 +64,9 @@ def _place(robot: Robot, component: str, reason: Mapping[str, str | None]) -> st
     return SET if span.file == SET else str(span)
 
 
-def _source(robot: Robot, component: str, key: str) -> tuple[Node, Path, int]:
+def _source(robot: Robot, component: str, key: str) -> tuple[TreeNode, KeyPath, int]:
     """Return the tree in which a key of a component is written, its path there, and how much of that must be there."""
-    root, own = robot.manifest.root, robot.parts[component].path
+    root, own = robot.manifest.root, robot.components[component].path
     if key.startswith(_TOPIC):
         return root, (*own, "connect", key.removeprefix(_TOPIC)), len(own) + 2
     keys = tuple(key.split("."))
@@ -80,10 +80,10 @@ def _source(robot: Robot, component: str, key: str) -> tuple[Node, Path, int]:
     return root, keys, 1
 
 
-def _indexed(root: Node, path: Path) -> Path:
+def _indexed(root: TreeNode, path: KeyPath) -> KeyPath:
     """Return a path with the numbers of items as numbers."""
-    found: Path = ()
+    found: KeyPath = ()
     for key in path:
-        is_item = isinstance(at(root, found), Sequence) and str(key).isdigit()
+        is_item = isinstance(at(root, found), SequenceNode) and str(key).isdigit()
         found = (*found, int(key) if is_item else key)
     return found

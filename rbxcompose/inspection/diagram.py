@@ -10,18 +10,18 @@ from rbxcompose.bus.names import resolve
 from rbxcompose.inspection.wire_keys import qos_of
 from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.engine.condition_watches import POSE
-from rbxcompose.missions.program.sources import Way
-from rbxcompose.model.robot import Part, Robot, RobotMission
-from rbxcompose.model.wires import End
+from rbxcompose.missions.program.sources import SkillWay
+from rbxcompose.model.robot import Robot, RobotComponent, RobotMission
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction
 
-MISSION = "mission"  # the part that runs missions
+MISSION = "mission"  # the component that runs missions
 TRANSFORMS = ("/tf", "/tf_static")  # what a look-up reads
 STATUSES = "/diagnostics"  # where every component reports, though none declares it
 
 
-class Shape(StrEnum):
+class BoxShape(StrEnum):
     """What a box stands for."""
 
     COMPONENT = "component"
@@ -29,7 +29,7 @@ class Shape(StrEnum):
     PROGRAM = "mission"
 
 
-class Line(StrEnum):
+class WireContent(StrEnum):
     """What a wire carries."""
 
     TOPIC = "topic"
@@ -39,7 +39,7 @@ class Line(StrEnum):
 
 
 # By which a mission reaches its skills; those in Python are within it.
-_LINES = {Way.ACTION: Line.ACTION, Way.SERVICE: Line.SERVICE, Way.TOPIC: Line.TOPIC}
+_LINES = {SkillWay.ACTION: WireContent.ACTION, SkillWay.SERVICE: WireContent.SERVICE, SkillWay.TOPIC: WireContent.TOPIC}
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Box:
     name: str
     type: str
     group: str
-    shape: Shape
+    shape: BoxShape
     about: str = ""
 
 
@@ -63,11 +63,11 @@ class Tip:
 
 
 @dataclass(frozen=True, slots=True)
-class Wire:
+class DiagramWire:
     """A topic, service or action: from who sends or asks to who takes or answers."""
 
     name: str
-    kind: Line
+    kind: WireContent
     type: str
     qos: str
     sources: tuple[Tip, ...]
@@ -98,7 +98,7 @@ class Diagram:
     about: str
     groups: tuple[str, ...]
     boxes: tuple[Box, ...]
-    wires: tuple[Wire, ...]
+    wires: tuple[DiagramWire, ...]
     runs: tuple[tuple[str, str], ...] = ()
     start: str = ""
 
@@ -111,7 +111,7 @@ class Diagram:
 class _Open:
     """A wire that is being put together."""
 
-    kind: Line
+    kind: WireContent
     type: str
     qos: str = ""
     sources: list[Tip] = field(default_factory=list)
@@ -140,58 +140,58 @@ def key_of(mission: str | None) -> str:
 
 def _programs(robot: Robot) -> list[str]:
     """Return the missions, the one that `up` starts first."""
-    return sorted(robot.missions, key=lambda name: name != robot.manifest.start) if MISSION in robot.parts else []
+    return sorted(robot.missions, key=lambda name: name != robot.manifest.start) if MISSION in robot.components else []
 
 
 def _boxes(robot: Robot) -> Iterator[Box]:
-    for part in robot.parts.values():
-        shape = Shape.MUX if part.declared(Forwards) else Shape.COMPONENT
-        about = (part.cls.__doc__ or "").strip().partition("\n")[0]
-        yield Box(part.name, part.name, part.type_name, part.process, shape, about)
+    for component in robot.components.values():
+        shape = BoxShape.MUX if component.declared(Forwards) else BoxShape.COMPONENT
+        about = (component.cls.__doc__ or "").strip().partition("\n")[0]
+        yield Box(component.name, component.name, component.type_name, component.process, shape, about)
     for name in _programs(robot):
         program = robot.missions[name].program
-        yield Box(key_of(name), name, "mission", robot.parts[MISSION].process, Shape.PROGRAM, program.about)
+        yield Box(key_of(name), name, "mission", robot.components[MISSION].process, BoxShape.PROGRAM, program.about)
 
 
-def _wires(robot: Robot) -> Iterator[Wire]:
+def _wires(robot: Robot) -> Iterator[DiagramWire]:
     """Yield the wires by what they carry and by name; nothing is drawn that nobody uses."""
-    found: dict[tuple[Line, str], _Open] = {}
-    for part in robot.parts.values():
-        if part.name != MISSION:  # its missions are drawn in its place
-            for end in part.ends:
-                _add(robot, part, end, found)
+    found: dict[tuple[WireContent, str], _Open] = {}
+    for component in robot.components.values():
+        if component.name != MISSION:  # its missions are drawn in its place
+            for end in component.ends:
+                _add(robot, component, end, found)
     for name in _programs(robot):
         _add_mission(robot, robot.missions[name], key_of(name), found)
     _add_look_ups(robot, found)
-    for (kind, topic), wire in sorted(found.items(), key=lambda item: ([*Line].index(item[0][0]), item[0][1])):
+    for (kind, topic), wire in sorted(found.items(), key=lambda item: ([*WireContent].index(item[0][0]), item[0][1])):
         about = "every component reports its status here" if topic == STATUSES else ""
-        yield Wire(topic, kind, wire.type, wire.qos, tuple(wire.sources), tuple(wire.targets), about)
+        yield DiagramWire(topic, kind, wire.type, wire.qos, tuple(wire.sources), tuple(wire.targets), about)
 
 
-def _add(robot: Robot, part: Part, end: End, found: dict[tuple[Line, str], _Open]) -> None:
+def _add(robot: Robot, component: RobotComponent, end: PortEnd, found: dict[tuple[WireContent, str], _Open]) -> None:
     kind = _kind(end)
     if kind is None:
         return
     wire = found.setdefault((kind, end.topic), _Open(kind, end.type_name))
     wire.qos = wire.qos or qos_of(end.port)
     tips = wire.sources if isinstance(end.port, Out | Calls | CallsAction) else wire.targets
-    tips.append(Tip(part.name, _note(robot, part, end)))
+    tips.append(Tip(component.name, _note(robot, component, end)))
 
 
-def _kind(end: End) -> Line | None:
+def _kind(end: PortEnd) -> WireContent | None:
     match end.port:
         case Out() | In():
-            return Line.TOPIC
+            return WireContent.TOPIC
         case Serves() | Calls():
-            return Line.SERVICE
+            return WireContent.SERVICE
         case ServesAction() | CallsAction():
-            return Line.ACTION
+            return WireContent.ACTION
     return None
 
 
-def _note(robot: Robot, part: Part, end: End) -> str:
+def _note(robot: Robot, component: RobotComponent, end: PortEnd) -> str:
     """Return the priority of an input or a lock of a mux."""
-    mux = robot.manifest.muxes.get(part.name)
+    mux = robot.manifest.muxes.get(component.name)
     if mux is None or not isinstance(end.port, In):
         return ""
     entry = mux.inputs.get(end.name) or mux.locks.get(end.name.removeprefix("lock_"))
@@ -199,40 +199,44 @@ def _note(robot: Robot, part: Part, end: End) -> str:
     return f"{what} {entry.priority}" if entry else ""
 
 
-def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tuple[Line, str], _Open]) -> None:
+def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tuple[WireContent, str], _Open]) -> None:
     """Add what a mission uses: actions, services and topics. A skill in Python runs in the mission itself."""
 
-    def lead(kind: Line, topic: str, type_name: str) -> None:
+    def lead(kind: WireContent, topic: str, type_name: str) -> None:
         found.setdefault((kind, topic), _Open(kind, type_name)).sources.append(Tip(key))
 
     def hear(topic: str, type_name: str, note: str) -> None:
-        found.setdefault((Line.TOPIC, topic), _Open(Line.TOPIC, type_name)).targets.append(Tip(key, note))
+        found.setdefault((WireContent.TOPIC, topic), _Open(WireContent.TOPIC, type_name)).targets.append(Tip(key, note))
 
     for skill in sorted({node.skill for node in mission.program.nodes} & robot.skills.keys()):
         source = robot.skills[skill]
         if source.way in _LINES:
             lead(_LINES[source.way], source.topic, source.action)
         if (halts := source.orders.halts) is not None:
-            lead(Line.TOPIC, halts.topic, halts.message)
+            lead(WireContent.TOPIC, halts.topic, halts.message)
         if (ends := source.orders.ends) is not None:
             hear(ends.topic, ends.message, skill)
     published, called = sent_by([mission.program])
     space = robot.manifest.bus.namespace or ""
     for name in sorted(published & robot.topics.keys()):
-        lead(Line.TOPIC, resolve(name, space), robot.topics[name].message)
+        lead(WireContent.TOPIC, resolve(name, space), robot.topics[name].message)
     for name in sorted(called & robot.services.keys()):
-        lead(Line.SERVICE, resolve(name, space), robot.services[name])
+        lead(WireContent.SERVICE, resolve(name, space), robot.services[name])
     for name in sorted(mission.program.reads() & robot.values.keys()):
         value = robot.values[name]
         hear(value.topic, value.message, f"${name}")
 
 
-def _add_look_ups(robot: Robot, found: dict[tuple[Line, str], _Open]) -> None:
+def _add_look_ups(robot: Robot, found: dict[tuple[WireContent, str], _Open]) -> None:
     """Let each topic of transforms lead to those that look something up, by a line of its own kind."""
-    boxes = [part.name for part in robot.parts.values() if any(isinstance(end.port, Looks) for end in part.ends)]
+    boxes = [
+        component.name
+        for component in robot.components.values()
+        if any(isinstance(end.port, Looks) for end in component.ends)
+    ]
     boxes = [name for name in boxes if name != MISSION]
     boxes += [key_of(name) for name in _programs(robot) if POSE in robot.missions[name].program.reads()]
     for topic in TRANSFORMS:
-        if (wire := found.pop((Line.TOPIC, topic), None)) is not None:
+        if (wire := found.pop((WireContent.TOPIC, topic), None)) is not None:
             wire.targets += [Tip(name) for name in boxes]
-            found[Line.LOOK_UP, topic] = wire
+            found[WireContent.LOOK_UP, topic] = wire

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from collections.abc import Mapping as AnyMapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rbxcompose.composition.dump import dump, dump_robot
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.inspection.origin import as_data, is_leaf, origin_of
-from rbxcompose.manifest.tree import Mapping, Node, Path, children
+from rbxcompose.manifest.tree import KeyPath, MappingNode, TreeNode, children
 
 WIDEST = 60  # columns up to which comments stand below each other
 _MARK = "\0"  # before a comment: no manifest holds it
@@ -25,7 +24,7 @@ def expand(manifest: RobotManifest, *, has_origins: bool = True) -> str:
     return aligned(dump_robot(manifest, lambda path, node: _comment(manifest, path, node)))
 
 
-def expand_below(manifest: RobotManifest, path: Path, root: Mapping, defaults: AnyMapping[str, str]) -> str:
+def expand_below(manifest: RobotManifest, path: KeyPath, root: MappingNode, defaults: Mapping[str, str]) -> str:
     """Return what stands below `path`, with origins, and then the defaults of what nobody wrote there.
 
     `root` is the map at `path`.
@@ -34,7 +33,7 @@ def expand_below(manifest: RobotManifest, path: Path, root: Mapping, defaults: A
     return aligned(written + "".join(f"{key}: {value}  # {_MARK}by default\n" for key, value in defaults.items()))
 
 
-def _comment(manifest: RobotManifest, path: Path, node: Node) -> str:
+def _comment(manifest: RobotManifest, path: KeyPath, node: TreeNode) -> str:
     return _MARK + origin_of(manifest, path, node).comment if is_leaf(node) else ""
 
 
@@ -61,7 +60,7 @@ def expand_data(manifest: RobotManifest) -> dict[str, Any]:
     return {"robot": as_data(manifest.root), "origins": origins}
 
 
-def leaves(node: Node, path: Path = ()) -> Iterator[tuple[Path, Node]]:
+def leaves(node: TreeNode, path: KeyPath = ()) -> Iterator[tuple[KeyPath, TreeNode]]:
     """Yield everything below which nothing stands, with its path."""
     if is_leaf(node):
         yield path, node

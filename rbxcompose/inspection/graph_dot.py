@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 
-from rbxcompose.inspection.diagram import Box, Diagram, Line, Shape, Wire
+from rbxcompose.inspection.diagram import Box, BoxShape, Diagram, DiagramWire, WireContent
 
 _STYLES = {
-    Line.TOPIC: 'style=solid color="#1f6feb"',
-    Line.SERVICE: 'style=dashed color="#1a7f37"',
-    Line.ACTION: 'style=bold penwidth=2.2 color="#8250df"',
-    Line.LOOK_UP: 'style=dotted color="#6e7781" arrowhead=odot',
+    WireContent.TOPIC: 'style=solid color="#1f6feb"',
+    WireContent.SERVICE: 'style=dashed color="#1a7f37"',
+    WireContent.ACTION: 'style=bold penwidth=2.2 color="#8250df"',
+    WireContent.LOOK_UP: 'style=dotted color="#6e7781" arrowhead=odot',
 }
-_SHAPES = {Shape.COMPONENT: "box", Shape.MUX: "hexagon", Shape.PROGRAM: "note"}
+_SHAPES = {BoxShape.COMPONENT: "box", BoxShape.MUX: "hexagon", BoxShape.PROGRAM: "note"}
 
 
 def dot(diagram: Diagram) -> str:
@@ -45,7 +45,7 @@ def _box(box: Box, start: str) -> str:
     return f"{_quoted(box.key)} [label={label} shape={_SHAPES[box.shape]}]"
 
 
-def _wire(wire: Wire) -> Iterator[str]:
+def _wire(wire: DiagramWire) -> Iterator[str]:
     """Yield an edge with a label; a wire with several ends, or none at one side, has a node of its own."""
     style = _STYLES[wire.kind]
     if wire.is_pair:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 
-from rbxcompose.inspection.diagram import Box, Diagram, Line, Shape, Tip, Wire
-from rbxcompose.inspection.layout import Edge, Item, Layout, Rect, lay_out
+from rbxcompose.inspection.diagram import Box, BoxShape, Diagram, DiagramWire, Tip, WireContent
+from rbxcompose.inspection.layout import Edge, Layout, LayoutItem, Rect, lay_out
 from rbxcompose.inspection.page import SCRIPT, STYLE
 
 _BOX_HEIGHT, _WIRE_HEIGHT = 46.0, 34.0
@@ -37,16 +37,16 @@ def _page(diagram: Diagram) -> Iterator[str]:
 def _legend(diagram: Diagram) -> Iterator[str]:
     """Yield what the lines mean, with a box to tick for each kind that is drawn."""
     yield '<div class="legend">'
-    for kind in Line:
+    for kind in WireContent:
         if count := sum(wire.kind is kind for wire in diagram.wires):
             sample = f'<svg width="34" height="10"><path class="line {kind}" d="M1 5H33"/></svg>'
             yield f'<label><input type="checkbox" checked data-kind="{kind}">{sample}{_plural(kind, count)}</label>'
     shapes = {box.shape for box in diagram.boxes}
-    yield from (f'<span><i class="sample {shape}"></i>{shape}</span>' for shape in Shape if shape in shapes)
+    yield from (f'<span><i class="sample {shape}"></i>{shape}</span>' for shape in BoxShape if shape in shapes)
     yield '<span><i class="sample group"></i>process</span></div>'
 
 
-def _plural(kind: Line, count: int) -> str:
+def _plural(kind: WireContent, count: int) -> str:
     return f"{count} {kind}{'' if count == 1 else 's'}"
 
 
@@ -81,18 +81,18 @@ def _layout(diagram: Diagram) -> Layout:
     """Return the places of boxes, and of wires, which stand between those that they connect."""
     groups = {box.key: box.group for box in diagram.boxes}
     items = [
-        Item(box.key, _width(box.name, box.type), _BOX_HEIGHT, box.group, is_round=box.shape is Shape.PROGRAM)
+        LayoutItem(box.key, _width(box.name, box.type), _BOX_HEIGHT, box.group, is_round=box.shape is BoxShape.PROGRAM)
         for box in diagram.boxes
     ]
     edges: list[Edge] = []
     for executive, program in diagram.runs:
-        items.append(Item(_run(program), 30.0, 16.0, groups[program], is_round=True))
+        items.append(LayoutItem(_run(program), 30.0, 16.0, groups[program], is_round=True))
         edges += [(executive, _run(program)), (_run(program), program)]
     for number, wire in enumerate(diagram.wires):
         key = f"w{number}"
         width = max(_SMALL * len(text) for text in (wire.name, _second_line(wire))) + 20
         group = groups[(wire.sources or wire.targets)[0].box]
-        items.append(Item(key, width, _WIRE_HEIGHT, group, is_round=True))
+        items.append(LayoutItem(key, width, _WIRE_HEIGHT, group, is_round=True))
         edges += [(tip.box, key) for tip in wire.sources] + [(key, tip.box) for tip in wire.targets]
     return lay_out(items, list(dict.fromkeys(edges)))
 
@@ -101,7 +101,7 @@ def _width(name: str, type_: str) -> float:
     return max(_WIDE * len(name), _SMALL * len(type_), 60.0) + 26
 
 
-def _wire(layout: Layout, key: str, wire: Wire) -> Iterator[str]:
+def _wire(layout: Layout, key: str, wire: DiagramWire) -> Iterator[str]:
     boxes = " ".join(dict.fromkeys(tip.box for tip in (*wire.sources, *wire.targets)))
     is_open = "" if wire.sources and wire.targets else " open"
     rect = layout.places[key]
@@ -117,11 +117,11 @@ def _wire(layout: Layout, key: str, wire: Wire) -> Iterator[str]:
     yield f'<text class="type" x="{x:.0f}" y="{y + 27:.0f}">{escape(_second_line(wire))}</text></g>'
 
 
-def _second_line(wire: Wire) -> str:
+def _second_line(wire: DiagramWire) -> str:
     return f"{wire.short_type}, {wire.note}" if wire.note else wire.short_type
 
 
-def _told(wire: Wire) -> str:
+def _told(wire: DiagramWire) -> str:
     """Return a wire in words."""
     lines = [f"{wire.kind} {wire.name}", wire.type, *([f"quality of service: {wire.qos}"] if wire.qos else [])]
     lines += [f"from {_names(wire.sources) or wire.about or 'outside'}", f"to {_names(wire.targets) or 'nobody here'}"]
@@ -141,8 +141,10 @@ def _box(rect: Rect, box: Box, is_start: bool) -> Iterator[str]:
     x, y = rect.x + rect.width / 2, rect.y
     yield f'<g class="box {box.shape}" data-box="{escape(box.key)}" tabindex="0">'
     yield f"<title>{escape(box.name)}: {escape(box.type)}\n{escape(box.about)}</title>"
-    yield _rect(rect, "body", {Shape.COMPONENT: 7.0, Shape.MUX: 2.0, Shape.PROGRAM: rect.height / 2}[box.shape])
-    if box.shape is Shape.MUX:
+    yield _rect(
+        rect, "body", {BoxShape.COMPONENT: 7.0, BoxShape.MUX: 2.0, BoxShape.PROGRAM: rect.height / 2}[box.shape]
+    )
+    if box.shape is BoxShape.MUX:
         yield _rect(Rect(rect.x + 3, rect.y + 3, rect.width - 6, rect.height - 6), "inner", 1)
     yield f'<text class="name" x="{x:.0f}" y="{y + 20:.0f}">{escape(box.name)}</text>'
     kind = "start mission" if is_start else box.type

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.inspection.diagram import Box, Diagram, Line, Shape, Wire
+from rbxcompose.inspection.diagram import Box, BoxShape, Diagram, DiagramWire, WireContent
 
-_ARROWS = {Line.TOPIC: "-->", Line.SERVICE: "-.->", Line.ACTION: "==>", Line.LOOK_UP: "-.-o"}
-_SHAPES = {Shape.COMPONENT: ("[", "]"), Shape.MUX: ("{{", "}}"), Shape.PROGRAM: ("([", "])")}
+_ARROWS = {
+    WireContent.TOPIC: "-->",
+    WireContent.SERVICE: "-.->",
+    WireContent.ACTION: "==>",
+    WireContent.LOOK_UP: "-.-o",
+}
+_SHAPES = {BoxShape.COMPONENT: ("[", "]"), BoxShape.MUX: ("{{", "}}"), BoxShape.PROGRAM: ("([", "])")}
 _STYLES = (
     "classDef wire fill:none,stroke-dasharray:2 2",
     "classDef mux stroke-width:2px",
@@ -36,12 +41,12 @@ def _lines(diagram: Diagram) -> Iterator[str]:
 def _box(box: Box, ids: dict[str, str], start: str) -> str:
     begin, end = _SHAPES[box.shape]
     kind = "start mission" if box.key == start else box.type
-    style = ":::mux" if box.shape is Shape.MUX else ""
+    style = ":::mux" if box.shape is BoxShape.MUX else ""
     below = f"<br/><i>{kind}</i>" if kind != box.name else ""
     return f'{ids[box.key]}{begin}"{box.name}{below}"{end}{style}'
 
 
-def _wire(wire: Wire, key: str, ids: dict[str, str]) -> Iterator[str]:
+def _wire(wire: DiagramWire, key: str, ids: dict[str, str]) -> Iterator[str]:
     """Yield an arrow with a label; a wire with several ends, or none at one side, has a node of its own."""
     arrow, label = _ARROWS[wire.kind], f"{wire.name}<br/>{wire.short_type}"
     if wire.is_pair:

@@ -40,7 +40,7 @@ class NotDrawnError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class LayoutItem:
     """Something to be placed: its size [px], its group, if it is in one, and whether its ends are round."""
 
     key: str
@@ -71,7 +71,7 @@ class Layout:
     height: float
 
 
-def lay_out(items: Sequence[Item], edges: Sequence[Edge]) -> Layout:
+def lay_out(items: Sequence[LayoutItem], edges: Sequence[Edge]) -> Layout:
     """Return a place for each item and a path for each edge; the same input gives the same picture.
 
     Raises:
@@ -96,7 +96,7 @@ def lay_out(items: Sequence[Item], edges: Sequence[Edge]) -> Layout:
     return _read(json.loads(graph.draw(format="json0", prog="dot")), items)
 
 
-def _read(drawn: dict[str, Any], items: Sequence[Item]) -> Layout:
+def _read(drawn: dict[str, Any], items: Sequence[LayoutItem]) -> Layout:
     """Return the layout that Graphviz wrote, which counts y upwards."""
     _, _, width, height = _numbers(drawn["bb"])
     sizes = {item.key: item for item in items}

@@ -8,18 +8,18 @@ from collections.abc import Iterator, Sequence
 from rbxcompose.inspection.mission_text import status_of
 from rbxcompose.missions.program.look import Form
 from rbxcompose.missions.program.statuses import NAMES
-from rbxcompose.missions.view.picture import Drawn, Picture
+from rbxcompose.missions.view.picture import Drawn, MissionPicture
 
 COLOURS = {"running": "#0969da", "success": "#1a7f37", "failure": "#cf222e", "skipped": "#818b98"}
 _SAFE = str.maketrans({'"': "'", "<": "&lt;", ">": "&gt;", "#": "&num;"})
 
 
-def mission_mermaid(picture: Picture, statuses: Sequence[int] = ()) -> str:
+def mission_mermaid(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
     """Return the text of a flowchart, with how each node stands if that is known."""
     return "".join(f"{line}\n" for line in _mermaid(picture, statuses))
 
 
-def mission_dot(picture: Picture, statuses: Sequence[int] = ()) -> str:
+def mission_dot(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
     """Return the text of a graph for Graphviz, with how each node stands if that is known."""
     return "".join(f"{line}\n" for line in _dot(picture, statuses))
 
@@ -31,13 +31,13 @@ def label_of(drawn: Drawn) -> str:
     return "\n".join([*([": ".join(names)] if names else []), title, *drawn.notes])
 
 
-def _keys(picture: Picture) -> dict[int, str]:
+def _keys(picture: MissionPicture) -> dict[int, str]:
     """Return the key of each box by the identity of what is drawn."""
     drawn = [one for root in picture.roots for one in root.all()]
     return {id(one): f"n{number}" for number, one in enumerate(drawn)}
 
 
-def _edges(picture: Picture) -> Iterator[tuple[str, str, str, bool]]:
+def _edges(picture: MissionPicture) -> Iterator[tuple[str, str, str, bool]]:
     """Yield the lines: from, to, label, and whether it is a transition."""
     keys = _keys(picture)
     for one in (one for root in picture.roots for one in root.all()):
@@ -49,7 +49,7 @@ def _edges(picture: Picture) -> Iterator[tuple[str, str, str, bool]]:
                 yield states[state.name], to, arrow.outcome, True
 
 
-def _ends(picture: Picture) -> Iterator[tuple[str, str]]:
+def _ends(picture: MissionPicture) -> Iterator[tuple[str, str]]:
     """Yield the ends of machines that are reached: key and name."""
     keys = _keys(picture)
     for one in (one for root in picture.roots for one in root.all()):
@@ -58,7 +58,7 @@ def _ends(picture: Picture) -> Iterator[tuple[str, str]]:
         yield from ((f"{keys[id(one)]}_{name}", name) for name in reached if name not in states)
 
 
-def _mermaid(picture: Picture, statuses: Sequence[int]) -> Iterator[str]:
+def _mermaid(picture: MissionPicture, statuses: Sequence[int]) -> Iterator[str]:
     yield "flowchart LR"
     keys = _keys(picture)
     for one in (one for root in picture.roots for one in root.all()):
@@ -74,7 +74,7 @@ def _mermaid(picture: Picture, statuses: Sequence[int]) -> Iterator[str]:
         yield from (f"  classDef {name} fill:{colour},color:#fff" for name, colour in COLOURS.items())
 
 
-def _dot(picture: Picture, statuses: Sequence[int]) -> Iterator[str]:
+def _dot(picture: MissionPicture, statuses: Sequence[int]) -> Iterator[str]:
     yield f"digraph {_quoted(picture.name)} {{"
     yield '  rankdir=LR node [shape=box fontname="sans-serif" fontsize=11] edge [fontname="sans-serif" fontsize=10]'
     keys = _keys(picture)

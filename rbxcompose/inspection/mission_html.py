@@ -5,24 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from rbxcompose.inspection.layout import Item, Layout, lay_out
+from rbxcompose.inspection.layout import Layout, LayoutItem, lay_out
 from rbxcompose.inspection.mission_style import STYLE
 from rbxcompose.inspection.mission_text import MARKS, status_of
 from rbxcompose.missions.program.look import Form
 from rbxcompose.missions.program.statuses import IDLE, NAMES
-from rbxcompose.missions.view.picture import Drawn, Picture
+from rbxcompose.missions.view.picture import Drawn, MissionPicture
 
 _LETTER, _SMALL = 7.6, 6.6  # width of a letter of names and of small text [px]
 _BESIDE = (Form.BESIDE, Form.MACHINE)
 _BOX, _PILL = 34.0, 22.0  # heights [px]
 
 
-def mission_html(picture: Picture, statuses: Sequence[int] = ()) -> str:
+def mission_html(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
     """Return the text of the page, with how each node stands if that is known; light or dark as the reader has it."""
     return "".join(f"{line}\n" for line in _page(picture, statuses))
 
 
-def _page(picture: Picture, statuses: Sequence[int]) -> Iterator[str]:
+def _page(picture: MissionPicture, statuses: Sequence[int]) -> Iterator[str]:
     title = escape(picture.name)
     yield "<!doctype html>"
     yield f'<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
@@ -105,9 +105,9 @@ def _layout(
 ) -> tuple[Layout, dict[tuple[str, str], str]]:
     """Return the places of states and of the labels between them, and the keys of these."""
     pills = {ends: f"{ends[0]} > {ends[1]}" for ends in joined}
-    items = [Item(name, _LETTER * len(name) + 26, _BOX, is_round=True) for name in names]
+    items = [LayoutItem(name, _LETTER * len(name) + 26, _BOX, is_round=True) for name in names]
     for ends, key in pills.items():
-        items.append(Item(key, _SMALL * len(", ".join(joined[ends])) + 18, _PILL, is_round=True))
+        items.append(LayoutItem(key, _SMALL * len(", ".join(joined[ends])) + 18, _PILL, is_round=True))
     edges = [edge for (begin, to), key in pills.items() for edge in ((begin, key), (key, to))]
     return lay_out(items, edges), pills
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from rbxcompose.missions.program.look import Form
 from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
-from rbxcompose.missions.view.picture import Drawn, Picture
+from rbxcompose.missions.view.picture import Drawn, MissionPicture
 from rbxcompose.printable import fitted, plain
 
 MARKS = {IDLE: "·", RUNNING: "▶", SUCCESS: "✓", FAILURE: "✗", SKIPPED: "-"}
@@ -15,13 +15,13 @@ _COLOURS = {IDLE: _FAINT, RUNNING: "\x1b[1;36m", SUCCESS: "\x1b[32m", FAILURE: "
 _STEP = "  "
 
 
-def mission_text(picture: Picture, statuses: Sequence[int] = ()) -> str:
+def mission_text(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
     """Return the text of a mission, with the status of each node if they are known."""
     return "".join(f"{line}\n" for line in mission_lines(picture, statuses))
 
 
 def mission_lines(
-    picture: Picture, statuses: Sequence[int] = (), *, width: int = 200, colour: bool = False
+    picture: MissionPicture, statuses: Sequence[int] = (), *, width: int = 200, colour: bool = False
 ) -> list[str]:
     """Return the lines, each of at most `width` columns."""
     head = plain(f"{picture.name}: {picture.about}" if picture.about else picture.name)
@@ -41,7 +41,7 @@ def _lines(drawn: Drawn, indent: str, statuses: Sequence[int], width: int, colou
         yield f"{_FAINT}{line}{_RESET}" if colour else line
 
 
-def running_lines(picture: Picture, statuses: Sequence[int], width: int) -> list[str]:
+def running_lines(picture: MissionPicture, statuses: Sequence[int], width: int) -> list[str]:
     """Return the lines of the nodes that run, and of those that they run in."""
     return [fitted(line, width) for root in picture.roots for line in _running(root, "", statuses)]
 

@@ -12,7 +12,7 @@ from rbxcompose.config import HIDDEN, Secret
 from rbxcompose.findings import Span
 from rbxcompose.manifest.arguments import show
 from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import BROKEN, Mapping, Node, Path, Scalar, Sequence
+from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.printable import plain
 from rbxcompose.units import Quantity
 
@@ -37,52 +37,52 @@ class Origin:
         return ", ".join(shown) + (f" = {plain(self.written, LONGEST)}" if self.written else "")
 
 
-def origin_of(manifest: RobotManifest, path: Path, node: Node) -> Origin:
+def origin_of(manifest: RobotManifest, path: KeyPath, node: TreeNode) -> Origin:
     """Return where the value at `path` comes from; `node` is what stands there, filled in."""
     steps = manifest.history.of(path)
     source = steps[-1].node if steps else None
-    is_filled = isinstance(source, Scalar) and "${" in source.text
-    written = source.text if is_filled and isinstance(source, Scalar) else ""
+    is_filled = isinstance(source, ScalarNode) and "${" in source.text
+    written = source.text if is_filled and isinstance(source, ScalarNode) else ""
     span = source.span if is_filled and source is not None else node.span
     return Origin(span, manifest.history.layer(path), written)
 
 
-def is_leaf(node: Node) -> bool:
+def is_leaf(node: TreeNode) -> bool:
     """Tell whether nothing stands below a node."""
     match node:
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             return not entries
-        case Sequence(items=items):
+        case SequenceNode(items=items):
             return not items
     return True
 
 
-def shown(node: Node) -> str:
+def shown(node: TreeNode) -> str:
     """Return a value in one line, for people; a secret is hidden."""
     match node:
-        case Scalar() if node.filled in (None, BROKEN):
+        case ScalarNode() if node.filled in (None, BROKEN):
             return node.text
-        case Scalar(filled=Secret()):
+        case ScalarNode(filled=Secret()):
             return HIDDEN
-        case Scalar():
+        case ScalarNode():
             return show(node.filled)
-        case Sequence(items=items):
+        case SequenceNode(items=items):
             return f"[{', '.join(map(shown, items))}]"
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             return f"{{{', '.join(f'{name}: {shown(entry.value)}' for name, entry in entries.items())}}}"
 
 
-def as_data(node: Node) -> object:
+def as_data(node: TreeNode) -> object:
     """Return a value as data for JSON: quantities as texts with their units, secrets hidden."""
     match node:
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             return {name: as_data(entry.value) for name, entry in entries.items()}
-        case Sequence(items=items):
+        case SequenceNode(items=items):
             return [as_data(item) for item in items]
-        case Scalar(filled=Quantity(value=value, dimension=dimension)):
+        case ScalarNode(filled=Quantity(value=value, dimension=dimension)):
             return exact(value, dimension)
-        case Scalar(filled=bool() | int() | float() | str()):
+        case ScalarNode(filled=bool() | int() | float() | str()):
             return node.filled
-        case Scalar(filled=None):
+        case ScalarNode(filled=None):
             return plain_value(node)
     return shown(node)

@@ -7,8 +7,8 @@ from rbxcompose.composition.set_options import in_section
 from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.file_models import robot_keys
 from rbxcompose.manifest.registry import naming
-from rbxcompose.manifest.section import Scope
-from rbxcompose.manifest.tree import Mapping, Node, Path, Sequence, at
+from rbxcompose.manifest.section import SetScope
+from rbxcompose.manifest.tree import KeyPath, MappingNode, SequenceNode, TreeNode, at
 from rbxcompose.model.robot import Robot
 from rbxcompose.printable import plain
 from rbxcompose.references import COMPONENT
@@ -28,7 +28,7 @@ Good: `rbxcompose why battery.runtime robots/turtlebot`
 )
 
 
-def path_of(robot: Robot, text: str) -> Path:
+def path_of(robot: Robot, text: str) -> KeyPath:
     """Return the path from the root that a text means; an item of a list is counted from 0."""
     names: list[str | int] = list(text.strip().split("."))
     manifest = robot.manifest
@@ -36,47 +36,47 @@ def path_of(robot: Robot, text: str) -> Path:
         names.insert(0, _section_of(manifest, str(names[0])))
     for index, name in enumerate(names):
         above = found_at(manifest, tuple(names[:index]))
-        if isinstance(above, Sequence) and str(name).isdecimal():
+        if isinstance(above, SequenceNode) and str(name).isdecimal():
             names[index] = int(name)
     return tuple(names)
 
 
 def _section_of(manifest: RobotManifest, name: str) -> str:
     """Return the section in which something that runs has its name; that of the components, if nothing has it."""
-    running = sorted(naming(COMPONENT), key=lambda one: one.scope is Scope.BARE)
+    running = sorted(naming(COMPONENT), key=lambda one: one.scope is SetScope.BARE)
     return next((one.name for one in running if name in one.names_in(manifest.root)), running[-1].name)
 
 
-def short(path: Path) -> str:
+def short(path: KeyPath) -> str:
     """Return a path as people write it."""
     return ".".join(map(str, path[1:] if path[0] == "components" and len(path) > 1 else path))
 
 
-def tree_of(manifest: RobotManifest, path: Path) -> Mapping:
+def tree_of(manifest: RobotManifest, path: KeyPath) -> MappingNode:
     """Return the tree that a path leads into: what is included is read before the rest, and kept beside it."""
     return manifest.include if path[:1] == (include.name,) else manifest.root
 
 
-def found_at(manifest: RobotManifest, path: Path) -> Node | None:
+def found_at(manifest: RobotManifest, path: KeyPath) -> TreeNode | None:
     """Return what stands at a path of the composed robot, or None."""
     return at(tree_of(manifest, path), path)
 
 
-def no_such_path(robot: Robot, path: Path, guide: Guide) -> Finding:
+def no_such_path(robot: Robot, path: KeyPath, guide: Guide) -> Finding:
     """Return the finding for a path that leads nowhere, with what was probably meant at the first wrong name."""
     if path[0] == "profiles":
         return NO_SUCH_PATH.at(None, "profiles have no value of their own", help="'--profile NAME' lays one on top")
     length = next(n for n in range(1, len(path) + 1) if not is_known(robot.manifest, guide, path[:n]))
     above, name = path[: length - 1], str(path[length - 1])
     node = found_at(robot.manifest, above)
-    valid = {*guide.keys(above), *(node.entries if isinstance(node, Mapping) else ())}
+    valid = {*guide.keys(above), *(node.entries if isinstance(node, MappingNode) else ())}
     place = f"'{short(above)}'" if above else ""
     if above in ((), ("components",)):
         place = f"robot '{robot.manifest.name}'"
-        valid |= {*robot.parts, *(key for key in robot_keys() if key in robot.manifest.root)}
-    elif len(above) == 2 and str(above[1]) in robot.parts:
-        valid |= {end.name for end in robot.parts[str(above[1])].ends}
-    if isinstance(node, Sequence):
+        valid |= {*robot.components, *(key for key in robot_keys() if key in robot.manifest.root)}
+    elif len(above) == 2 and str(above[1]) in robot.components:
+        valid |= {end.name for end in robot.components[str(above[1])].ends}
+    if isinstance(node, SequenceNode):
         valid = {str(index) for index in range(len(node.items))}
     message = f"{place} has no '{plain(name, 60)}'"
     if above == ("components",) and (meant := in_section([str(key) for key in path[1:]], robot.manifest.root)):
@@ -84,6 +84,6 @@ def no_such_path(robot: Robot, path: Path, guide: Guide) -> Finding:
     return NO_SUCH_PATH.misspelt(None, message, name, sorted(valid), "what it has")
 
 
-def is_known(manifest: RobotManifest, guide: Guide, path: Path) -> bool:
+def is_known(manifest: RobotManifest, guide: Guide, path: KeyPath) -> bool:
     """Tell whether a path leads to something, or is a key that could be written where it stands."""
     return found_at(manifest, path) is not None or str(path[-1]) in guide.keys(path[:-1])

@@ -6,16 +6,16 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-from rbxcompose.composition.history import Step
+from rbxcompose.composition.history import HistoryStep
 from rbxcompose.composition.overlay import SET
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.findings import Finding
-from rbxcompose.inspection.answer import Answer, Layer, Source
+from rbxcompose.inspection.answer import ArgumentSource, Layer, PathAnswer
 from rbxcompose.inspection.expand import expand_below
 from rbxcompose.inspection.origin import origin_of, shown
 from rbxcompose.inspection.paths import found_at, is_known, no_such_path, path_of, short, tree_of
 from rbxcompose.inspection.port import why_port
-from rbxcompose.manifest.tree import Mapping, Node, Path, Scalar, key_span
+from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, key_span
 from rbxcompose.missions.engine.value_text import show as show_value
 from rbxcompose.missions.program.program import Input
 from rbxcompose.model.robot import Robot
@@ -28,35 +28,35 @@ _ARGUMENT = re.compile(r"\bargs\.([a-z][a-z0-9_]*)")
 _MEASURED = ("args", "missions", "include")  # sections in which only the value itself says what it measures
 
 
-def why(robot: Robot, text: str) -> Answer | Finding:
+def why(robot: Robot, text: str) -> PathAnswer | Finding:
     """Return all that is known of a path of the robot, written as for `--set`, or of a port: `go_to.cmd_vel`."""
     path = path_of(robot, text)
     node = found_at(robot.manifest, path)
     guide = _guide(robot.manifest, path)
-    if isinstance(node, Mapping) and path[0] == "args" and len(path) == 2:
+    if isinstance(node, MappingNode) and path[0] == "args" and len(path) == 2:
         return _argument_in_effect(robot, guide, path, node)
     if node is not None:
         return _written(robot, guide, path, node)
     if removed := _removed(robot.manifest, path):
-        return Answer(short(path), "nothing", _about(robot, guide, path), layers=removed)
+        return PathAnswer(short(path), "nothing", _about(robot, guide, path), layers=removed)
     if path[0] != "profiles" and (answer := _unwritten(robot, guide, path)):
         return answer
     return why_port(robot, path) or no_such_path(robot, path, guide)
 
 
-def _guide(manifest: RobotManifest, path: Path) -> Guide:
+def _guide(manifest: RobotManifest, path: KeyPath) -> Guide:
     types = {name: entry.type for name, entry in manifest.components.items()}
     return Guide(installed_schema("Robot"), tree_of(manifest, path), types)
 
 
-def _written(robot: Robot, guide: Guide, path: Path, node: Node) -> Answer:
+def _written(robot: Robot, guide: Guide, path: KeyPath, node: TreeNode) -> PathAnswer:
     about, place = _about(robot, guide, path), origin_of(robot.manifest, path, node)
-    if isinstance(node, Mapping) and node.entries:
+    if isinstance(node, MappingNode) and node.entries:
         body = expand_below(robot.manifest, path, node, dict(_defaults(guide, path, node)))
         where = key_span(tree_of(robot.manifest, path), path)
-        return Answer(short(path), _kind(path, node), about, place=str(where), body=body, node=node)
+        return PathAnswer(short(path), _kind(path, node), about, place=str(where), body=body, node=node)
     dimension = _dimension(guide, path, node)
-    return Answer(
+    return PathAnswer(
         short(path),
         shown(node),
         about,
@@ -68,7 +68,7 @@ def _written(robot: Robot, guide: Guide, path: Path, node: Node) -> Answer:
     )
 
 
-def _argument_in_effect(robot: Robot, guide: Guide, path: Path, declared: Mapping) -> Answer:
+def _argument_in_effect(robot: Robot, guide: Guide, path: KeyPath, declared: MappingNode) -> PathAnswer:
     """Return the value that an argument has: its default, or what a layer above has put in the place of that."""
     written = {name: shown(entry.value) for name, entry in declared.entries.items()}
     limits = [f"{words} {written[key]}" for key, words in (("min", "at least"), ("max", "at most")) if key in written]
@@ -77,37 +77,37 @@ def _argument_in_effect(robot: Robot, guide: Guide, path: Path, declared: Mappin
     value = declared.get("default")
     if value is None:
         place = key_span(robot.manifest.root, path)
-        return Answer(short(path), "nothing", written.get("about", ""), place=str(place), hints=hints)
+        return PathAnswer(short(path), "nothing", written.get("about", ""), place=str(place), hints=hints)
     answer = _written(robot, guide, (*path, "default"), value)
     return replace(answer, path=short(path), about=written.get("about", ""), hints=hints)
 
 
-def _kind(path: Path, node: Mapping) -> str:
+def _kind(path: KeyPath, node: MappingNode) -> str:
     type_ = node.get("type")
     if path[0] == "components" and len(path) == 2 and type_ is not None:
         return f"a component of type {shown(type_)}"
     return "a map with one key" if len(node.entries) == 1 else f"a map with {len(node.entries)} keys"
 
 
-def _about(robot: Robot, guide: Guide, path: Path) -> str:
+def _about(robot: Robot, guide: Guide, path: KeyPath) -> str:
     """Return what a key is for, in the words of its type."""
-    if len(path) == 2 and path[0] == "components" and str(path[1]) in robot.parts:
-        return (robot.parts[str(path[1])].cls.__doc__ or "").strip().partition("\n")[0]
+    if len(path) == 2 and path[0] == "components" and str(path[1]) in robot.components:
+        return (robot.components[str(path[1])].cls.__doc__ or "").strip().partition("\n")[0]
     return guide.describe(path)
 
 
-def _layer(step: Step) -> Layer:
+def _layer(step: HistoryStep) -> Layer:
     name = SET if step.layer.strip("'") == SET else step.layer
     return Layer(name, None if step.node is None else shown(step.node), step.span)
 
 
-def _removed(manifest: RobotManifest, path: Path) -> tuple[Layer, ...]:
+def _removed(manifest: RobotManifest, path: KeyPath) -> tuple[Layer, ...]:
     """Return the layers of a value that is not there any more, the one that took it away last."""
     return tuple(_layer(step) for step in manifest.history.of(path))
 
 
-def _dimension(guide: Guide, path: Path, node: Node) -> Dimension | None:
-    if not isinstance(node, Scalar):
+def _dimension(guide: Guide, path: KeyPath, node: TreeNode) -> Dimension | None:
+    if not isinstance(node, ScalarNode):
         return None
     if isinstance(node.filled, Quantity):
         return node.filled.dimension
@@ -119,9 +119,9 @@ def _dimension(guide: Guide, path: Path, node: Node) -> Dimension | None:
     return guide.value(path).dimension
 
 
-def _si(node: Node, dimension: Dimension | None) -> float | None:
+def _si(node: TreeNode, dimension: Dimension | None) -> float | None:
     """Return a quantity in SI, None if it is none or wrong, which `check` tells."""
-    if dimension is None or not isinstance(node, Scalar):
+    if dimension is None or not isinstance(node, ScalarNode):
         return None
     try:
         return to_si(node.filled if node.filled is not None else node.text, dimension)
@@ -129,58 +129,62 @@ def _si(node: Node, dimension: Dimension | None) -> float | None:
         return None
 
 
-def _sources(manifest: RobotManifest, path: Path) -> Iterator[Source]:
+def _sources(manifest: RobotManifest, path: KeyPath) -> Iterator[ArgumentSource]:
     """Yield the arguments that a value was filled in from, each followed by those that it was given."""
     steps = manifest.history.of(path)
     written = steps[-1].node if steps else None
-    if not isinstance(written, Scalar) or "${" not in written.text:
+    if not isinstance(written, ScalarNode) or "${" not in written.text:
         return
     for name in _ARGUMENT.findall(written.text):
         yield from _argument(manifest, name, written.scope)
 
 
-def _argument(manifest: RobotManifest, name: str, scope: str) -> Iterator[Source]:
-    path: Path = ("include", scope, "with", name) if scope else ("args", name, "default")
+def _argument(manifest: RobotManifest, name: str, scope: str) -> Iterator[ArgumentSource]:
+    path: KeyPath = ("include", scope, "with", name) if scope else ("args", name, "default")
     label = f"args.{name}" + (f" of part '{scope}'" if scope else "")
     node = found_at(manifest, path)
     if node is not None:
         below = tuple(map(_layer, manifest.history.of(path)[:-1]))
-        yield Source(label, shown(node), origin_of(manifest, path, node), below)
+        yield ArgumentSource(label, shown(node), origin_of(manifest, path, node), below)
         yield from _sources(manifest, path)
     elif scope in manifest.parts:
         given = "given by the part that includes it, else " if "." in scope else ""
-        yield Source(label, f"{given}the default in {manifest.parts[scope].file}", None)
+        yield ArgumentSource(label, f"{given}the default in {manifest.parts[scope].file}", None)
 
 
-def _unwritten(robot: Robot, guide: Guide, path: Path) -> Answer | None:
+def _unwritten(robot: Robot, guide: Guide, path: KeyPath) -> PathAnswer | None:
     """Return what holds for a key that exists and that nobody wrote."""
     if given := _input(robot, path):
         return _unwritten_input(path, given)
     if not all(is_known(robot.manifest, guide, path[:length]) for length in range(1, len(path) + 1)):
         return None
     if guide.keys(path):
-        body = expand_below(robot.manifest, path, Mapping(), dict(_defaults(guide, path, Mapping())))
-        return Answer(short(path), "the defaults, no file writes it", guide.describe(path), is_default=True, body=body)
+        body = expand_below(robot.manifest, path, MappingNode(), dict(_defaults(guide, path, MappingNode())))
+        return PathAnswer(
+            short(path), "the defaults, no file writes it", guide.describe(path), is_default=True, body=body
+        )
     value, default = guide.value(path), _default(guide.value(path).default)
-    part = robot.parts.get(str(path[1])) if len(path) == 3 and path[0] == "components" else None
-    of = f" of type '{part.type_name}'" if part else ""
+    component = robot.components.get(str(path[1])) if len(path) == 3 and path[0] == "components" else None
+    of = f" of type '{component.type_name}'" if component else ""
     said = f"no file writes it: this is the default{of}" if default else "no file writes it, and it has no default"
     where = key_span(tree_of(robot.manifest, path), path[:-1]) if found_at(robot.manifest, path[:-1]) else None
     below = f"'{path[-1]}:' below {where}, or " if where is not None and len(path) > 1 else ""
     dimension = value.dimension
-    si = _si(Scalar(default, robot.manifest.root.span), dimension) if default else None
+    si = _si(ScalarNode(default, robot.manifest.root.span), dimension) if default else None
     hints = (("where", said), ("to set it", below + _to_set(path)))
-    return Answer(short(path), default or "nothing", guide.describe(path), dimension, si, is_default=True, hints=hints)
+    return PathAnswer(
+        short(path), default or "nothing", guide.describe(path), dimension, si, is_default=True, hints=hints
+    )
 
 
-def _unwritten_input(path: Path, given: Input) -> Answer:
+def _unwritten_input(path: KeyPath, given: Input) -> PathAnswer:
     default = given.default
     value = "nothing" if default is None else show_value(given.type, default.value)
     said = f"no file writes it: this is the default of the mission ({given.span})" if default else f"see {given.span}"
     hints = (("where", said), ("to set it", _to_set(path)))
     dimension, si = given.type.dimension, default.value if default else None
     is_measured = dimension is not None and isinstance(si, float)
-    return Answer(
+    return PathAnswer(
         short(path),
         value,
         "An input of the mission.",
@@ -191,11 +195,11 @@ def _unwritten_input(path: Path, given: Input) -> Answer:
     )
 
 
-def _to_set(path: Path) -> str:
+def _to_set(path: KeyPath) -> str:
     return f"{SET} {short(path)}=VALUE"
 
 
-def _input(robot: Robot, path: Path) -> Input | None:
+def _input(robot: Robot, path: KeyPath) -> Input | None:
     """Return the input of a mission that a path names."""
     match path:
         case ("missions", str(mission), "with", str(name)) if mission in robot.missions:
@@ -209,7 +213,7 @@ def _default(value: object) -> str:
     return "" if value is None or isinstance(value, dict) else plain(str(value))
 
 
-def _defaults(guide: Guide, path: Path, node: Mapping) -> Iterator[tuple[str, str]]:
+def _defaults(guide: Guide, path: KeyPath, node: MappingNode) -> Iterator[tuple[str, str]]:
     """Yield the keys of a map that nobody wrote and that have a default, with that."""
     for key in guide.keys(path):
         if key not in node and (default := _default(guide.value((*path, key)).default)):

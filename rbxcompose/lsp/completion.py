@@ -13,7 +13,7 @@ from rbxcompose.lsp.names import SKILL, named_by_key
 from rbxcompose.lsp.variables import fills, variables
 from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.references import PLACE
-from rbxcompose.schema.guide import Guide, Value
+from rbxcompose.schema.guide import Guide, GuidedValue
 from rbxcompose.schema.scalars import Schema, units_of
 from rbxcompose.units import NUMBER_TEXT, Dimension
 
@@ -24,7 +24,7 @@ _QUANTITY = re.compile(rf"\s*[+-]?{NUMBER_TEXT}(?P<space>\s*)(?P<unit>(?:[A-Za-z
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class CompletionItem:
     """One proposal: `text` is written in the place of the `replaces` characters before the position.
 
     `sort` is 'key', 'name', 'word', 'unit' or 'variable'.
@@ -38,7 +38,7 @@ class Item:
     about: str = ""
 
 
-def complete(document: Document, line: int, column: int) -> list[Item]:
+def complete(document: Document, line: int, column: int) -> list[CompletionItem]:
     """Return what may be written at a position (from 0), in the order in which it is best shown."""
     spot = document.at(line, column)
     if spot is None:
@@ -49,7 +49,7 @@ def complete(document: Document, line: int, column: int) -> list[Item]:
     return [*words, *_of_key(spot)]
 
 
-def _of_key(spot: Spot) -> Iterator[Item]:
+def _of_key(spot: Spot) -> Iterator[CompletionItem]:
     cursor = spot.cursor
     taken = cursor.siblings
     schemas = _open_keys(spot)
@@ -78,33 +78,35 @@ def _takes_nodes(schemas: Mapping[str, Any]) -> bool:
     return "sequence" in schemas
 
 
-def _key(spot: Spot, key: str, sort: str, detail: str, about: str) -> Item:
+def _key(spot: Spot, key: str, sort: str, detail: str, about: str) -> CompletionItem:
     text = key if spot.cursor.has_colon else f"{key}: "
-    return Item(key, sort, text, len(spot.cursor.before), detail, about)
+    return CompletionItem(key, sort, text, len(spot.cursor.before), detail, about)
 
 
 def _kind_of_value(schema: Mapping[str, Any]) -> str:
-    value = Value([dict(schema)])
+    value = GuidedValue([dict(schema)])
     return value.dimension.name if value.dimension else ""
 
 
-def _words_of_item(spot: Spot) -> Iterator[Item]:
+def _words_of_item(spot: Spot) -> Iterator[CompletionItem]:
     """Yield what may stand as a word in a list, where a key may stand as well."""
     path = spot.cursor.path
     if spot.document.is_mission and _takes_nodes(spot.guide.keys(path)):
         for name, about in spot.known.of(SKILL).items():
-            yield Item(name, "name", name, len(spot.cursor.before), about)
+            yield CompletionItem(name, "name", name, len(spot.cursor.before), about)
     else:
         yield from _of_value(spot, path)
 
 
-def _of_value(spot: Spot, path: tuple[str | int, ...]) -> Iterator[Item]:
+def _of_value(spot: Spot, path: tuple[str | int, ...]) -> Iterator[CompletionItem]:
     before, value = spot.cursor.before, spot.guide.value(path)
     if match := _FILL.search(before):
-        yield from (Item(name, "variable", name, len(match[1]), about) for name, about in fills(spot).items())
+        yield from (CompletionItem(name, "variable", name, len(match[1]), about) for name, about in fills(spot).items())
         return
     if spot.document.is_mission and (match := _VARIABLE.search(before)):
-        yield from (Item(name, "variable", name, len(match[1]), about) for name, about in variables(spot).items())
+        yield from (
+            CompletionItem(name, "variable", name, len(match[1]), about) for name, about in variables(spot).items()
+        )
         return
     if match := _QUANTITY.fullmatch(before):
         if value.dimension:
@@ -113,21 +115,21 @@ def _of_value(spot: Spot, path: tuple[str | int, ...]) -> Iterator[Item]:
     replaces = len(before) - len(before.rstrip(_WORD_CHARACTERS))
     kind = value.names
     for name, about in (spot.known.of(kind, path) if kind else {}).items():
-        yield Item(name, "name", name, replaces, about)
+        yield CompletionItem(name, "name", name, replaces, about)
     if spot.document.is_mission and not kind and _is_expression(value):
-        yield from (Item(name, "name", name, replaces, about) for name, about in spot.known.of(PLACE).items())
+        yield from (CompletionItem(name, "name", name, replaces, about) for name, about in spot.known.of(PLACE).items())
     for word, about in value.words.items():
-        yield Item(word, "word", word, replaces, "", about)
+        yield CompletionItem(word, "word", word, replaces, "", about)
     if not before:
-        yield from (Item(sample, "word", sample, 0, "example") for sample in value.examples)
+        yield from (CompletionItem(sample, "word", sample, 0, "example") for sample in value.examples)
 
 
-def _is_expression(value: Value) -> bool:
+def _is_expression(value: GuidedValue) -> bool:
     """Tell whether places may be compared here."""
     return value.dimension is None and not value.words
 
 
-def _units(dimension: Dimension, match: re.Match[str]) -> Iterator[Item]:
+def _units(dimension: Dimension, match: re.Match[str]) -> Iterator[CompletionItem]:
     space = "" if match["space"] or match["unit"] else " "
     for unit in units_of(dimension):
-        yield Item(unit, "unit", f"{space}{unit}", len(match["unit"]), dimension.name)
+        yield CompletionItem(unit, "unit", f"{space}{unit}", len(match["unit"]), dimension.name)

@@ -11,8 +11,8 @@ from pygls.workspace import PositionCodec
 from pygls.workspace.position_codec import ServerTextPosition
 
 from rbxcompose.findings import Finding, Severity, Span
-from rbxcompose.lsp.completion import Item
-from rbxcompose.lsp.fixes import Action, Change
+from rbxcompose.lsp.completion import CompletionItem
+from rbxcompose.lsp.fixes import CodeAction, TextChange
 
 SOURCE = "rbxcompose"
 _SEVERITIES = {
@@ -82,7 +82,7 @@ class Converter:
             related_information=related,
         )
 
-    def item(self, text: str, place: tuple[int, int], number: int, item: Item) -> types.CompletionItem:
+    def item(self, text: str, place: tuple[int, int], number: int, item: CompletionItem) -> types.CompletionItem:
         """Return a proposal at a place of a text; `number` is its turn."""
         line, column = place
         edit = types.TextEdit(self.range(text, (line, column - item.replaces), place), item.text)
@@ -96,7 +96,7 @@ class Converter:
             text_edit=edit,
         )
 
-    def action(self, action: Action) -> types.CodeAction:
+    def action(self, action: CodeAction) -> types.CodeAction:
         """Return a fix."""
         changes = {self.uri(path): [self._edit(path, change)] for path, change in action.changes.items()}
         path = Path(action.finding.span.file).resolve() if action.finding.span else None
@@ -108,5 +108,5 @@ class Converter:
             edit=types.WorkspaceEdit(changes=changes),
         )
 
-    def _edit(self, path: Path, change: Change) -> types.TextEdit:
+    def _edit(self, path: Path, change: TextChange) -> types.TextEdit:
         return types.TextEdit(self.range(self.text(path), change.start, change.end), change.text)

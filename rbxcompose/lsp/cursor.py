@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from rbxcompose.lsp.quick import LARGE, near, quick_tree
 from rbxcompose.manifest.garbage_collection import paused_collection
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, Sequence, at
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
 
 MARK = "\ue000"  # a character for private use, so that it stands in no manifest
 _TOKEN_BEHIND = re.compile(r"[^\s:,\[\]{}#]*")
@@ -31,8 +31,8 @@ class Cursor:
     the map. `begins_item` tells that the key is the first of a list's item, so that it may become a plain word as well.
     """
 
-    root: Mapping
-    path: Path
+    root: MappingNode
+    path: KeyPath
     before: str
     after: str
     is_key: bool
@@ -41,10 +41,10 @@ class Cursor:
     siblings: frozenset[str] = frozenset()
 
     @property
-    def around(self) -> Mapping:
+    def around(self) -> MappingNode:
         """Return the tree without the key that is being written."""
         tree = _without_key(self.root, self.path, self.text) if self.is_key else self.root
-        return tree if isinstance(tree, Mapping) else self.root
+        return tree if isinstance(tree, MappingNode) else self.root
 
     @property
     def text(self) -> str:
@@ -52,7 +52,7 @@ class Cursor:
         return self.before + self.after
 
     @property
-    def place(self) -> Path:
+    def place(self) -> KeyPath:
         """Return the path of what is meant: for a key, that of its value."""
         return (*self.path, self.text) if self.is_key else self.path
 
@@ -70,19 +70,19 @@ def locate(text: str, line: int, column: int) -> Cursor | None:
         around = near(lines, line) if len(lines) > LARGE and "&" not in text else lines
         for candidate in _candidates(around, line, before, after):
             tree = quick_tree(candidate)
-            if isinstance(tree, Mapping) and (found := _marked(tree, (), set())):
+            if isinstance(tree, MappingNode) and (found := _marked(tree, (), set())):
                 return _cursor(tree, *found, before, after)
     return None
 
 
-def _cursor(tree: Mapping, path: Path, scalar: Scalar, is_key: bool, before: str, after: str) -> Cursor:
+def _cursor(tree: MappingNode, path: KeyPath, scalar: ScalarNode, is_key: bool, before: str, after: str) -> Cursor:
     start, _, end = scalar.text.partition(MARK)
     above = at(tree, path)
-    others = above.entries if is_key and isinstance(above, Mapping) else {}
+    others = above.entries if is_key and isinstance(above, MappingNode) else {}
     root = _without_mark(tree, path)
     begins = before.lstrip(" ").startswith("-") and _BEGINS_NODE.fullmatch(before) is not None
     return Cursor(
-        root if isinstance(root, Mapping) else tree,
+        root if isinstance(root, MappingNode) else tree,
         path,
         start,
         end,
@@ -93,34 +93,34 @@ def _cursor(tree: Mapping, path: Path, scalar: Scalar, is_key: bool, before: str
     )
 
 
-def _without_key(node: Node, path: Path, key: str) -> Node:
+def _without_key(node: TreeNode, path: KeyPath, key: str) -> TreeNode:
     """Return a tree without the key `key` of the map at `path`."""
     match node:
-        case Sequence(items=items) if path:
+        case SequenceNode(items=items) if path:
             changed = (_without_key(one, path[1:], key) if index == path[0] else one for index, one in enumerate(items))
             return replace(node, items=tuple(changed))
-        case Mapping(entries=entries) if path:
+        case MappingNode(entries=entries) if path:
             entry = entries[str(path[0])]
             inner = replace(entry, value=_without_key(entry.value, path[1:], key))
             return replace(node, entries={**entries, str(path[0]): inner})
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             return replace(node, entries={name: entry for name, entry in entries.items() if name != key})
     return node
 
 
-def _without_mark(node: Node, path: Path) -> Node:
+def _without_mark(node: TreeNode, path: KeyPath) -> TreeNode:
     """Return the tree of the text as if the mark had never been in the scalar; `path` leads towards that."""
     match node:
-        case Scalar(text=text):
+        case ScalarNode(text=text):
             return replace(node, text=text.replace(MARK, ""))
-        case Sequence(items=items) if path:
+        case SequenceNode(items=items) if path:
             cleaned = (_without_mark(item, path[1:]) if index == path[0] else item for index, item in enumerate(items))
             return replace(node, items=tuple(cleaned))
-        case Mapping(entries=entries) if path:
+        case MappingNode(entries=entries) if path:
             entry = entries[str(path[0])]
             inner = replace(entry, value=_without_mark(entry.value, path[1:]))
             return replace(node, entries={**entries, str(path[0]): inner})
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             renamed: dict[str, Entry] = {}
             for name, entry in entries.items():
                 own = name.replace(MARK, "")
@@ -165,14 +165,14 @@ def _closing(before: str) -> str:
     return "".join(reversed(waiting))
 
 
-def _marked(node: Node, path: Path, seen: set[int]) -> tuple[Path, Scalar, bool] | None:
+def _marked(node: TreeNode, path: KeyPath, seen: set[int]) -> tuple[KeyPath, ScalarNode, bool] | None:
     """Return the path, the scalar with the mark in it, and whether that is a key; what aliases repeat is seen once."""
-    if isinstance(node, Scalar):
+    if isinstance(node, ScalarNode):
         return (path, node, False) if MARK in node.text else None
     if id(node) in seen:
         return None
     seen.add(id(node))
-    if isinstance(node, Sequence):
+    if isinstance(node, SequenceNode):
         found = (_marked(item, (*path, index), seen) for index, item in enumerate(node.items))
         return next((one for one in found if one), None)
     for name, entry in node.entries.items():

@@ -10,7 +10,7 @@ from rbxcompose.lsp.names import SKILL, named_by_key
 from rbxcompose.lsp.variables import variable_span
 from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.registry import naming
-from rbxcompose.manifest.tree import Path, at, key_span
+from rbxcompose.manifest.tree import KeyPath, at, key_span
 from rbxcompose.references import COMPONENT, FILE, PLACE, PORT, RUNNING
 from rbxcompose.sections.args import args
 
@@ -71,7 +71,7 @@ def _of_kind(spot: Spot, kind: str, word: str) -> Span | None:
     return next((span for path in paths if (span := _own(spot, path))), None)
 
 
-def _own(spot: Spot, path: Path) -> Span | None:
+def _own(spot: Spot, path: KeyPath) -> Span | None:
     """Return the place of an entry: in the text itself, else in the composed robot."""
     if not spot.document.is_mission and at(spot.cursor.root, path) is not None:
         return key_span(spot.cursor.root, path)
@@ -88,4 +88,4 @@ def _skill(spot: Spot, word: str) -> Span | None:
     if robot is None or source is None:
         return None
     ends = (end for end in robot.ends if end.port.kind in _SERVING and end.topic == source.topic)
-    return next((robot.part_span(end.instance) for end in ends), None)
+    return next((robot.component_span(end.instance) for end in ends), None)

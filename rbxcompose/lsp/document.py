@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rbxcompose.lsp.cursor import Cursor, locate
-from rbxcompose.lsp.names import Known
+from rbxcompose.lsp.names import KnownNames
 from rbxcompose.lsp.project import MISSION, OVERLAY, kind_of
 from rbxcompose.model.robot import Robot
 from rbxcompose.schema.documents import MAKERS, installed_schema
@@ -44,7 +44,7 @@ class Document:
         cursor = locate(self.text, line, column)
         if cursor is None:
             return None
-        known = Known(self.path, cursor.root, self.robot)
+        known = KnownNames(self.path, cursor.root, self.robot)
         return Spot(self, cursor, known, Guide(installed_schema(self.kind), cursor.root, known.types))
 
 
@@ -54,5 +54,5 @@ class Spot:
 
     document: Document
     cursor: Cursor
-    known: Known
+    known: KnownNames
     guide: Guide

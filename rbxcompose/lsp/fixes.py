@@ -12,7 +12,7 @@ from rbxcompose.lsp.project import Project
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class TextChange:
     """A text that is written in the place of what stands between two positions (line, column, from 0)."""
 
     start: tuple[int, int]
@@ -21,16 +21,16 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Action:
+class CodeAction:
     """What an editor offers to do about a finding."""
 
     title: str
     finding: Finding
     is_safe: bool
-    changes: dict[Path, Change]
+    changes: dict[Path, TextChange]
 
 
-def actions(project: Project, findings: Iterable[Finding], first: int, last: int) -> Iterator[Action]:
+def actions(project: Project, findings: Iterable[Finding], first: int, last: int) -> Iterator[CodeAction]:
     """Yield the fixes of the findings that stand on the lines `first` to `last` (from 0)."""
     for finding in findings:
         span, fix = finding.span, finding.fix
@@ -41,21 +41,21 @@ def actions(project: Project, findings: Iterable[Finding], first: int, last: int
         after = apply([fix], texts).texts
         changes = {files[file]: change_of(texts[file], after[file]) for file in files if texts[file] != after[file]}
         if changes:
-            yield Action(fix.title, finding, fix.is_safe, changes)
+            yield CodeAction(fix.title, finding, fix.is_safe, changes)
 
 
 def _meets(span: Span, first: int, last: int) -> bool:
     return span.line - 1 <= last and span.end_line - 1 >= first
 
 
-def change_of(before: str, after: str) -> Change:
+def change_of(before: str, after: str) -> TextChange:
     """Return the one change that makes `after` of `before`, as small as it can be."""
     shortest = min(len(before), len(after))
     start = next((index for index in range(shortest) if before[index] != after[index]), shortest)
     most = shortest - start
     tail = next((size for size in range(most) if before[-1 - size] != after[-1 - size]), most)
     end = len(before) - tail
-    return Change(_position(before, start), _position(before, end), after[start : len(after) - tail])
+    return TextChange(_position(before, start), _position(before, end), after[start : len(after) - tail])
 
 
 def _position(text: str, offset: int) -> tuple[int, int]:

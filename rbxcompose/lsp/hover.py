@@ -8,7 +8,7 @@ from rbxcompose.lsp.definition import word_at
 from rbxcompose.lsp.document import Document, Spot
 from rbxcompose.lsp.names import SKILL, below_profile
 from rbxcompose.lsp.variables import fills, variables
-from rbxcompose.manifest.tree import BROKEN, Path, Scalar, at
+from rbxcompose.manifest.tree import BROKEN, KeyPath, ScalarNode, at
 from rbxcompose.model.robot import Robot
 from rbxcompose.references import PLACE
 from rbxcompose.units import Quantity, format_quantity
@@ -57,7 +57,7 @@ def _type(spot: Spot) -> str:
     """Return what the type of the entry is whose name stands at the position."""
     place = (*spot.cursor.place, "type")
     word = at(spot.cursor.root, place)
-    return spot.guide.value(place).words.get(word.text, "") if isinstance(word, Scalar) else ""
+    return spot.guide.value(place).words.get(word.text, "") if isinstance(word, ScalarNode) else ""
 
 
 def _value(spot: Spot) -> str:
@@ -67,15 +67,15 @@ def _value(spot: Spot) -> str:
         return ""
     path = below_profile(spot.cursor.place)
     node = at(robot.manifest.root, path)
-    if not isinstance(node, Scalar) or node.filled is BROKEN or not node.text:
+    if not isinstance(node, ScalarNode) or node.filled is BROKEN or not node.text:
         return ""
     filled = node.filled
     shown = format_quantity(filled.value, filled.dimension) if isinstance(filled, Quantity) else filled
     return f"`{node.text}`{'' if filled is None else f' = `{shown}`'} from {node.span}{''.join(_lost(robot, path))}"
 
 
-def _lost(robot: Robot, path: Path) -> Iterator[str]:
+def _lost(robot: Robot, path: KeyPath) -> Iterator[str]:
     """Yield the values that a later layer has replaced, the last one first."""
     for step in reversed(robot.manifest.history.of(path)[:-1]):
-        if isinstance(step.node, Scalar):
+        if isinstance(step.node, ScalarNode):
             yield f"; {step.layer} had `{step.node.text}` ({step.node.span})"

@@ -11,8 +11,7 @@ from rbxcompose.manifest.options import OWN_PORT
 from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.registry import naming, section_named
 from rbxcompose.manifest.shapes import kind_of_keys
-from rbxcompose.manifest.tree import Mapping, Scalar, at
-from rbxcompose.manifest.tree import Path as TreePath
+from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, at
 from rbxcompose.model.robot import Robot
 from rbxcompose.references import COMPONENT, PORT, RUNNING, VALUE
 from rbxcompose.sections.args import args
@@ -23,12 +22,12 @@ from rbxcompose.sections.profiles import profiles
 SKILL = "skill"
 
 
-def below_profile(path: TreePath) -> TreePath:
+def below_profile(path: KeyPath) -> KeyPath:
     """Return a path as it is in the robot that a profile changes."""
     return path[2:] if path[:1] == (profiles.name,) else path
 
 
-def named_by_key(path: TreePath, is_overlay: bool) -> str:
+def named_by_key(path: KeyPath, is_overlay: bool) -> str:
     """Return of what the keys of the map at `path` are names that exist, or nothing."""
     below = below_profile(path)
     section = section_named(below[0]) if below else None
@@ -41,14 +40,14 @@ def named_by_key(path: TreePath, is_overlay: bool) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class KnownNames:
     """The names of a robot as it was last read, and those of the file that is being typed, each with a few words."""
 
     path: Path
-    root: Mapping
+    root: MappingNode
     robot: Robot | None
 
-    def of(self, kind: str, path: TreePath = ()) -> dict[str, str]:
+    def of(self, kind: str, path: KeyPath = ()) -> dict[str, str]:
         """Return the names of a kind with what each is; `path` is where one of them is to stand."""
         special: dict[str, Callable[[], dict[str, str]]] = {
             PORT: lambda: {**self._in_text(COMPONENT), **dict(self._ports())},
@@ -71,7 +70,7 @@ class Known:
         found: dict[str, str] = {}
         for section in naming(kind):
             named = at(self.root, (section.name, *section.at))
-            if isinstance(named, Mapping):
+            if isinstance(named, MappingNode):
                 found |= {name: _about(named, name) for name in named.entries if name.isidentifier()}
         return found
 
@@ -84,7 +83,7 @@ class Known:
         return {name: words for one in naming(kind) for name, words in one.described(contents).items()}
 
     def _parts(self) -> dict[str, str]:
-        return {name: part.type_name for name, part in self.robot.parts.items()} if self.robot else {}
+        return {name: component.type_name for name, component in self.robot.components.items()} if self.robot else {}
 
     def _ports(self) -> Iterator[tuple[str, str]]:
         for end in self.robot.ends if self.robot else ():
@@ -92,7 +91,7 @@ class Known:
                 yield f"{end.instance}.{end.name}", f"{end.port.kind}: {end.type_name} on {end.topic}"
 
     def _own_ports(self, component: str) -> Iterator[tuple[str, str]]:
-        part = self.robot.parts.get(component) if self.robot else None
+        part = self.robot.components.get(component) if self.robot else None
         for end in part.ends if part else ():
             yield end.name, f"{end.port.kind}: {end.type_name} on {end.topic}"
 
@@ -106,12 +105,12 @@ class Known:
     def _part_arguments(self, instance: str) -> dict[str, str]:
         """Return the arguments of the part that an instance is of."""
         written = at(self.root, (include.name, instance, "part"))
-        path = resolve(written.text, self.path, written.span) if isinstance(written, Scalar) else None
+        path = resolve(written.text, self.path, written.span) if isinstance(written, ScalarNode) else None
         part = read_file(path, str(path), {})[0] if isinstance(path, Path) else None
-        named = part.get(args.name) if isinstance(part, Mapping) else None
-        return {name: _about(named, name) for name in named.entries} if isinstance(named, Mapping) else {}
+        named = part.get(args.name) if isinstance(part, MappingNode) else None
+        return {name: _about(named, name) for name in named.entries} if isinstance(named, MappingNode) else {}
 
 
-def _about(named: Mapping, name: str) -> str:
+def _about(named: MappingNode, name: str) -> str:
     word = at(named, (name, "type"))
-    return word.text if isinstance(word, Scalar) else ""
+    return word.text if isinstance(word, ScalarNode) else ""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from rbxcompose.lsp.project import Found, OutdatedError, Project
+from rbxcompose.lsp.project import FoundByFile, OutdatedError, Project
 from rbxcompose.schema.documents import MAKERS, installed_schema
 
 PAUSE = 0.1  # [s] without a key stroke before robots are compiled anew
@@ -21,7 +21,7 @@ class Newest:
     `told` is always of the newest texts. All methods belong to the thread of the event loop.
     """
 
-    def __init__(self, project: Project, told: Callable[[Found], None]) -> None:
+    def __init__(self, project: Project, told: Callable[[FoundByFile], None]) -> None:
         self.project = project
         self._told = told
         self._waiting: dict[Path, str | None] = {}

@@ -21,7 +21,7 @@ _HEADER = re.compile(r"^rbx:", re.MULTILINE)
 _MOST_ROBOTS = 200  # of one project, that are looked at
 _BEGINNING = 4_000  # characters in which the header of a manifest stands
 
-Found = dict[Path, list[Finding]]
+FoundByFile = dict[Path, list[Finding]]
 
 
 class OutdatedError(Exception):
@@ -51,7 +51,7 @@ class Project:
     unsaved: dict[Path, str] = field(default_factory=dict)
     is_outdated: Callable[[], bool] = lambda: False
     _watched: dict[Path, _Watched] = field(default_factory=dict)
-    _alone: Found = field(default_factory=dict)  # findings in files that belong to no robot
+    _alone: FoundByFile = field(default_factory=dict)  # findings in files that belong to no robot
 
     def copy(self, is_outdated: Callable[[], bool]) -> Project:
         """Return a project that can change without this one; it raises `OutdatedError` once it is outdated."""
@@ -69,7 +69,7 @@ class Project:
         read_file(path, str(path), sources)
         return sources.get(str(path), "")
 
-    def change(self, path: Path, text: str | None) -> Found:
+    def change(self, path: Path, text: str | None) -> FoundByFile:
         """Take a new text (None: the saved one counts again) and return the findings of all files concerned.
 
         A file without findings has an empty list, so that what was shown of it can be taken away.
@@ -90,7 +90,7 @@ class Project:
         after = {file for robot in robots for file in self._watched[robot].files}
         return {file: self.findings(file) for file in sorted({path} | before | after)}
 
-    def change_all(self, texts: Mapping[Path, str | None]) -> Found:
+    def change_all(self, texts: Mapping[Path, str | None]) -> FoundByFile:
         """Take several new texts, as `change` takes one.
 
         Raises:

@@ -9,7 +9,7 @@ from itertools import pairwise
 import yaml
 
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.yaml_nodes import compose
 
 LARGE = 300  # lines; of longer manifests only what is near the position is read
@@ -19,7 +19,7 @@ _SECTION = re.compile(r"[A-Za-z_\"']")
 _ENTRY = re.compile(r"( +)[^\s#]")
 
 
-def quick_tree(text: str) -> Node | None:
+def quick_tree(text: str) -> TreeNode | None:
     """Return the tree of a text, None if it is no YAML; spans have no file, a key that is written twice counts last.
 
     What an alias repeats is the same object again; one that leads back to what it lies in is an empty map.
@@ -28,30 +28,30 @@ def quick_tree(text: str) -> Node | None:
     return None if root is None else _node(root, {})
 
 
-def _node(node: yaml.Node, done: dict[int, Node]) -> Node:
+def _node(node: yaml.Node, done: dict[int, TreeNode]) -> TreeNode:
     start, end = node.start_mark, node.end_mark
     span = Span("", start.line + 1, start.column + 1, end.line + 1, end.column + 1)
     if isinstance(node, yaml.ScalarNode):
-        return Scalar(node.value, span, not node.style)
+        return ScalarNode(node.value, span, not node.style)
     if id(node) in done:
         return done[id(node)]
-    done[id(node)] = Mapping({}, span)
+    done[id(node)] = MappingNode({}, span)
     if isinstance(node, yaml.SequenceNode):
-        made: Node = Sequence(tuple(_node(item, done) for item in node.value), span)
+        made: TreeNode = SequenceNode(tuple(_node(item, done) for item in node.value), span)
     else:
-        made = Mapping(_entries(node.value, done), span)
+        made = MappingNode(_entries(node.value, done), span)
     done[id(node)] = made
     return made
 
 
-def _entries(pairs: list[tuple[yaml.Node, yaml.Node]], done: dict[int, Node]) -> dict[str, Entry]:
+def _entries(pairs: list[tuple[yaml.Node, yaml.Node]], done: dict[int, TreeNode]) -> dict[str, Entry]:
     own: dict[str, Entry] = {}
     merged: dict[str, Entry] = {}
     for key_node, value_node in pairs:
         key, value = _node(key_node, done), _node(value_node, done)
-        if isinstance(key, Scalar) and key.text == _MERGE and key.plain and isinstance(value, Mapping):
+        if isinstance(key, ScalarNode) and key.text == _MERGE and key.plain and isinstance(value, MappingNode):
             merged |= value.entries
-        elif isinstance(key, Scalar):
+        elif isinstance(key, ScalarNode):
             own[key.text] = Entry(key, value)
     return {**merged, **own}
 

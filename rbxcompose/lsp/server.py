@@ -17,7 +17,7 @@ from rbxcompose.lsp.document import Document
 from rbxcompose.lsp.fixes import actions
 from rbxcompose.lsp.hover import describe
 from rbxcompose.lsp.newest import PAUSE, Newest
-from rbxcompose.lsp.project import Found, Project
+from rbxcompose.lsp.project import FoundByFile, Project
 
 P = TypeVar("P")
 R = TypeVar("R")
@@ -70,7 +70,7 @@ class Session:
         """Let the thread end."""
         self.newest.close()
 
-    def _publish(self, found: Found) -> None:
+    def _publish(self, found: FoundByFile) -> None:
         for file, findings in found.items():
             shown = [self.convert.diagnostic(file, finding) for finding in findings]
             uri = self.convert.uri(file)

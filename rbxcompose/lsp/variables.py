@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span
 from rbxcompose.lsp.document import Spot
-from rbxcompose.manifest.tree import Mapping, Scalar, at, key_span
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, at, key_span
 from rbxcompose.missions.analysis.scope_types import base_names, views
 from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.program.program import Program
@@ -43,7 +43,7 @@ def variable_span(spot: Spot, name: str) -> Span | None:
             return key_span(root, (section, name))
     for length in range(len(spot.cursor.path), -1, -1):
         word = at(root, (*spot.cursor.path[:length], "for"))
-        if isinstance(word, Scalar) and word.text == name:
+        if isinstance(word, ScalarNode) and word.text == name:
             return word.span
     if robot is not None and name in robot.manifest.values:
         return key_span(robot.manifest.root, ("values", name))
@@ -57,12 +57,12 @@ def _program(spot: Spot) -> Program | None:
     return next((one.program for one in missions if entries[one.name].path == path), None)
 
 
-def _declared(spot: Spot, root: Mapping, section: str) -> Iterator[tuple[str, str]]:
+def _declared(spot: Spot, root: MappingNode, section: str) -> Iterator[tuple[str, str]]:
     named, program = root.get(section), _program(spot)
-    for name in named.entries if isinstance(named, Mapping) else ():
+    for name in named.entries if isinstance(named, MappingNode) else ():
         known = base_names(program, spot.known.robot.names).get(name) if program and spot.known.robot else None
-        word = at(named, (name, "type")) if isinstance(named, Mapping) else None
-        yield name, known.phrase if known else word.text if isinstance(word, Scalar) else UNKNOWN.phrase
+        word = at(named, (name, "type")) if isinstance(named, MappingNode) else None
+        yield name, known.phrase if known else word.text if isinstance(word, ScalarNode) else UNKNOWN.phrase
 
 
 def _items(spot: Spot) -> Iterator[tuple[str, str]]:
@@ -75,5 +75,5 @@ def _items(spot: Spot) -> Iterator[tuple[str, str]]:
                 types[item] = view.scope.names[item].phrase
     for length in range(len(spot.cursor.path) + 1):
         word = at(spot.cursor.root, (*spot.cursor.path[:length], "for"))
-        if isinstance(word, Scalar):
+        if isinstance(word, ScalarNode):
             yield word.text, types.get(word.text, UNKNOWN.phrase)

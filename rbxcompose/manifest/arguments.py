@@ -11,7 +11,7 @@ from rbxcompose.config import Config, Secret
 from rbxcompose.expressions.types import TYPES, Type, TypeKind, choice_of
 from rbxcompose.findings import Report
 from rbxcompose.manifest.scalars import describe
-from rbxcompose.manifest.tree import BROKEN, Mapping, Node, Path, Scalar, Sequence, key_span
+from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, key_span
 from rbxcompose.manifest.validate import (
     MISSING_KEY,
     NOT_A_CHOICE,
@@ -46,16 +46,16 @@ class ArgumentModel(Config):
 
 
 @dataclass(frozen=True, slots=True)
-class Argument:
+class DeclaredArgument:
     """A declared argument: what a value of it must be."""
 
     name: str
     type: Type
-    default: Node | None
+    default: TreeNode | None
     least: object = None
     most: object = None
 
-    def read(self, node: Node, report: Report) -> object:
+    def read(self, node: TreeNode, report: Report) -> object:
         """Return the typed value of a node, `BROKEN` after a finding: see `read_value`."""
         value = read_value(node, self.type, self.name, report)
         for words, bound, sign in (("at least", self.least, 1), ("at most", self.most, -1)):
@@ -66,10 +66,10 @@ class Argument:
         return value
 
 
-def read_argument(name: str, node: Node, path: Path, report: Report) -> Argument | None:
+def read_argument(name: str, node: TreeNode, path: KeyPath, report: Report) -> DeclaredArgument | None:
     """Return the declaration of an argument that stands at `path`, or None after its findings."""
     model = validate(ArgumentModel, node, path, report)
-    if model is None or not isinstance(node, Mapping):
+    if model is None or not isinstance(node, MappingNode):
         return None
     declared = _type(model, node, path, report)
     if declared is None:
@@ -81,10 +81,10 @@ def read_argument(name: str, node: Node, path: Path, report: Report) -> Argument
                 report.add(WRONG_TYPE.at(key_span(node, (key,)), f"'{key}' has no meaning for {declared.phrase}"))
                 continue
             bounds[key] = read_value(bound, declared, key, report)
-    return Argument(name, declared, node.get("default"), bounds.get("min"), bounds.get("max"))
+    return DeclaredArgument(name, declared, node.get("default"), bounds.get("min"), bounds.get("max"))
 
 
-def _type(model: ArgumentModel, node: Mapping, path: Path, report: Report) -> Type | None:
+def _type(model: ArgumentModel, node: MappingNode, path: KeyPath, report: Report) -> Type | None:
     written = node.get("type")
     if model.type == CHOICE:
         if model.choices:
@@ -98,13 +98,13 @@ def _type(model: ArgumentModel, node: Mapping, path: Path, report: Report) -> Ty
     return None
 
 
-def read_value(node: Node, expected: Type, name: str, report: Report) -> object:
+def read_value(node: TreeNode, expected: Type, name: str, report: Report) -> object:
     """Return a node as a value of the type `expected`, `BROKEN` after a finding.
 
     Quantities for dimensions, float for `number`, int for `count`, text for words, names and places, bool for flags,
     the node itself for lists, maps and poses that are written out.
     """
-    if isinstance(node, Scalar) and node.filled is BROKEN:
+    if isinstance(node, ScalarNode) and node.filled is BROKEN:
         return BROKEN
     if expected.dimension and expected.dimension != NUMBER:
         return _quantity(node, expected.dimension, name, report)
@@ -117,18 +117,18 @@ def read_value(node: Node, expected: Type, name: str, report: Report) -> object:
             read = value
         case TypeKind.FLAG if isinstance(value, bool):
             read = value
-        case TypeKind.TEXT if isinstance(node, Scalar) and value is not None:
+        case TypeKind.TEXT if isinstance(node, ScalarNode) and value is not None:
             read = node.text if node.filled is None else value if isinstance(value, Secret) else show(value)
-        case TypeKind.CHOICE if isinstance(node, Scalar):
+        case TypeKind.CHOICE if isinstance(node, ScalarNode):
             read = node.text if node.filled is None else value
             if read not in expected.choices:
                 report.add(not_a_choice(node.span, name, node, list(expected.choices)))
                 return BROKEN
         case TypeKind.PLACE | TypeKind.POSE if isinstance(value, str):
             read = value
-        case TypeKind.POSE | TypeKind.MAP if isinstance(node, Mapping):
+        case TypeKind.POSE | TypeKind.MAP if isinstance(node, MappingNode):
             read = node
-        case TypeKind.LIST if isinstance(node, Sequence):
+        case TypeKind.LIST if isinstance(node, SequenceNode):
             read = node
     if read is None:
         must_be = {TypeKind.COUNT: "a whole number, not below 0", TypeKind.FLAG: "true or false"}
@@ -138,7 +138,7 @@ def read_value(node: Node, expected: Type, name: str, report: Report) -> object:
     return read
 
 
-def _quantity(node: Node, dimension: Dimension, name: str, report: Report) -> object:
+def _quantity(node: TreeNode, dimension: Dimension, name: str, report: Report) -> object:
     try:
         return Quantity(to_si(to_plain(node), dimension), dimension)
     except UnitError as error:

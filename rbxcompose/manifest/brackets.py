@@ -5,17 +5,17 @@ from __future__ import annotations
 import re
 
 from rbxcompose.findings import Fix, replacement
-from rbxcompose.manifest.tree import Node, Scalar
+from rbxcompose.manifest.tree import ScalarNode, TreeNode
 
 _ITEM = re.compile(r"\s*+([A-Za-z0-9_.$+-]++(?: [A-Za-z0-9_.%/]++)?)\s*+")  # a word, a name, a number with its unit
 
 
-def without_brackets(node: Node | None) -> list[tuple[str, int]]:
+def without_brackets(node: TreeNode | None) -> list[tuple[str, int]]:
     """Return the items, with their offsets, of a text that lacks but the brackets of a list; nothing of any other.
 
     Round brackets in their place are taken as well.
     """
-    if not isinstance(node, Scalar) or not node.plain or node.filled is not None or not node.text:
+    if not isinstance(node, ScalarNode) or not node.plain or node.filled is not None or not node.text:
         return []
     start, end = (1, -1) if node.text[0] == "(" and node.text[-1] == ")" else (0, None)
     pieces = node.text[start:end].split(",")
@@ -29,7 +29,7 @@ def without_brackets(node: Node | None) -> list[tuple[str, int]]:
     return found
 
 
-def bracketed(node: Scalar) -> tuple[str, Fix]:
+def bracketed(node: ScalarNode) -> tuple[str, Fix]:
     """Return the help for a text that lacks the brackets of a list, and its fix."""
     meant = f"[{', '.join(text for text, _ in without_brackets(node))}]"
     return f"a list has brackets: write '{meant}'", replacement(node.span, node.text, meant)

@@ -7,11 +7,11 @@ from typing import Any
 
 from pydantic_core import ErrorDetails
 
-from rbxcompose.manifest.tree import Node, Path, Scalar, at
+from rbxcompose.manifest.tree import KeyPath, ScalarNode, TreeNode, at
 from rbxcompose.units import Quantity, format_quantity
 
 
-def repaired(data: Any, error: ErrorDetails, node: Node) -> Any:
+def repaired(data: Any, error: ErrorDetails, node: TreeNode) -> Any:
     """Return `data` with what a strict field takes and YAML cannot write: text for a number, a tuple for a list."""
     convert = _REPAIRS.get(error["type"])
     if convert is None:
@@ -22,7 +22,7 @@ def repaired(data: Any, error: ErrorDetails, node: Node) -> Any:
         return data
 
 
-def changed(data: Any, path: Path, convert: Callable[[object], object]) -> Any:
+def changed(data: Any, path: KeyPath, convert: Callable[[object], object]) -> Any:
     """Return `data` with the value at `path` converted; the same object if the value stays the same."""
     if not path:
         return convert(data)
@@ -35,16 +35,16 @@ def changed(data: Any, path: Path, convert: Callable[[object], object]) -> Any:
     return type(data)(inner if index == key else item for index, item in enumerate(data))
 
 
-def _as_text(value: object, node: Node | None) -> object:
+def _as_text(value: object, node: TreeNode | None) -> object:
     if isinstance(value, Quantity):
         return format_quantity(value.value, value.dimension)
-    if isinstance(node, Scalar) and node.filled is None and value is not None:
+    if isinstance(node, ScalarNode) and node.filled is None and value is not None:
         return node.text
     return str(value) if isinstance(value, int | float) else value
 
 
-def _as_tuple(value: object, _node: Node | None) -> object:
+def _as_tuple(value: object, _node: TreeNode | None) -> object:
     return tuple(value) if isinstance(value, list) else value
 
 
-_REPAIRS: dict[str, Callable[[object, Node | None], object]] = {"string_type": _as_text, "tuple_type": _as_tuple}
+_REPAIRS: dict[str, Callable[[object, TreeNode | None], object]] = {"string_type": _as_text, "tuple_type": _as_tuple}

@@ -9,9 +9,9 @@ from typing import Any
 
 from rbxcompose.findings import Finding, Related, Report, Span, kind
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.reader import read_file
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.manifest.validate import validate
 
 OTHER_KIND = kind(
@@ -43,7 +43,7 @@ class Documents:
     sources: dict[str, str]
     files: dict[str, Path] = field(default_factory=dict)
 
-    def read(self, file: Path, wanted: str, span: Span | None = None) -> Mapping | None:
+    def read(self, file: Path, wanted: str, span: Span | None = None) -> MappingNode | None:
         """Return the tree of a manifest of the kind that is wanted, or None after findings.
 
         `span` is the place that names the file, for what is wrong with it as a whole.
@@ -58,27 +58,27 @@ class Documents:
             related = (Related(span, f"this needs a {wanted}"),) if span else ()
             self.report.add(changed(finding, related=(*finding.related, *related)))
             return None
-        return root if isinstance(root, Mapping) else None
+        return root if isinstance(root, MappingNode) else None
 
     def writer(self, span: Span, robot: Path) -> Path:
         """Return the file that a value was written in; the robot's for one of the command line."""
         return self.files.get(span.file, robot)
 
-    def check(self, model: type[Header], root: Mapping) -> None:
+    def check(self, model: type[ManifestHeader], root: MappingNode) -> None:
         """Add what is wrong with the keys of a whole file; what a section holds is looked at where it is read."""
         anything = {name for name, field in model.model_fields.items() if field.annotation is Any}
         keys = {
-            name: Entry(entry.key, Scalar("", entry.value.span)) if name in anything else entry
+            name: Entry(entry.key, ScalarNode("", entry.value.span)) if name in anything else entry
             for name, entry in root.entries.items()
         }
         validate(model, changed(root, entries=keys), (), self.report)
 
 
-def _trouble(root: Node, wanted: str) -> Finding | None:
+def _trouble(root: TreeNode, wanted: str) -> Finding | None:
     """Return why a document is not of the kind that is wanted."""
-    if not isinstance(root, Mapping):
+    if not isinstance(root, MappingNode):
         return OTHER_KIND.at(root.span, "a manifest is a map that begins with 'rbx: 1' and 'kind:'")
     written = root.get("kind")
-    if not isinstance(written, Scalar) or written.text == wanted:
+    if not isinstance(written, ScalarNode) or written.text == wanted:
         return None
     return OTHER_KIND.misspelt(written.span, f"this is no {wanted}", written.text, [wanted], "what is needed")

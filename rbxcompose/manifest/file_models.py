@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field, create_model
 
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
 
@@ -18,17 +18,17 @@ FILES = {
 }
 
 
-def file_model(kind: str) -> type[Header]:
+def file_model(kind: str) -> type[ManifestHeader]:
     """Return the keys of a robot's, part's or overlay's file, with anything in each section."""
     return _model(kind, tuple((one.name, one.doc) for one in sections(kind)))
 
 
 @cache
-def _model(kind: str, sections: tuple[tuple[str, str], ...]) -> type[Header]:
+def _model(kind: str, sections: tuple[tuple[str, str], ...]) -> type[ManifestHeader]:
     fields: dict[str, Any] = {name: (Any, Field(None, description=doc)) for name, doc in sections}
-    return create_model(f"{kind}File", __base__=Header, __doc__=FILES[kind], **fields)
+    return create_model(f"{kind}File", __base__=ManifestHeader, __doc__=FILES[kind], **fields)
 
 
 def robot_keys() -> list[str]:
     """Return the keys of a robot's file, its header's first."""
-    return [*Header.model_fields, *(one.name for one in sections(ROBOT))]
+    return [*ManifestHeader.model_fields, *(one.name for one in sections(ROBOT))]

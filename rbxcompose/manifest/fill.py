@@ -22,7 +22,7 @@ from rbxcompose.manifest.limits import ALL_BYTES
 from rbxcompose.manifest.scalar_parts import part_span
 from rbxcompose.manifest.scalars import describe
 from rbxcompose.manifest.secrets import NoSecretError
-from rbxcompose.manifest.tree import BROKEN, Entry, Node, Scalar, Sequence, size
+from rbxcompose.manifest.tree import BROKEN, Entry, ScalarNode, SequenceNode, TreeNode, size
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.printable import plain
@@ -147,7 +147,7 @@ _SECRET = re.compile(r"\s*secret\.(?P<name>[a-z][a-z0-9_]{0,59})\s*")
 _ENVIRONMENT = re.compile(r"\s*env\.(?P<name>[A-Za-z_][A-Za-z0-9_]*)(:(?P<mode>[-?])(?P<rest>.*))?\s*", re.DOTALL)
 
 
-def fill(root: tree.Mapping, names: Names, report: Report, *, runs: bool = False) -> tree.Mapping:
+def fill(root: tree.MappingNode, names: Names, report: Report, *, runs: bool = False) -> tree.MappingNode:
     """Return the tree with every `${...}` filled in; `runs` tells that `$name` has a meaning in it (missions).
 
     A scalar that is nothing but `${...}` holds the typed value in `filled`, or is the list or map that it names; one
@@ -167,23 +167,23 @@ class _Filler:
         self.known = names.known("")
         self.left = ALL_BYTES  # by which the tree may grow
 
-    def node(self, node: Node) -> Node:
+    def node(self, node: TreeNode) -> TreeNode:
         match node:
-            case Scalar():
+            case ScalarNode():
                 return self.scalar(node) if "$" in node.text else node
-            case Sequence(items=items):
+            case SequenceNode(items=items):
                 filled = tuple(map(self.node, items))
                 return node if all(map(is_, filled, items)) else replace(node, items=filled)
         return self.mapping(node)
 
-    def mapping(self, mapping: tree.Mapping) -> tree.Mapping:
+    def mapping(self, mapping: tree.MappingNode) -> tree.MappingNode:
         changed = {}
         for name, entry in mapping.entries.items():
             if (value := self.node(entry.value)) is not entry.value:
                 changed[name] = Entry(entry.key, value)
         return replace(mapping, entries={**mapping.entries, **changed}) if changed else mapping
 
-    def scalar(self, scalar: Scalar) -> Node:
+    def scalar(self, scalar: ScalarNode) -> TreeNode:
         if scalar.scope != self.scope:
             self.scope, self.known = scalar.scope, self.names.known(scalar.scope)
         pieces = list(_PIECE.finditer(scalar.text))
@@ -198,7 +198,7 @@ class _Filler:
                 broken = self.shown_secret(scalar, piece, "a secret cannot stand inside a text")
                 return replace(scalar, filled=broken)
         for piece, value in values.items():
-            if isinstance(value, Sequence | tree.Mapping):
+            if isinstance(value, SequenceNode | tree.MappingNode):
                 span = part_span(scalar, piece.start(), piece.end())
                 message = f"{describe(to_plain(value)).removeprefix('this is ')} cannot stand inside a text"
                 self.report.add(WRONG_OPERATION.at(span, message))
@@ -209,14 +209,14 @@ class _Filler:
             position = piece.end()
         return self.within(scalar, replace(scalar, text="".join(parts) + scalar.text[position:])) if parts else scalar
 
-    def where_given(self, filled: Node, piece: re.Match[str]) -> Node:
+    def where_given(self, filled: TreeNode, piece: re.Match[str]) -> TreeNode:
         """Return what was filled in for one `${...}` with its place, where it is an argument that was given a value."""
         named = self.known.get((piece["body"] or "").strip())
-        if named is None or named.given is None or not isinstance(filled, Scalar):
+        if named is None or named.given is None or not isinstance(filled, ScalarNode):
             return filled  # lists and maps are as they were written, with their own places
         return replace(filled, span=given_span(named.given, filled.span))
 
-    def within(self, scalar: Scalar, filled: Node) -> Node:
+    def within(self, scalar: ScalarNode, filled: TreeNode) -> TreeNode:
         """Return what was filled in, or `BROKEN` after a finding if all of it together has become too large."""
         if self.left >= 0:
             self.left -= size(filled) - size(scalar)
@@ -226,7 +226,7 @@ class _Filler:
             self.report.add(TOO_LARGE.at(scalar.span, message))
         return replace(scalar, filled=BROKEN)
 
-    def piece(self, scalar: Scalar, piece: re.Match[str]) -> object:
+    def piece(self, scalar: ScalarNode, piece: re.Match[str]) -> object:
         """Return the value of one `${...}`, None for what stays as it is, `BROKEN` after a finding."""
         body, name = piece["body"], piece["name"]
         if body is None and name:
@@ -249,7 +249,7 @@ class _Filler:
             return BROKEN
         return self.expression(scalar, piece.start("body"), expression)
 
-    def running_name(self, scalar: Scalar, piece: re.Match[str]) -> object:
+    def running_name(self, scalar: ScalarNode, piece: re.Match[str]) -> object:
         name = piece["name"].rstrip(".")
         known = [key for key in self.known if name in (key, key.removeprefix("args."))]
         help_text = f"write '${{{known[0]}}}'" if known else "what is filled in has braces; a dollar is written '$$'"
@@ -259,7 +259,7 @@ class _Filler:
         self.report.add(NOT_RUNNING.at(span, message, help=help_text, fix=fix))
         return BROKEN
 
-    def variable(self, scalar: Scalar, piece: re.Match[str], variable: re.Match[str]) -> object:
+    def variable(self, scalar: ScalarNode, piece: re.Match[str], variable: re.Match[str]) -> object:
         name, mode, rest = variable["name"], variable["mode"], variable["rest"]
         value = self.names.environment.get(name)
         if value or (value is not None and not mode):
@@ -272,7 +272,7 @@ class _Filler:
         self.report.add(ENVIRONMENT.at(span, message, label=why, help=f"set it, or write '${{env.{name}:-DEFAULT}}'"))
         return BROKEN
 
-    def secret(self, scalar: Scalar, piece: re.Match[str], name: str) -> object:
+    def secret(self, scalar: ScalarNode, piece: re.Match[str], name: str) -> object:
         if piece.group() != scalar.text:
             return self.shown_secret(scalar, piece, "a secret cannot stand inside a text")
         if self.names.secrets is None:
@@ -283,12 +283,12 @@ class _Filler:
             self.report.add(SECRET.at(part_span(scalar, piece.start(), piece.end()), error.message, help=error.help))
             return BROKEN
 
-    def shown_secret(self, scalar: Scalar, piece: re.Match[str], message: str) -> object:
+    def shown_secret(self, scalar: ScalarNode, piece: re.Match[str], message: str) -> object:
         help_text = "give it, alone, to a setting of a component that takes a secret"
         self.report.add(SHOWN_SECRET.at(part_span(scalar, piece.start(), piece.end()), message, help=help_text))
         return BROKEN
 
-    def expression(self, scalar: Scalar, offset: int, expression: Expression) -> object:
+    def expression(self, scalar: ScalarNode, offset: int, expression: Expression) -> object:
         known = self.known
         unknown = [word for word in expression.words if word.name not in known]
         for word in unknown:
@@ -335,10 +335,10 @@ class _FromEnvironment:
     text: str
 
 
-def _typed(scalar: Scalar, value: object) -> Node:
+def _typed(scalar: ScalarNode, value: object) -> TreeNode:
     if isinstance(value, _FromEnvironment):
         return replace(scalar, text=value.text, plain=True)
-    if isinstance(value, Scalar | Sequence | tree.Mapping):
+    if isinstance(value, ScalarNode | SequenceNode | tree.MappingNode):
         return value
     return replace(scalar, filled=value)
 

@@ -11,7 +11,7 @@ from rbxcompose.expressions.types import Type
 from rbxcompose.findings import Span
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.secrets import Secrets
-from rbxcompose.manifest.tree import Scalar, Sequence
+from rbxcompose.manifest.tree import ScalarNode, SequenceNode
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.units import Quantity
 
@@ -90,7 +90,7 @@ class NameValues:
         value = self.names[name].value
         if isinstance(value, Quantity):
             return value.value
-        return to_plain(value) if isinstance(value, Scalar | Sequence | tree.Mapping) else value
+        return to_plain(value) if isinstance(value, ScalarNode | SequenceNode | tree.MappingNode) else value
 
     def age(self, name: str) -> float:
         """Raise, since there is no such value."""

@@ -7,7 +7,7 @@ from typing import Literal
 from rbxcompose.config import Config, Name
 
 
-class Header(Config):
+class ManifestHeader(Config):
     """The keys that every manifest begins with."""
 
     rbx: Literal[1]

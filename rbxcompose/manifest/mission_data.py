@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from rbxcompose.findings import Report
 from rbxcompose.manifest.limits import DATA_NODES
-from rbxcompose.manifest.tree import Mapping, Node, is_larger
+from rbxcompose.manifest.tree import MappingNode, TreeNode, is_larger
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 
 
-def is_moderate(section: Node | None, what: str, report: Report) -> bool:
+def is_moderate(section: TreeNode | None, what: str, report: Report) -> bool:
     """Tell whether each entry of a section holds no more than a mission takes, after a finding for each that does."""
-    entries = section.entries.values() if isinstance(section, Mapping) else ()
+    entries = section.entries.values() if isinstance(section, MappingNode) else ()
     large = [entry for entry in entries if is_larger(entry.value, DATA_NODES)]
     for entry in large:
         message = f"the {what} '{entry.key.text}' holds more than {DATA_NODES:,} values"

@@ -10,7 +10,7 @@ from pathlib import Path
 from rbxcompose.findings import Edit, Finding, Fix, Span, kind
 from rbxcompose.manifest.limits import ALL_BYTES, FILE_BYTES, FILES
 from rbxcompose.manifest.parser_error import NOT_YAML
-from rbxcompose.manifest.tree import Node
+from rbxcompose.manifest.tree import TreeNode
 from rbxcompose.manifest.walk import CHARACTER, Walk
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE, compose
 from rbxcompose.printable import FORBIDDEN, code_point
@@ -60,7 +60,7 @@ class Texts(dict[str, str]):
         self.unsaved = unsaved
 
 
-def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> tuple[Node | None, list[Finding]]:
+def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> tuple[TreeNode | None, list[Finding]]:
     """Read one manifest and enter its text into `sources` under the name that findings show."""
     text, findings = read_source(path, shown, sources)
     return (None, findings) if text is None else read_text(text, shown)
@@ -123,7 +123,7 @@ def _decode(data: bytes, file: str) -> tuple[str, list[Finding]]:
         return text, [NOT_UTF8.at(span, message, label=f"byte 0x{data[error.start]:02x}", help="save it as UTF-8")]
 
 
-def read_text(text: str | bytes, file: str) -> tuple[Node | None, list[Finding]]:
+def read_text(text: str | bytes, file: str) -> tuple[TreeNode | None, list[Finding]]:
     """Read the text of one manifest into a located tree; columns count characters from 1.
 
     The tree is None if the text cannot be read to its end; with other findings it holds what could be read.

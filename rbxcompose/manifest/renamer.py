@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Node
+from rbxcompose.manifest.tree import TreeNode
 
 
 @dataclass(frozen=True, slots=True)
-class Topic:
+class RenamedTopic:
     """Another name for a topic of a part, and where it is written."""
 
     name: str
@@ -40,14 +40,14 @@ class Renames(Protocol):
         """Return what a topic becomes."""
         ...
 
-    def written(self, topic: str) -> Topic:
+    def written(self, topic: str) -> RenamedTopic:
         """Return what gives a topic its other name: itself, or the topic that it stands below."""
         ...
 
-    def topics(self, node: Node, above: str = "") -> Node:
+    def topics(self, node: TreeNode, above: str = "") -> TreeNode:
         """Return a map whose keys are topics (below `above`, if given) with these changed."""
         ...
 
-    def texts(self, node: Node, change: Callable[[str], str]) -> Node:
+    def texts(self, node: TreeNode, change: Callable[[str], str]) -> TreeNode:
         """Return a node with every text below it changed, but for those that are filled in later."""
         ...

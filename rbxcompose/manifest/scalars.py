@@ -6,7 +6,7 @@ import math
 import re
 
 from rbxcompose.manifest.limits import NUMBER
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 
 PlainValue = bool | int | float | str | None
 
@@ -23,7 +23,7 @@ _NUMBER = re.compile(
 _MAY_BE_NUMBER = frozenset("+-.0123456789")
 
 
-def plain_value(scalar: Scalar) -> PlainValue:
+def plain_value(scalar: ScalarNode) -> PlainValue:
     """Return the value of a scalar by YAML's core types; a number that `number_trouble` names stays text."""
     text = scalar.text
     if not scalar.plain:
@@ -38,7 +38,7 @@ def plain_value(scalar: Scalar) -> PlainValue:
     return int(text) if form == "decimal" else int(text, 0)
 
 
-def number_trouble(scalar: Scalar) -> str:
+def number_trouble(scalar: ScalarNode) -> str:
     """Return why the number that a scalar writes cannot be taken, in words after "this number"; else nothing."""
     if scalar.text[:1] not in _MAY_BE_NUMBER or not scalar.plain:
         return ""

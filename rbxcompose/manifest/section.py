@@ -6,12 +6,11 @@ none of them knows a section by name.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from collections.abc import Mapping as AnyMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from enum import Enum
 from functools import cache, cached_property
-from pathlib import Path as FilePath
+from pathlib import Path
 from types import GenericAlias
 from typing import Annotated, Any, Generic, TypeVar, cast
 
@@ -22,7 +21,7 @@ from rbxcompose.findings import Report
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.shapes import below, kinds_of, with_references
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Scalar, at
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.manifest.validate import WRONG_TYPE, is_valid, label_of, validate
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.references import COMPONENT, Refers
@@ -37,7 +36,7 @@ ANY = "*"
 """Any key, in a path of `Section.shared`."""
 
 
-class Scope(Enum):
+class SetScope(Enum):
     """What a path of `--set` may name in a section."""
 
     NOTHING = "nothing"
@@ -94,7 +93,7 @@ class Declaration(Generic[M]):
     short: Short | None = None
     needs: str = ""
     """The key that a new entry must have in an overlay; without it, it was to change an old one."""
-    scope: Scope = Scope.ANYTHING
+    scope: SetScope = SetScope.ANYTHING
 
     is_composed: bool = True
     """Whether it is part of the composed robot; else composition itself is what reads it."""
@@ -106,20 +105,20 @@ class Declaration(Generic[M]):
     """Whether its keys are topics, which get no prefix when a part brings them."""
     clash: Callable[[Sequence[str]], tuple[str, str] | None] = lambda names: None
     """Tells of what two parts bring under a path in the section: what it is, and what helps."""
-    models: Callable[[Node], Iterable[Any]] | None = None
+    models: Callable[[TreeNode], Iterable[Any]] | None = None
     """The models of one entry, where they depend on what stands in it."""
-    rename: Callable[[Renames, str, Node], Node] = lambda renames, name, node: node
+    rename: Callable[[Renames, str, TreeNode], TreeNode] = lambda renames, name, node: node
     """What else changes in an entry of a part, whose references have been renamed."""
-    topics: Callable[[str, Node], Iterable[str]] = lambda name, node: ()
+    topics: Callable[[str, TreeNode], Iterable[str]] = lambda name, node: ()
     """The topics that an entry has, as `connect:` of an instance may name them."""
 
     brings: tuple[str, ...] = ()
     """Names of components that it brings, where it is written."""
     components: Callable[[Contents, Wiring], Iterable[WantedComponent]] = lambda contents, wiring: ()
     """The components that it becomes."""
-    connects: Callable[[Contents], AnyMapping[str, AnyMapping[str, str]]] = lambda contents: {}
+    connects: Callable[[Contents], Mapping[str, Mapping[str, str]]] = lambda contents: {}
     """Topics that it gives to the ports of components: component -> port -> topic."""
-    details: Callable[[Any], AnyMapping[str, str]] = lambda read: {}
+    details: Callable[[Any], Mapping[str, str]] = lambda read: {}
     """A few words on each of its names, for editors; it is given what was read."""
 
     @property
@@ -127,9 +126,9 @@ class Declaration(Generic[M]):
         """Tell whether its keys are names that the user gives."""
         return bool(self.names) and not self.at
 
-    def types_of(self, entry: Node) -> Iterable[Any]:
+    def types_of(self, entry: TreeNode) -> Iterable[Any]:
         """Return the types that tell what stands in an entry."""
-        if isinstance(entry, Scalar):
+        if isinstance(entry, ScalarNode):
             return (self.short_type,)
         return self.models(entry) if self.models else (self.model,)
 
@@ -137,7 +136,7 @@ class Declaration(Generic[M]):
         """Tell whether its keys are names of a kind; what runs is a component as well."""
         return kind == self.names or (kind == COMPONENT and self.runs)
 
-    def is_shared(self, path: Path) -> bool:
+    def is_shared(self, path: KeyPath) -> bool:
         """Tell whether several parts may add to the map at a path below it."""
         patterns = self.shared if self.shared is not None else [()] if self.is_map else []
         return any(
@@ -162,9 +161,9 @@ class Declaration(Generic[M]):
         """Return what stands below its name."""
         return GenericAlias(dict, (Name, self.entry_type)) if self.is_map else self.model
 
-    def with_references(self, node: Node, change: Callable[[str, Node], Node]) -> Node:
+    def with_references(self, node: TreeNode, change: Callable[[str, TreeNode], TreeNode]) -> TreeNode:
         """Return what stands below its name with `change(kind, value)` in the place of each name of something."""
-        if not self.is_map or not isinstance(node, Mapping):
+        if not self.is_map or not isinstance(node, MappingNode):
             return with_references(node, self.type, change)
         entries = {}
         for name, entry in node.entries.items():
@@ -174,10 +173,10 @@ class Declaration(Generic[M]):
             entries[name] = Entry(entry.key, value)
         return replace(node, entries=entries)
 
-    def names_in(self, root: Mapping) -> Iterable[str]:
+    def names_in(self, root: MappingNode) -> Iterable[str]:
         """Return the names that a tree gives in this section."""
         named = at(root, (self.name, *self.at)) if self.names else None
-        return named.entries if isinstance(named, Mapping) else ()
+        return named.entries if isinstance(named, MappingNode) else ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,19 +189,19 @@ class Section(Declaration[M], Generic[M, R]):
     """YAML for the reference; a test compiles it within the patrol robot."""
     read: Callable[[Reading[M]], R]
 
-    def described(self, contents: Contents) -> AnyMapping[str, str]:
+    def described(self, contents: Contents) -> Mapping[str, str]:
         """Return the names of what was read, each with a few words; none of a section that composition reads."""
         if not self.is_composed:
             return {}
         read = contents.of(self)
-        return self.details(read) or dict.fromkeys(read if isinstance(read, AnyMapping) else (), self.entry)
+        return self.details(read) or dict.fromkeys(read if isinstance(read, Mapping) else (), self.entry)
 
 
 class Contents:
     """What the sections of a filled tree say: each is read when it is first asked for."""
 
     def __init__(
-        self, root: Mapping, file: FilePath, documents: Documents, sections: Iterable[Section[Any, Any]] = ()
+        self, root: MappingNode, file: Path, documents: Documents, sections: Iterable[Section[Any, Any]] = ()
     ) -> None:
         self.root, self.file, self.documents = root, file, documents
         self._naming = [one for one in sections if one.names]
@@ -215,13 +214,13 @@ class Contents:
         return cast(R, self._read[section.name])
 
     @cached_property
-    def known(self) -> dict[str, AnyMapping[str, object]]:
+    def known(self) -> dict[str, Mapping[str, object]]:
         """Return the names of each kind, also those of entries with mistakes: what refers to them is not wrong."""
         kinds = {COMPONENT, *(one.names for one in self._naming)}
         return {kind: _Names(self, [one for one in self._naming if one.has_names_of(kind)]) for kind in kinds}
 
 
-class _Names(AnyMapping[str, object]):
+class _Names(Mapping[str, object]):
     """The names of a kind; what one stands for is read when it is asked for."""
 
     def __init__(self, contents: Contents, sections: Iterable[Section[Any, Any]]) -> None:
@@ -230,7 +229,7 @@ class _Names(AnyMapping[str, object]):
 
     def __getitem__(self, name: str) -> object:
         read = self._contents.of(self._section[name])
-        return read.get(name, name) if isinstance(read, AnyMapping) else name
+        return read.get(name, name) if isinstance(read, Mapping) else name
 
     def __contains__(self, name: object) -> bool:
         return name in self._section
@@ -255,12 +254,12 @@ class Reading(Generic[M]):
         return self.contents.documents.report
 
     @property
-    def node(self) -> Node | None:
+    def node(self) -> TreeNode | None:
         """Return what stands below the section's name; None if there is nothing."""
         node = self.contents.root.get(self.section.name)
         return None if node is None or is_empty(node) else node
 
-    def writer(self, node: Node) -> FilePath:
+    def writer(self, node: TreeNode) -> Path:
         """Return the file that a value was written in."""
         return self.contents.documents.writer(node.span, self.contents.file)
 
@@ -268,7 +267,7 @@ class Reading(Generic[M]):
         """Yield the entries by name, after a finding for each bad name."""
         return named_entries(self.contents.root, (self.section.name, *self.section.at), self.report)
 
-    def valid(self, model: type[T], name: str, node: Node) -> T | None:
+    def valid(self, model: type[T], name: str, node: TreeNode) -> T | None:
         """Return an entry as `model`, or None after its findings."""
         path = (self.section.name, *self.section.at, name)
         return validate(model, node, path, self.report, self.contents.known)
@@ -285,17 +284,17 @@ class Reading(Generic[M]):
         return validate(self.section.model, self.node, (self.section.name,), self.report, self.contents.known)
 
 
-def is_empty(node: Node) -> bool:
+def is_empty(node: TreeNode) -> bool:
     """Tell whether there is nothing behind the name of a section."""
-    return isinstance(node, Scalar) and node.plain and not node.text
+    return isinstance(node, ScalarNode) and node.plain and not node.text
 
 
-def named_entries(root: Mapping, path: tuple[str, ...], report: Report) -> Iterator[tuple[str, Entry]]:
+def named_entries(root: MappingNode, path: tuple[str, ...], report: Report) -> Iterator[tuple[str, Entry]]:
     """Yield the entries of a section by name, after a finding for each bad name."""
     node = at(root, path)
     if node is None or is_empty(node):
         return
-    if not isinstance(node, Mapping):
+    if not isinstance(node, MappingNode):
         message = f"'{path[-1]}' must be a map from names to what they are"
         report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
         return

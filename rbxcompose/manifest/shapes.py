@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel
 
 from rbxcompose.config import Dimensioned
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Path, Sequence
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, SequenceNode, TreeNode
 from rbxcompose.references import Refers
 from rbxcompose.units import Dimension
 
@@ -24,12 +24,12 @@ def field_types(model: type[BaseModel]) -> dict[str, Any]:
     }
 
 
-def keys_at(model: Any, path: Path) -> list[str]:
+def keys_at(model: Any, path: KeyPath) -> list[str]:
     """Return the keys of the map at `path` below `model`; none if the model does not name them."""
     return sorted({name for one in _types_at(model, path) for shape in _models(one) for name in field_types(shape)})
 
 
-def dimension_at(model: Any, path: Path) -> Dimension | None:
+def dimension_at(model: Any, path: KeyPath) -> Dimension | None:
     """Return what the quantity at `path` below `model` measures, None if it is no quantity."""
     marks = (mark for one in _types_at(model, path) for mark in alternatives(one))
     return next((mark.dimension for mark in marks if isinstance(mark, Dimensioned)), None)
@@ -40,7 +40,7 @@ def kinds_of(hint: Any) -> Iterator[str]:
     return (one.kind for one in alternatives(hint) if isinstance(one, Refers))
 
 
-def kind_of_keys(model: Any, path: Path) -> str:
+def kind_of_keys(model: Any, path: KeyPath) -> str:
     """Return of what the keys of the map at `path` below `model` are names, or nothing."""
     maps = (shape for one in _types_at(model, path) for shape in alternatives(one) if get_origin(shape) is dict)
     return next((kind for one in maps for kind in kinds_of(get_args(one)[0])), "")
@@ -58,20 +58,20 @@ def below(hint: Any, key: str | int) -> Iterator[Any]:
             yield get_args(one)[0]
 
 
-def with_references(node: Node, hint: Any, change: Callable[[str, Node], Node]) -> Node:
+def with_references(node: TreeNode, hint: Any, change: Callable[[str, TreeNode], TreeNode]) -> TreeNode:
     """Return a node with `change(kind, value)` in the place of each value that is a name of a kind by its type."""
     for kind in kinds_of(hint):
         node = change(kind, node)
     match node:
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             values = {name: _changed_below(one.value, hint, name, change) for name, one in entries.items()}
             return replace(node, entries={name: Entry(one.key, values[name]) for name, one in entries.items()})
-        case Sequence(items=items):
+        case SequenceNode(items=items):
             return replace(node, items=tuple(_changed_below(one, hint, i, change) for i, one in enumerate(items)))
     return node
 
 
-def _changed_below(node: Node, hint: Any, key: str | int, change: Callable[[str, Node], Node]) -> Node:
+def _changed_below(node: TreeNode, hint: Any, key: str | int, change: Callable[[str, TreeNode], TreeNode]) -> TreeNode:
     for inner in below(hint, key):
         node = with_references(node, inner, change)
     return node
@@ -94,7 +94,7 @@ def _models(hint: Any) -> Iterator[type[BaseModel]]:
     return (one for one in alternatives(hint) if isinstance(one, type) and issubclass(one, BaseModel))
 
 
-def _types_at(model: Any, path: Path) -> list[Any]:
+def _types_at(model: Any, path: KeyPath) -> list[Any]:
     found = [model]
     for key in path:
         found = [inner for one in found for inner in below(one, key)]

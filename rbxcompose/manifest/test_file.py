@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from rbxcompose.config import Config, Name, Time
 from rbxcompose.manifest.fields import TopicName
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 
 TEST = "Test"
 LONGEST_TEST = 3600.0  # [s] of robot time
@@ -21,11 +21,11 @@ def _given(value: bool) -> bool:
     return value
 
 
-Order = Annotated[bool, AfterValidator(_given)]
+TrueOnly = Annotated[bool, AfterValidator(_given)]
 CallNumber = Annotated[str, StringConstraints(pattern=r"^[1-9][0-9]{0,5}$")]
 
 
-class TrialFile(Header):
+class TrialFile(ManifestHeader):
     """A test of a mission: what happens to it, and what it must do."""
 
     robot: Any = None
@@ -42,7 +42,7 @@ class TrialFile(Header):
     """What must have happened in the end."""
 
 
-class Mock(Config):
+class MockModel(Config):
     """How the test answers in the place of a skill or a service."""
 
     takes: Time = Field(0.0, ge=0)
@@ -61,7 +61,7 @@ class Mock(Config):
     """Outcome by number of the call, where it differs from `result`."""
 
 
-class Sent(Config):
+class SentModel(Config):
     """A message."""
 
     topic: TopicName
@@ -70,26 +70,26 @@ class Sent(Config):
     """Its fields; a single value stands for the only one."""
 
 
-class Event(Config):
+class EventModel(Config):
     """Something that happens to the robot; several things of one instant happen in the order of the text."""
 
     at: Time = Field(ge=0)
     """When, counted from the start of the test."""
     set_: dict[Name, Any] = Field({}, alias="set")
     """Values that get this value now, and keep it until the test sets them again."""
-    publish: Sent | None = None
+    publish: SentModel | None = None
     """A message that comes from outside."""
-    stop: Order = False
+    stop: TrueOnly = False
     """The robot is stopped, and its mission paused."""
-    release: Order = False
+    release: TrueOnly = False
     """The stop is released."""
-    pause: Order = False
+    pause: TrueOnly = False
     """The mission is paused."""
-    resume: Order = False
+    resume: TrueOnly = False
     """The mission goes on."""
 
 
-class Expect(Config):
+class ExpectModel(Config):
     """What must have happened."""
 
     outcome: Name | None = None
@@ -104,7 +104,7 @@ class Expect(Config):
     """How often a step is begun, by its name."""
     data: dict[Name, Any] = {}
     """Values of the mission's data at the end."""
-    published: tuple[Sent, ...] = ()
+    published: tuple[SentModel, ...] = ()
     """Messages that it publishes, in this order; only the fields that are written count."""
     reports: tuple[str, ...] = ()
     """Texts that stand in what it logs or reports."""
@@ -116,9 +116,9 @@ def _in_full(value: object) -> object:
     return {"result": value} if isinstance(value, str) else value
 
 
-MockModel = Annotated[Mock, BeforeValidator(_in_full, json_schema_input_type=Mock | Name | None)]
+ShortMock = Annotated[MockModel, BeforeValidator(_in_full, json_schema_input_type=MockModel | Name | None)]
 """A mock, or the word for its result, or nothing: it succeeds at once."""
 
-SECTIONS = {"mocks": dict[Name, MockModel], "events": tuple[Event, ...], "expect": Expect}
+SECTIONS = {"mocks": dict[Name, ShortMock], "events": tuple[EventModel, ...], "expect": ExpectModel}
 """What stands in each section."""
 STEP_KEYS = ("ended", "at")  # beside the name of a step

@@ -12,11 +12,11 @@ BROKEN = object()
 """What `Scalar.filled` holds of a value of which all was said: filling it in has failed, or it was a slip."""
 
 Key = str | int
-Path = tuple[Key, ...]  # from the root of a file: ("components", "base", "max_speed") or ("do", 0, "go_to")
+KeyPath = tuple[Key, ...]  # from the root of a file: ("components", "base", "max_speed") or ("do", 0, "go_to")
 
 
 @dataclass(frozen=True, slots=True)
-class Scalar:
+class ScalarNode:
     """One word, number or text as written.
 
     `plain` tells whether it stands without quotes, so that YAML 1.2's core types apply. `filled` is the typed value
@@ -32,10 +32,10 @@ class Scalar:
 
 
 @dataclass(frozen=True, slots=True)
-class Sequence:
+class SequenceNode:
     """A list of nodes."""
 
-    items: tuple[Node, ...]
+    items: tuple[TreeNode, ...]
     span: Span
     tag: str = ""
 
@@ -44,22 +44,22 @@ class Sequence:
 class Entry:
     """A key with its value."""
 
-    key: Scalar
-    value: Node
+    key: ScalarNode
+    value: TreeNode
 
 
 NOWHERE = Span("", 1, 1, 1, 1)
 
 
 @dataclass(frozen=True, slots=True)
-class Mapping:
+class MappingNode:
     """Named nodes, in the order of the text. `tag` is `!replace` where an overlay says so."""
 
     entries: dict[str, Entry] = field(default_factory=dict)
     span: Span = NOWHERE
     tag: str = ""
 
-    def get(self, name: str) -> Node | None:
+    def get(self, name: str) -> TreeNode | None:
         """Return the value of a key, or None."""
         entry = self.entries.get(name)
         return entry.value if entry else None
@@ -68,44 +68,44 @@ class Mapping:
         return name in self.entries
 
 
-Node = Scalar | Sequence | Mapping
+TreeNode = ScalarNode | SequenceNode | MappingNode
 
 
-def children(node: Node) -> Iterator[tuple[Key, Node]]:
+def children(node: TreeNode) -> Iterator[tuple[Key, TreeNode]]:
     """Yield what stands directly below a node, with its key or index."""
     match node:
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             for name, entry in entries.items():
                 yield name, entry.value
-        case Sequence(items=items):
+        case SequenceNode(items=items):
             yield from enumerate(items)
         case _:
             return
 
 
-def with_children(node: Node, change: Callable[[Key, Node], Node]) -> Node:
+def with_children(node: TreeNode, change: Callable[[Key, TreeNode], TreeNode]) -> TreeNode:
     """Return a node with what `change` makes of each node directly below it; the same one if nothing changes."""
     changed = {key: new for key, below in children(node) if (new := change(key, below)) is not below}
     match node:
-        case Mapping(entries=entries) if changed:
+        case MappingNode(entries=entries) if changed:
             new_ones = {name: Entry(one.key, changed.get(name, one.value)) for name, one in entries.items()}
-            return Mapping(new_ones, node.span, node.tag)
-        case Sequence(items=items) if changed:
-            return Sequence(tuple(changed.get(index, one) for index, one in enumerate(items)), node.span, node.tag)
+            return MappingNode(new_ones, node.span, node.tag)
+        case SequenceNode(items=items) if changed:
+            return SequenceNode(tuple(changed.get(index, one) for index, one in enumerate(items)), node.span, node.tag)
     return node
 
 
-def size(node: Node) -> int:
+def size(node: TreeNode) -> int:
     """Return about how large a tree is [bytes]: its texts, and something for each node."""
     total, waiting = 0, [node]
     while waiting:
         now = waiting.pop()
-        total += NODE_BYTES + (len(now.text) if isinstance(now, Scalar) else 0)
+        total += NODE_BYTES + (len(now.text) if isinstance(now, ScalarNode) else 0)
         waiting += (child for _, child in children(now))
     return total
 
 
-def is_larger(node: Node, most: int) -> bool:
+def is_larger(node: TreeNode, most: int) -> bool:
     """Tell whether a tree has more than `most` nodes below its root; it is not looked at any further."""
     count, waiting = 0, [node]
     while waiting and count <= most:
@@ -115,32 +115,32 @@ def is_larger(node: Node, most: int) -> bool:
     return count > most
 
 
-def at(node: Node, path: Path) -> Node | None:
+def at(node: TreeNode, path: KeyPath) -> TreeNode | None:
     """Return the node at `path`, or None if there is none."""
-    found: Node | None = node
+    found: TreeNode | None = node
     for key in path:
         match found:
-            case Mapping():
+            case MappingNode():
                 found = found.get(str(key))
-            case Sequence(items=items) if isinstance(key, int) and 0 <= key < len(items):
+            case SequenceNode(items=items) if isinstance(key, int) and 0 <= key < len(items):
                 found = items[key]
             case _:
                 return None
     return found
 
 
-def key_span(node: Node, path: Path) -> Span:
+def key_span(node: TreeNode, path: KeyPath) -> Span:
     """Return the place of the key at `path`; of the nearest place above it, where there is no key."""
     for length in range(len(path), 0, -1):
         above = at(node, path[: length - 1])
-        if isinstance(above, Mapping) and str(path[length - 1]) in above.entries:
+        if isinstance(above, MappingNode) and str(path[length - 1]) in above.entries:
             return above.entries[str(path[length - 1])].key.span
-        if isinstance(above, Sequence) and (item := at(above, path[length - 1 : length])):
+        if isinstance(above, SequenceNode) and (item := at(above, path[length - 1 : length])):
             return item.span
     return node.span
 
 
-def value_span(node: Node, path: Path) -> Span:
+def value_span(node: TreeNode, path: KeyPath) -> Span:
     """Return the place of the value at `path`; of the nearest node above it, where there is none."""
     for length in range(len(path), -1, -1):
         if (found := at(node, path[:length])) is not None:

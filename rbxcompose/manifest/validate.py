@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
-from collections.abc import Mapping as AnyMapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import cache
@@ -18,8 +17,18 @@ from rbxcompose.findings import SIMILAR, Finding, Report, Span, correction, kind
 from rbxcompose.manifest.conversions import changed, repaired
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import dimension_at, keys_at
-from rbxcompose.manifest.slips import Refused, value_slip
-from rbxcompose.manifest.tree import BROKEN, Mapping, Node, Path, Scalar, Sequence, at, key_span, value_span
+from rbxcompose.manifest.slips import RefusedValue, value_slip
+from rbxcompose.manifest.tree import (
+    BROKEN,
+    KeyPath,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    at,
+    key_span,
+    value_span,
+)
 from rbxcompose.printable import plain
 from rbxcompose.units import Quantity, UnitError, format_quantity
 
@@ -149,16 +158,16 @@ _MOST_FINDINGS = 100  # of one part: nobody writes more by mistake, and each cos
 _ROUNDS = 8  # of repairs; each one goes at least one level deeper into a value
 
 
-def to_plain(node: Node) -> object:
+def to_plain(node: TreeNode) -> object:
     """Return plain data: scalars by YAML's core types, filled ones with their typed value, maps and lists of these."""
     match node:
-        case Scalar(filled=None):
+        case ScalarNode(filled=None):
             return plain_value(node)
-        case Scalar():
+        case ScalarNode():
             return node.filled
-        case Sequence(items=items):
+        case SequenceNode(items=items):
             return [to_plain(item) for item in items]
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             return {name: to_plain(entry.value) for name, entry in entries.items()}
 
 
@@ -178,10 +187,10 @@ def is_valid(model: Any, data: object) -> bool:
 
 def validate(
     model: type[T],
-    node: Node,
-    path: Path,
+    node: TreeNode,
+    path: KeyPath,
     report: Report,
-    context: AnyMapping[str, object] | None = None,
+    context: Mapping[str, object] | None = None,
     *,
     also: Iterable[str] = (),
 ) -> T | None:
@@ -207,12 +216,12 @@ def validate(
 
 
 def _findings(
-    model: Any, node: Node, path: Path, errors: list[ErrorDetails], also: tuple[str, ...]
+    model: Any, node: TreeNode, path: KeyPath, errors: list[ErrorDetails], also: tuple[str, ...]
 ) -> Iterator[Finding]:
     """Turn pydantic's errors into findings: one for each place, none for what was said before."""
     located = [(_locate(node, error), error) for error in errors]
     lacking = {loc for loc, error in located if error["type"] == "missing"}
-    said: set[Path] = set()
+    said: set[KeyPath] = set()
     for loc, error in located:
         if error["type"] == "extra_forbidden":
             known = [*keys_at(model, loc[:-1]), *(() if len(loc) > 1 else also)]
@@ -225,9 +234,9 @@ def _findings(
             yield _slip(model, node, path, loc, error) or _finding(model, node, path, loc, error)
 
 
-def _locate(node: Node, error: ErrorDetails) -> Path:
+def _locate(node: TreeNode, error: ErrorDetails) -> KeyPath:
     """Return the place of an error in the tree; pydantic's own steps, such as members of a union, are left out."""
-    found: Path = ()
+    found: KeyPath = ()
     for step in error["loc"]:
         if at(node, (*found, step)) is not None:
             found = (*found, step)
@@ -236,7 +245,7 @@ def _locate(node: Node, error: ErrorDetails) -> Path:
     return found
 
 
-def where(path: Path) -> str:
+def where(path: KeyPath) -> str:
     """Return how a map at `path` is called: "component 'gui'", "'inputs.teleop' of mux 'cmd_vel'"."""
     match path:
         case ():
@@ -248,26 +257,28 @@ def where(path: Path) -> str:
     return f"'{'.'.join(map(str, path))}'"
 
 
-def _unknown_key(known: Iterable[str], node: Node, path: Path, loc: Path, lacking: set[Path]) -> tuple[Finding, str]:
+def _unknown_key(
+    known: Iterable[str], node: TreeNode, path: KeyPath, loc: KeyPath, lacking: set[KeyPath]
+) -> tuple[Finding, str]:
     """Return the finding for an unknown key, and the missing key that it is a misspelling of, if any."""
     key = str(loc[-1])
     missing = [str(place[-1]) for place in lacking if place[:-1] == loc[:-1]]
     meant = get_close_matches(key, missing, n=1, cutoff=SIMILAR)
     message = f"unknown key '{plain(key, 60)}' in {where((*path, *loc[:-1]))}"
     above = at(node, loc[:-1])
-    taken = above.entries if isinstance(above, Mapping) else ()
+    taken = above.entries if isinstance(above, MappingNode) else ()
     finding = UNKNOWN_KEY.misspelt(key_span(node, loc), message, key, meant or known, KEYS, taken=taken)
     return finding, meant[0] if meant else ""
 
 
-def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails) -> Finding:
+def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: ErrorDetails) -> Finding:
     name = _called((*path, *loc))
     value = at(node, loc)
     context = error.get("ctx", {})
     span = value_span(node, loc)
     if error["loc"][-1:] == ("[key]",) or error["type"] == "string_pattern_mismatch":
         place = key_span(node, loc) if error["loc"][-1:] == ("[key]",) else span
-        text = value.text if isinstance(value, Scalar) and place is span else name
+        text = value.text if isinstance(value, ScalarNode) and place is span else name
         help_text = "small letters, digits and underscores, beginning with a letter"
         return BAD_NAME.at(place, f"'{text}' is no name", help=help_text)
     match error["type"]:
@@ -301,9 +312,9 @@ def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails)
     return WRONG_TYPE.at(span, f"'{name}': {error['msg'][:1].lower()}{error['msg'][1:]}", label=label_of(value))
 
 
-def not_a_choice(span: Span, name: str, value: Node | None, choices: list[str]) -> Finding:
+def not_a_choice(span: Span, name: str, value: TreeNode | None, choices: list[str]) -> Finding:
     """Return the finding for a value that is none of the few words that its key takes."""
-    written = str(value.text if value.filled is None else value.filled) if isinstance(value, Scalar) else ""
+    written = str(value.text if value.filled is None else value.filled) if isinstance(value, ScalarNode) else ""
     if len(choices) == 1:
         label = "" if written else label_of(value)
         fix = correction(written, choices, span)
@@ -313,50 +324,52 @@ def not_a_choice(span: Span, name: str, value: Node | None, choices: list[str]) 
     return finding if is_near else replace(finding, help="")  # the message lists all there are
 
 
-def _called(path: Path) -> str:
+def _called(path: KeyPath) -> str:
     """Return how a value is called: by its key, or by its list and number."""
     *above, last = path or ("this file",)
     return f"{above[-1]}[{last}]" if isinstance(last, int) and above else str(last)
 
 
-def is_broken(node: Node | None) -> bool:
+def is_broken(node: TreeNode | None) -> bool:
     """Tell whether a value could not be filled in, or is no number that can be taken, which was said."""
-    return isinstance(node, Scalar) and (node.filled is BROKEN or (node.filled is None and bool(number_trouble(node))))
+    return isinstance(node, ScalarNode) and (
+        node.filled is BROKEN or (node.filled is None and bool(number_trouble(node)))
+    )
 
 
-def label_of(node: Node | None) -> str:
+def label_of(node: TreeNode | None) -> str:
     """Return what a node is, for the label of a finding: "this is text"."""
-    if isinstance(node, Scalar) and isinstance(node.filled, Quantity):
+    if isinstance(node, ScalarNode) and isinstance(node.filled, Quantity):
         return f"this is {node.filled.dimension.phrase}"
     return describe(to_plain(node)) if node is not None else ""
 
 
-def unit_finding(error: UnitError, node: Node, name: str) -> Finding:
+def unit_finding(error: UnitError, node: TreeNode, name: str) -> Finding:
     """Return the finding for a value that is not the quantity that it should be."""
     # What does not even look like a number needs no lesson on numbers.
-    is_word = isinstance(node, Scalar) and node.filled is None and node.text[:1] not in "+-.0123456789"
+    is_word = isinstance(node, ScalarNode) and node.filled is None and node.text[:1] not in "+-.0123456789"
     label = label_of(node) if is_word or not error.detail else error.detail
     return WRONG_TYPE.at(node.span, f"'{name}' {error.message}", label=label, help="" if is_word else error.help)
 
 
-def _slip(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails) -> Finding | None:
+def _slip(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: ErrorDetails) -> Finding | None:
     """Return the finding about a slip, if the model has nothing against what it stands for."""
     refused_at = loc[:-1] if error["type"] == "missing" else loc
     written = at(node, refused_at)
     if written is None:
         return None
     for slip in value_slip.at(error["type"]):
-        repair = slip(Refused((*path, *loc), _finding(model, node, path, loc, error)), written)
+        repair = slip(RefusedValue((*path, *loc), _finding(model, node, path, loc, error)), written)
         if repair and _takes(model, _with(to_plain(node), refused_at, to_plain(repair.node)), loc):
             return repair.findings[0]
     return None
 
 
-def _with(data: object, path: Path, value: object) -> object:
+def _with(data: object, path: KeyPath, value: object) -> object:
     return changed(data, path, lambda _: value)
 
 
-def _takes(model: Any, data: object, loc: Path) -> bool:
+def _takes(model: Any, data: object, loc: KeyPath) -> bool:
     """Tell whether a model has nothing against what stands at `loc`."""
     try:
         _adapter(model).validate_python(data)

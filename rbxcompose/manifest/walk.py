@@ -16,7 +16,7 @@ from rbxcompose.findings import Finding, Related, Severity, Span, kind
 from rbxcompose.manifest.limits import ALIAS_NODES, DEPTH, KEY, TEXT
 from rbxcompose.manifest.parser_error import QUOTE_HELP, QUOTES_NEEDED
 from rbxcompose.manifest.scalars import number_trouble
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.printable import FORBIDDEN, code_point, plain
 
@@ -164,7 +164,7 @@ class Walk:
         self.may_repeat = "&" in text  # without an anchor there is no alias, and nothing to keep in mind
         self.may_tag = "!" in text
         self.findings: list[Finding] = []
-        self._done: dict[int, tuple[Node, int, int]] = {}  # by id: the node, how many nodes it has, how deep it is
+        self._done: dict[int, tuple[TreeNode, int, int]] = {}  # by id: the node, how many nodes it has, how deep it is
         self._open: set[int] = set()  # ids of the nodes that are being walked, from the root to here
         self._alias_nodes = 0
 
@@ -173,16 +173,16 @@ class Walk:
         if len(self.findings) < _MOST_FINDINGS:
             self.findings.append(finding)
 
-    def node(self, node: yaml.Node) -> Node:
+    def node(self, node: yaml.Node) -> TreeNode:
         """Return a node with all below it; a second visit is an alias and is counted."""
         return self._visit(node)[0]
 
-    def _visit(self, node: yaml.Node) -> tuple[Node, int, int]:
+    def _visit(self, node: yaml.Node) -> tuple[TreeNode, int, int]:
         if not self.may_repeat:
             return self._read(node)
         if id(node) in self._open:
             self._refuse_alias(node, "this alias leads back to what it lies in")
-            return Mapping({}, span_of(node, self.file)), 1, 1
+            return MappingNode({}, span_of(node, self.file)), 1, 1
         if (done := self._done.get(id(node))) is not None:
             return self._repeat(node, done)
         self._open.add(id(node))
@@ -196,7 +196,7 @@ class Walk:
         index = node.start_mark.index
         return self.text[index : index + 1]
 
-    def _repeat(self, node: yaml.Node, done: tuple[Node, int, int]) -> tuple[Node, int, int]:
+    def _repeat(self, node: yaml.Node, done: tuple[TreeNode, int, int]) -> tuple[TreeNode, int, int]:
         _, size, height = done
         self._alias_nodes += size
         if self._alias_nodes > ALIAS_NODES:
@@ -205,7 +205,7 @@ class Walk:
             self._refuse_alias(node, f"with its aliases this file has more than {DEPTH} levels inside each other")
         else:
             return done
-        return Mapping({}, span_of(node, self.file)), 1, 1
+        return MappingNode({}, span_of(node, self.file)), 1, 1
 
     def _refuse_alias(self, node: yaml.Node, message: str) -> None:
         if not any(finding.code == ALIAS.code for finding in self.findings):  # one bomb makes thousands of them
@@ -225,10 +225,10 @@ class Walk:
                 return Span(self.file, start.line + 1, start.column + 1, end.line + 1, end.column + 1), anchor
         return anchor, anchor
 
-    def _read(self, node: yaml.Node) -> tuple[Node, int, int]:
+    def _read(self, node: yaml.Node) -> tuple[TreeNode, int, int]:
         tag = self._tag(node) if self.may_tag else ""
         if tag == REMOVE:
-            return Mapping({}, span_of(node, self.file), REMOVE), 1, 1
+            return MappingNode({}, span_of(node, self.file), REMOVE), 1, 1
         match node:
             case yaml.ScalarNode():
                 return self._scalar(node), 1, 1
@@ -252,8 +252,8 @@ class Walk:
         self.add(TAG.at(span_of(node, self.file), message, help=help_text))
         return ""
 
-    def _scalar(self, node: yaml.ScalarNode) -> Scalar:
-        scalar = Scalar(node.value, span_of(node, self.file), not node.style)
+    def _scalar(self, node: yaml.ScalarNode) -> ScalarNode:
+        scalar = ScalarNode(node.value, span_of(node, self.file), not node.style)
         text = scalar.text
         if len(text) > TEXT:
             message = f"this text has {len(text):,} characters, {TEXT:,} are the limit"
@@ -265,9 +265,9 @@ class Walk:
             self.add(NUMBER.at(scalar.span, f"this number {trouble}"))
         return scalar
 
-    def _check_comment(self, value: Node) -> None:
+    def _check_comment(self, value: TreeNode) -> None:
         span = value.span
-        line = self.commented.get(span.end_line) if isinstance(value, Scalar) and value.plain else None
+        line = self.commented.get(span.end_line) if isinstance(value, ScalarNode) and value.plain else None
         if line is not None and (found := _SWALLOWED.match(line, span.end_column - 1)):
             start, end = found.span(1)
             place = Span(self.file, span.end_line, start + 1, span.end_line, end + 1)
@@ -284,7 +284,7 @@ class Walk:
                 self.add(QUOTES_NEEDED.at(span, message, label=QUOTE_HELP))
                 return
 
-    def _sequence(self, node: yaml.SequenceNode, tag: str) -> tuple[Node, int, int]:
+    def _sequence(self, node: yaml.SequenceNode, tag: str) -> tuple[TreeNode, int, int]:
         if node.flow_style:
             self._check_cut(node.value)
         items, size, height = [], 1, 0
@@ -294,9 +294,9 @@ class Walk:
             items.append(item)
             size += item_size
             height = max(height, item_height)
-        return Sequence(tuple(items), span_of(node, self.file), tag), size, height + 1
+        return SequenceNode(tuple(items), span_of(node, self.file), tag), size, height + 1
 
-    def _mapping(self, node: yaml.MappingNode, tag: str) -> tuple[Node, int, int]:
+    def _mapping(self, node: yaml.MappingNode, tag: str) -> tuple[TreeNode, int, int]:
         own: dict[str, Entry] = {}
         merged: dict[str, Entry] = {}
         size, height = 1, 0
@@ -320,12 +320,12 @@ class Walk:
                 self.add(NOT_A_KEY.at(key.span, message, help=help_text))
             self._check_comment(value)
             self._enter(own, Entry(key, value))
-        return Mapping({**merged, **own}, span_of(node, self.file), tag), size + len(merged), height + 1
+        return MappingNode({**merged, **own}, span_of(node, self.file), tag), size + len(merged), height + 1
 
-    def _is_missing(self, value: Node) -> bool:
-        return isinstance(value, Scalar) and value.plain and not value.text
+    def _is_missing(self, value: TreeNode) -> bool:
+        return isinstance(value, ScalarNode) and value.plain and not value.text
 
-    def _key(self, node: yaml.Node) -> Scalar | None:
+    def _key(self, node: yaml.Node) -> ScalarNode | None:
         if self.may_tag:
             self._tag(node)
         if not isinstance(node, yaml.ScalarNode):
@@ -347,11 +347,11 @@ class Walk:
             message = f"the key '{plain(entry.key.text, 60)}' is written twice"
             self.add(TWICE.at(entry.key.span, message, label="the second", related=related))
 
-    def _merge(self, merged: dict[str, Entry], value: Node, node: yaml.Node, span: Span) -> None:
+    def _merge(self, merged: dict[str, Entry], value: TreeNode, node: yaml.Node, span: Span) -> None:
         """Take over the entries of the map or maps that `<<` names; the earlier one wins."""
-        sources = value.items if isinstance(value, Sequence) else (value,)
+        sources = value.items if isinstance(value, SequenceNode) else (value,)
         for source in sources:
-            if not isinstance(source, Mapping):
+            if not isinstance(source, MappingNode):
                 related = [Related(span_of(node, self.file), "this is none")]
                 self.add(ALIAS.at(span, "'<<' takes a map, or a list of maps", related=related))
                 return

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from rbxcompose.config import Config
 from rbxcompose.manifest.options import ComponentOptions
-from rbxcompose.manifest.tree import Path
+from rbxcompose.manifest.tree import KeyPath
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class WantedComponent:
     type_name: str
     config: Config | Mapping[str, object]
     """Its configuration, or what its type is to make one of."""
-    path: Path
+    path: KeyPath
     options: ComponentOptions = field(default_factory=ComponentOptions)
 
 

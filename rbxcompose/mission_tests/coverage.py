@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from rbxcompose.findings import Span
 from rbxcompose.mission_tests.mission_facts import missions_in
 from rbxcompose.missions.engine.events import InterruptStarted, MissionEvent, SkillEnded, Transition
-from rbxcompose.missions.program.possible import Key, cut, ended, led, skipped, started
+from rbxcompose.missions.program.possible import StateKey, cut, ended, led, skipped, started
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.statuses import SKIPPED
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class Way:
+class CoveredWay:
     """Something that a mission may do: the place of its node, and in words."""
 
     span: Span
@@ -26,10 +26,10 @@ class Way:
 class Coverage:
     """The ways of all missions that were tested; the same node is one, however often a mission is used."""
 
-    ways: set[Way] = field(default_factory=set)
-    taken: set[Way] = field(default_factory=set)
+    ways: set[CoveredWay] = field(default_factory=set)
+    taken: set[CoveredWay] = field(default_factory=set)
 
-    def add(self, linked: Program, robot: RobotNames, seen: set[Key]) -> None:
+    def add(self, linked: Program, robot: RobotNames, seen: set[StateKey]) -> None:
         """Add what one run of a mission saw."""
         for way, key in ways_of(linked, robot):
             self.ways.add(way)
@@ -37,16 +37,16 @@ class Coverage:
                 self.taken.add(way)
 
     @property
-    def missing(self) -> list[Way]:
+    def missing(self) -> list[CoveredWay]:
         """Return the ways that no test took, by place."""
         return sorted(self.ways - self.taken)
 
 
-class Seen:
+class SeenWays:
     """Watches one run of a mission, and keeps the keys of the ways that it took."""
 
     def __init__(self) -> None:
-        self.keys: set[Key] = set()
+        self.keys: set[StateKey] = set()
 
     def started(self, number: int, /) -> None:
         """Hear that a node starts."""
@@ -69,17 +69,17 @@ class Seen:
                 self.keys.add(led(machine, state, to, outcome))
 
 
-def ways_of(linked: Program, robot: RobotNames) -> Iterator[tuple[Way, Key]]:
+def ways_of(linked: Program, robot: RobotNames) -> Iterator[tuple[CoveredWay, StateKey]]:
     """Yield the ways of a linked mission, each with the key under which it is seen."""
     owners = _owners(linked)
     for node in linked.nodes:
         for possible in node.step.possibilities(node, linked.nodes, robot):
-            yield Way(possible.span, owners[node.number], possible.text), possible.key
+            yield CoveredWay(possible.span, owners[node.number], possible.text), possible.key
     for program in missions_in(linked):
         for interrupt in program.interrupts:
             root = interrupt.root
             seen = cut(interrupt.name) if root is None else started(root)
-            yield Way(interrupt.span, program.name, f"interrupt {interrupt.name}"), seen
+            yield CoveredWay(interrupt.span, program.name, f"interrupt {interrupt.name}"), seen
 
 
 def _owners(linked: Program) -> Mapping[int, str]:

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 from rbxcompose.findings import Span
 from rbxcompose.manifest import test_file as trials
-from rbxcompose.manifest.tree import Node, Path, at, key_span, value_span
-from rbxcompose.manifest.tree import Sequence as Listed
+from rbxcompose.manifest.tree import KeyPath, SequenceNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.mission_tests import codes
-from rbxcompose.mission_tests.model import Deed, Event
-from rbxcompose.mission_tests.sections import Context, entries_of
+from rbxcompose.mission_tests.model import EventDeed, TrialEvent
+from rbxcompose.mission_tests.sections import TrialContext, entries_of
 from rbxcompose.model.wires import resolve
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.plain import from_plain
@@ -20,29 +19,31 @@ from rbxcompose.msgs.plain import from_plain
 AT, SET, PUBLISH = "at", "set", "publish"
 
 
-def read_events(context: Context, node: Node | None, models: Sequence[trials.Event]) -> tuple[Event, ...]:
+def read_events(
+    context: TrialContext, node: TreeNode | None, models: Sequence[trials.EventModel]
+) -> tuple[TrialEvent, ...]:
     """Return the events in the order of the text."""
-    items = node.items if isinstance(node, Listed) else ()
+    items = node.items if isinstance(node, SequenceNode) else ()
     return tuple(_event(context, item, model) for item, model in zip(items, models, strict=False))
 
 
-def _event(context: Context, node: Node, model: trials.Event) -> Event:
+def _event(context: TrialContext, node: TreeNode, model: trials.EventModel) -> TrialEvent:
     words = [word for word, _ in entries_of(node) if word != AT]
     if not words:
         context.report.add(codes.NEVER.at(node.span, "nothing happens here", help="give 'set', 'publish', 'stop', ..."))
     deeds = (_deed(context, word, node, model) for word in words)
-    return Event(model.at, tuple(deed for deed in deeds if deed), value_span(node, (AT,)))
+    return TrialEvent(model.at, tuple(deed for deed in deeds if deed), value_span(node, (AT,)))
 
 
-def _deed(context: Context, word: str, node: Node, model: trials.Event) -> Deed | None:
+def _deed(context: TrialContext, word: str, node: TreeNode, model: trials.EventModel) -> EventDeed | None:
     if word == SET:
-        return Deed(SET, context.settings(at(node, (SET,)), {}))
+        return EventDeed(SET, context.settings(at(node, (SET,)), {}))
     if word == PUBLISH and model.publish:
         return _published(context, node, model.publish)
-    return Deed(word)
+    return EventDeed(word)
 
 
-def _published(context: Context, node: Node, sent: trials.Sent) -> Deed | None:
+def _published(context: TrialContext, node: TreeNode, sent: trials.SentModel) -> EventDeed | None:
     """Return a message for a topic that somebody reads or writes."""
     topics, topic = _topics(context), resolve(sent.topic, context.robot.manifest.bus.namespace or "")
     if topic not in topics:
@@ -55,12 +56,12 @@ def _published(context: Context, node: Node, sent: trials.Sent) -> Deed | None:
     data = {} if written is None else to_plain(written)
     if not isinstance(data, dict):
         data = {next(iter(cls.FIELDS)): data}
-    made, findings = from_plain(cls, data, Places(node, place))
+    made, findings = from_plain(cls, data, MessagePlaces(node, place))
     context.report.extend(findings)
-    return Deed(PUBLISH, topic=topic, message=made) if made is not None else None
+    return EventDeed(PUBLISH, topic=topic, message=made) if made is not None else None
 
 
-def _topics(context: Context) -> dict[str, str]:
+def _topics(context: TrialContext) -> dict[str, str]:
     """Return the absolute names of topics with their types: those of components, and those that are values."""
     namespace = context.robot.manifest.bus.namespace or ""
     own = {resolve(name, namespace): message for name, message in context.names.topics.items()}
@@ -68,16 +69,16 @@ def _topics(context: Context) -> dict[str, str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Places:
+class MessagePlaces:
     """Where the parts of a message stand."""
 
-    node: Node
-    below: Path
+    node: TreeNode
+    below: KeyPath
 
-    def key(self, path: Path) -> Span:
+    def key(self, path: KeyPath) -> Span:
         """Return the place of a field's name."""
         return key_span(self.node, (*self.below, *path))
 
-    def value(self, path: Path) -> Span:
+    def value(self, path: KeyPath) -> Span:
         """Return the place of a field's value."""
         return value_span(self.node, (*self.below, *path))

@@ -10,14 +10,22 @@ from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Span
 from rbxcompose.manifest import test_file as trials
 from rbxcompose.manifest.test_file import STEP_KEYS
-from rbxcompose.manifest.tree import Entry, Node, Scalar, at, key_span, value_span
-from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.manifest.tree import Sequence as Listed
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import validate
 from rbxcompose.mission_tests import codes
-from rbxcompose.mission_tests.model import FAILS, HALTED, RUNS, SKIPPED, SUCCEEDS, Expect, Named, Sent, Step
+from rbxcompose.mission_tests.model import (
+    FAILS,
+    HALTED,
+    RUNS,
+    SKIPPED,
+    SUCCEEDS,
+    Expectations,
+    ExpectedMessage,
+    ExpectedStep,
+    ExpectedValue,
+)
 from rbxcompose.mission_tests.scope import read_value
-from rbxcompose.mission_tests.sections import Context, entries_of
+from rbxcompose.mission_tests.sections import TrialContext, entries_of
 from rbxcompose.missions.analysis.held_nodes import brief
 from rbxcompose.missions.language.literals import literal
 from rbxcompose.msgs import registry
@@ -26,11 +34,11 @@ STEP_HELP = "write the name of a skill, a node or a state, such as '- go_to: cor
 ENDS = {one: one for one in (SUCCEEDS, FAILS, HALTED, SKIPPED)}
 
 
-def read_expect(context: Context, node: Node | None, model: trials.Expect) -> Expect:
+def read_expect(context: TrialContext, node: TreeNode | None, model: trials.ExpectModel) -> Expectations:
     """Return what is expected."""
-    root = node or Tree()
+    root = node or MappingNode()
     _look_at_outcome(context, root, model)
-    expect = Expect(
+    expect = Expectations(
         model.outcome or "",
         value_span(root, ("outcome",)),
         model.for_,
@@ -39,7 +47,7 @@ def read_expect(context: Context, node: Node | None, model: trials.Expect) -> Ex
         tuple(_counts(context, at(root, ("count",)), model.count)),
         tuple(_data(context, at(root, ("data",)))),
         tuple(_published(context, at(root, ("published",)), model.published)),
-        tuple(Named(text, text, value_span(root, ("reports", i))) for i, text in enumerate(model.reports)),
+        tuple(ExpectedValue(text, text, value_span(root, ("reports", i))) for i, text in enumerate(model.reports)),
     )
     for step in expect.steps:
         if model.for_ is not None and step.at is not None and step.at > model.for_:
@@ -47,7 +55,7 @@ def read_expect(context: Context, node: Node | None, model: trials.Expect) -> Ex
     return expect
 
 
-def _look_at_outcome(context: Context, root: Node, model: trials.Expect) -> None:
+def _look_at_outcome(context: TrialContext, root: TreeNode, model: trials.ExpectModel) -> None:
     report, ends = context.report, {**context.facts.ends, RUNS: RUNS}
     if model.outcome is not None and model.outcome not in ends:
         message = f"the mission '{context.program.name}' has no outcome '{model.outcome}'"
@@ -58,16 +66,16 @@ def _look_at_outcome(context: Context, root: Node, model: trials.Expect) -> None
         report.add(codes.NEVER.at(key_span(root, ("outcome",)), "every test of a mission ends", help=help_text))
 
 
-def _steps(context: Context, node: Node | None) -> list[Step]:
-    items = node.items if isinstance(node, Listed) else ()
+def _steps(context: TrialContext, node: TreeNode | None) -> list[ExpectedStep]:
+    items = node.items if isinstance(node, SequenceNode) else ()
     return [step for item in items if (step := _step(context, item))]
 
 
-def _step(context: Context, node: Node) -> Step | None:
+def _step(context: TrialContext, node: TreeNode) -> ExpectedStep | None:
     """Read one step: a word, or a map with one name beside `ended` and `at`."""
     entries = dict(entries_of(node))
-    if isinstance(node, Scalar):
-        entries = {node.text: Entry(node, Scalar("", node.span))}
+    if isinstance(node, ScalarNode):
+        entries = {node.text: Entry(node, ScalarNode("", node.span))}
     names = [key for key in entries if key not in STEP_KEYS]
     if len(names) != 1 or not names[0]:
         message = "this is no step" if not names else f"a step has one name, this has {len(names)}"
@@ -81,17 +89,17 @@ def _step(context: Context, node: Node) -> Step | None:
         return None
     when = validate(Time, entries["at"].value, ("at",), context.report) if "at" in entries else None
     arguments = _arguments(context, name, entry.value)
-    text = name if isinstance(entry.value, Scalar) and not entry.value.text else f"{name} {brief(entry.value)}"
-    if isinstance(entry.value, Tree):
+    text = name if isinstance(entry.value, ScalarNode) and not entry.value.text else f"{name} {brief(entry.value)}"
+    if isinstance(entry.value, MappingNode):
         text = " ".join([name, *(f"{key} {brief(one.value)}" for key, one in entry.value.entries.items())])
-    return Step(name, entry.key.span, arguments, _ended(context, name, entries), when, text, steps[name])
+    return ExpectedStep(name, entry.key.span, arguments, _ended(context, name, entries), when, text, steps[name])
 
 
-def _ended(context: Context, name: str, entries: Mapping[str, Entry]) -> str:
+def _ended(context: TrialContext, name: str, entries: Mapping[str, Entry]) -> str:
     node = entries["ended"].value if "ended" in entries else None
     if node is None:
         return ""
-    word = node.text if isinstance(node, Scalar) else ""
+    word = node.text if isinstance(node, ScalarNode) else ""
     known = {**ENDS, RUNS: RUNS, **context.facts.steps[name]}
     if word not in known:
         message = f"'{name}' does not end with '{word}'" if word else "'ended' needs a word"
@@ -99,15 +107,15 @@ def _ended(context: Context, name: str, entries: Mapping[str, Entry]) -> str:
     return word
 
 
-def _arguments(context: Context, name: str, node: Node) -> dict[str, Value]:
+def _arguments(context: TrialContext, name: str, node: TreeNode) -> dict[str, Value]:
     """Return the arguments of a call that are expected; a single value is the main one."""
-    if isinstance(node, Scalar) and node.plain and not node.text:
+    if isinstance(node, ScalarNode) and node.plain and not node.text:
         return {}
     skill = context.facts.skills.get(name)
     if skill is None:
         context.report.add(codes.NO_STEP.at(node.span, f"'{name}' is no skill, so that it has no arguments"))
         return {}
-    written = {key: one.value for key, one in entries_of(node)} if isinstance(node, Tree) else {skill.main: node}
+    written = {key: one.value for key, one in entries_of(node)} if isinstance(node, MappingNode) else {skill.main: node}
     found: dict[str, Value] = {}
     for key, value in written.items():
         if key not in skill.arguments:
@@ -120,7 +128,7 @@ def _arguments(context: Context, name: str, node: Node) -> dict[str, Value]:
     return found
 
 
-def _counts(context: Context, node: Node | None, counts: Mapping[str, int]) -> list[Named]:
+def _counts(context: TrialContext, node: TreeNode | None, counts: Mapping[str, int]) -> list[ExpectedValue]:
     found = []
     for name, entry in entries_of(node):
         if name not in context.facts.steps:
@@ -129,11 +137,11 @@ def _counts(context: Context, node: Node | None, counts: Mapping[str, int]) -> l
         elif counts.get(name, -1) < 0:
             context.report.add(codes.NEVER.at(entry.value.span, "nothing is done less often than never"))
         else:
-            found.append(Named(name, counts[name], entry.key.span))
+            found.append(ExpectedValue(name, counts[name], entry.key.span))
     return found
 
 
-def _data(context: Context, node: Node | None) -> list[Named]:
+def _data(context: TrialContext, node: TreeNode | None) -> list[ExpectedValue]:
     found = []
     for name, entry in entries_of(node):
         wanted = context.type_of_datum(name)
@@ -143,25 +151,29 @@ def _data(context: Context, node: Node | None) -> list[Named]:
             continue
         value, findings = read_value(entry.value, wanted or UNKNOWN, context.names, f"the datum '{name}'")
         context.report.extend(findings)
-        found.append(Named(name, value, entry.key.span))
+        found.append(ExpectedValue(name, value, entry.key.span))
     return found
 
 
-def _published(context: Context, node: Node | None, models: Sequence[trials.Sent]) -> list[Sent]:
+def _published(
+    context: TrialContext, node: TreeNode | None, models: Sequence[trials.SentModel]
+) -> list[ExpectedMessage]:
     found = []
     for index, model in enumerate(models):
-        span: Span = value_span(node or Tree(), (index, "topic"))
+        span: Span = value_span(node or MappingNode(), (index, "topic"))
         known = {topic.strip("/"): topic for topic in context.facts.topics}
         if model.topic.strip("/") not in known:
             message = f"the mission '{context.program.name}' does not publish on '{model.topic}'"
             context.report.add(codes.UNKNOWN.misspelt(span, message, model.topic, known, "its topics"))
             continue
         topic = known[model.topic.strip("/")]
-        found.append(Sent(topic, _fields(context, topic, at(node or Tree(), (index, "message"))), span))
+        found.append(
+            ExpectedMessage(topic, _fields(context, topic, at(node or MappingNode(), (index, "message"))), span)
+        )
     return found
 
 
-def _fields(context: Context, topic: str, node: Node | None) -> dict[str, Value]:
+def _fields(context: TrialContext, topic: str, node: TreeNode | None) -> dict[str, Value]:
     """Return the fields that are expected of a message; a single value stands for the only one."""
     if node is None:
         return {}

@@ -18,7 +18,7 @@ from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Reported, SkillStarted
 from rbxcompose.missions.engine.run import STILL_HOLDS
 from rbxcompose.missions.engine.snapshot import restore, save
-from rbxcompose.missions.engine.story import Story
+from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.engine.value_text import show_briefly
 from rbxcompose.missions.program.program import Program, RobotNames
@@ -29,7 +29,7 @@ _DONE = {SUCCEEDS: "succeeds", FAILS: "fails"}
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class ExplorationLimits:
     """How far a mission is explored: states in all, and choices one after the other."""
 
     states: int = 2000
@@ -57,7 +57,7 @@ class Explored:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class ExploredChoice:
     """One thing that may happen next: a call ends, time passes, a value changes."""
 
     text: str
@@ -80,7 +80,9 @@ class Moment:
     script: tuple[str, ...] = ()
 
 
-def explore(program: Program, robot: RobotNames, inputs: Mapping[str, Value], limits: Limits = Limits()) -> Explored:
+def explore(
+    program: Program, robot: RobotNames, inputs: Mapping[str, Value], limits: ExplorationLimits = ExplorationLimits()
+) -> Explored:
     """Explore a mission without mistakes."""
     return Explorer(program, robot, inputs, limits).explore()
 
@@ -88,7 +90,9 @@ def explore(program: Program, robot: RobotNames, inputs: Mapping[str, Value], li
 class Explorer:
     """Restores an engine to each moment, lets one more thing happen, and looks at where that leads."""
 
-    def __init__(self, program: Program, robot: RobotNames, inputs: Mapping[str, Value], limits: Limits) -> None:
+    def __init__(
+        self, program: Program, robot: RobotNames, inputs: Mapping[str, Value], limits: ExplorationLimits
+    ) -> None:
         self.limits = limits
         self.robot = robot
         self.out = Explored(program.name)
@@ -117,22 +121,22 @@ class Explorer:
                 self.follow(moment, choice)
         return self.out
 
-    def choices(self, moment: Moment) -> Iterator[Choice]:
+    def choices(self, moment: Moment) -> Iterator[ExploredChoice]:
         """Yield what may happen next."""
         if moment.engine is None:
-            yield Choice("")
+            yield ExploredChoice("")
         for leaf, words in moment.calls.items():
             skill = self.robot.skills.get(self.skills[leaf])
             for outcome in (SUCCEEDS, FAILS, *(skill.outcomes if skill else ())):
-                yield Choice(f"{words} {_DONE.get(outcome, f'ends {outcome}')}", leaf=leaf, outcome=outcome)
+                yield ExploredChoice(f"{words} {_DONE.get(outcome, f'ends {outcome}')}", leaf=leaf, outcome=outcome)
         wake = self.wake_of(moment)
         if wake is not None:
-            yield Choice(f"{max(0.0, wake - moment.now):.3g} s pass", until=wake)
+            yield ExploredChoice(f"{max(0.0, wake - moment.now):.3g} s pass", until=wake)
         for name, values in self.values.items():
             for value in values:
                 if value != moment.values[name]:
                     words = show_briefly(self.robot.values.get(name), value)
-                    yield Choice(f"{name} becomes {words}", name=name, value=value)
+                    yield ExploredChoice(f"{name} becomes {words}", name=name, value=value)
 
     def wake_of(self, moment: Moment) -> float | None:
         """Return when the mission wakes by itself [s]."""
@@ -141,7 +145,7 @@ class Explorer:
         restore(self.engine, moment.engine)
         return self.engine.next_wake()
 
-    def follow(self, moment: Moment, choice: Choice) -> None:
+    def follow(self, moment: Moment, choice: ExploredChoice) -> None:
         """Let one thing happen, and keep where it leads if that is new."""
         engine, world = self.engine, self.world
         restore(engine, self.fresh if moment.engine is None else moment.engine)
@@ -162,7 +166,7 @@ class Explorer:
         engine.tick(world.now)
         self.look(script)
 
-    def counts_as(self, choice: Choice) -> str:
+    def counts_as(self, choice: ExploredChoice) -> str:
         """Return what the outcome of a call counts as."""
         skill = self.robot.skills.get(self.skills[choice.leaf])
         return (skill.outcomes if skill else {}).get(choice.outcome, choice.outcome)
@@ -213,7 +217,7 @@ class ExploredWorld:
         self.held: dict[int, str] = {}
         self.reports: list[str] = []
         self.end: MissionEnded | None = None
-        self.story = Story(mission, robot.skills)
+        self.story = MissionStory(mission, robot.skills)
 
     def enter(self, moment: Moment) -> None:
         """Be as it was then."""

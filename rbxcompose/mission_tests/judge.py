@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from rbxcompose.expressions.types import Type
 from rbxcompose.expressions.values import NOT_ARRIVED
 from rbxcompose.findings import Span
-from rbxcompose.mission_tests.model import RUNS, Expect, Step
-from rbxcompose.mission_tests.record import Done, Record
+from rbxcompose.mission_tests.model import RUNS, Expectations, ExpectedStep
+from rbxcompose.mission_tests.record import Done, TrialRecord
 from rbxcompose.mission_tests.scope import agrees
 from rbxcompose.missions.engine.value_text import show
 from rbxcompose.units import format_number
@@ -18,7 +18,7 @@ ON_TIME = 0.01  # [s] by which a step may differ from its `at`
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class UnmetExpectation:
     """Something that is not as expected: in words, its place in the test, the line of the trace that it follows."""
 
     message: str
@@ -26,7 +26,7 @@ class Problem:
     line: int | None = None
 
 
-def judge(expect: Expect, record: Record, types: Mapping[str, Type]) -> list[Problem]:
+def judge(expect: Expectations, record: TrialRecord, types: Mapping[str, Type]) -> list[UnmetExpectation]:
     """Return what is not as it was expected, nothing for a test that passed; `types` are those of the data."""
     return [
         *_ending(expect, record),
@@ -39,45 +39,49 @@ def judge(expect: Expect, record: Record, types: Mapping[str, Type]) -> list[Pro
     ]
 
 
-def _ending(expect: Expect, record: Record) -> Iterator[Problem]:
+def _ending(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpectation]:
     last = len(record.lines) - 1
     if record.trouble:
-        yield Problem(record.trouble, expect.outcome_span, last)
+        yield UnmetExpectation(record.trouble, expect.outcome_span, last)
         return
     happened = record.outcome
     counts_as = record.end.result if record.end else RUNS
     if expect.outcome and expect.outcome not in (happened, counts_as):
         why = f": {record.end.message}" if record.end and record.end.message else ""
-        yield Problem(
+        yield UnmetExpectation(
             f"expected outcome {expect.outcome}, the mission {_how(happened)}{why}", expect.outcome_span, last
         )
     if record.late:
         events = "an event" if record.late == 1 else f"{record.late} events"
-        yield Problem(f"the mission ended at {at(record.now)}, before {events} of the test", expect.outcome_span, last)
+        yield UnmetExpectation(
+            f"the mission ended at {at(record.now)}, before {events} of the test", expect.outcome_span, last
+        )
 
 
 def _how(outcome: str) -> str:
     return "is still running" if outcome == RUNS else f"ended with {outcome}"
 
 
-def _steps(expected: Sequence[Step], record: Record) -> Iterator[Problem]:
+def _steps(expected: Sequence[ExpectedStep], record: TrialRecord) -> Iterator[UnmetExpectation]:
     """Look for each step behind the one before it, also after one that is missing."""
     behind = 0
     for step in expected:
         found = next((i for i in range(behind, len(record.steps)) if is_it(step, record.steps[i])), None)
         if found is None:
             line = record.steps[behind - 1].line if behind else -1
-            yield Problem(f"expected {_written(step)}: {_nearest(step, record.steps, behind)}", step.span, line)
+            yield UnmetExpectation(
+                f"expected {_written(step)}: {_nearest(step, record.steps, behind)}", step.span, line
+            )
         else:
             behind = found + 1
 
 
-def is_it(step: Step, done: Done) -> bool:
+def is_it(step: ExpectedStep, done: Done) -> bool:
     """Tell whether a step that was done is the one that is looked for."""
     return done.name == step.name and not _differences(step, done)
 
 
-def _differences(step: Step, done: Done) -> list[str]:
+def _differences(step: ExpectedStep, done: Done) -> list[str]:
     """Return in which ways a step of the same name is another one; empty words for other arguments."""
     found = []
     arguments = step.arguments.items()
@@ -90,7 +94,7 @@ def _differences(step: Step, done: Done) -> list[str]:
     return found
 
 
-def _nearest(step: Step, done: Sequence[Done], behind: int) -> str:
+def _nearest(step: ExpectedStep, done: Sequence[Done], behind: int) -> str:
     """Return what comes nearest to a step that is missing, in words: the same call first, then one that is alike.
 
     What was done before what was looked for counts more than a call with other arguments behind it.
@@ -106,38 +110,40 @@ def _nearest(step: Step, done: Sequence[Done], behind: int) -> str:
     return "it was never begun" if not behind else f"it was not begun after {done[behind - 1].text}"
 
 
-def _written(step: Step) -> str:
+def _written(step: ExpectedStep) -> str:
     ended = f", ended {step.ended}" if step.ended else ""
     return f"{step.text}{ended}" + (f", at {at(step.at)}" if step.at is not None else "")
 
 
-def _never(never: Sequence[Step], record: Record) -> Iterator[Problem]:
+def _never(never: Sequence[ExpectedStep], record: TrialRecord) -> Iterator[UnmetExpectation]:
     for step in never:
         done = next((one for one in record.steps if is_it(step, one)), None)
         if done:
-            yield Problem(f"{_written(step)} must never be done, and was at {at(done.began)}", step.span, done.line)
+            yield UnmetExpectation(
+                f"{_written(step)} must never be done, and was at {at(done.began)}", step.span, done.line
+            )
 
 
-def _counts(expect: Expect, record: Record) -> Iterator[Problem]:
+def _counts(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpectation]:
     for one in expect.count:
         count = sum(step.name == one.name for step in record.steps)
         if count != one.value:
-            yield Problem(f"expected {_times(one.name, one.value)}, counted {count}", one.span)
+            yield UnmetExpectation(f"expected {_times(one.name, one.value)}, counted {count}", one.span)
 
 
 def _times(name: str, count: object) -> str:
     return f"{name} {'once' if count == 1 else f'{count} times'}"
 
 
-def _data(expect: Expect, record: Record, types: Mapping[str, Type]) -> Iterator[Problem]:
+def _data(expect: Expectations, record: TrialRecord, types: Mapping[str, Type]) -> Iterator[UnmetExpectation]:
     for one in expect.data:
         happened, kind = record.data.get(one.name, NOT_ARRIVED), types.get(one.name)
         if not agrees(one.value, happened):
             told = "it has no value" if happened is NOT_ARRIVED else f"it is {show(kind, happened)}"
-            yield Problem(f"expected {one.name} to be {show(kind, one.value)}, {told}", one.span)
+            yield UnmetExpectation(f"expected {one.name} to be {show(kind, one.value)}, {told}", one.span)
 
 
-def _published(expect: Expect, record: Record) -> Iterator[Problem]:
+def _published(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpectation]:
     behind = 0
     for sent in expect.published:
         rest = enumerate(record.published[behind:], behind)
@@ -146,15 +152,15 @@ def _published(expect: Expect, record: Record) -> Iterator[Problem]:
         if found is None:
             others = [show(None, fields) for topic, fields in record.published if topic == sent.topic]
             told = f"; on it were: {', '.join(others[:3])}" if others else "; nothing was published on it"
-            yield Problem(f"expected {show(None, sent.fields)} on {sent.topic}{told}", sent.span)
+            yield UnmetExpectation(f"expected {show(None, sent.fields)} on {sent.topic}{told}", sent.span)
         else:
             behind = found + 1
 
 
-def _reports(expect: Expect, record: Record) -> Iterator[Problem]:
+def _reports(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpectation]:
     for one in expect.reports:
         if not any(one.name in text for text in record.reports):
-            yield Problem(f"nothing that was logged or reported has '{one.name}' in it", one.span)
+            yield UnmetExpectation(f"nothing that was logged or reported has '{one.name}' in it", one.span)
 
 
 def at(seconds: float) -> str:

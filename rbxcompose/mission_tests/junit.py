@@ -6,12 +6,12 @@ import re
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
-from rbxcompose.mission_tests.report import Outcome, Teller
+from rbxcompose.mission_tests.report import FileOutcome, Teller
 
 _NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def junit(outcomes: Sequence[Outcome]) -> str:
+def junit(outcomes: Sequence[FileOutcome]) -> str:
     """Return one suite with a case for each test; what kept a test from running is an error, all else a failure."""
     failed = [one for one in outcomes if one.verdict and not one.passed]
     broken = [one for one in outcomes if not one.verdict]

@@ -19,7 +19,7 @@ def missions_in(program: Program) -> Iterator[Program]:
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class MissionFacts:
     """What a mission asks of the robot, and its steps by name, each with what its outcomes count as."""
 
     skills: Mapping[str, Skill]
@@ -30,7 +30,7 @@ class Facts:
     ends: Mapping[str, str]
 
     @classmethod
-    def of(cls, program: Program, robot: RobotNames) -> Facts:
+    def of(cls, program: Program, robot: RobotNames) -> MissionFacts:
         """Return what is known of a linked mission."""
         named: dict[str, Mapping[str, str]] = {}
         for node in program.nodes:

@@ -8,20 +8,20 @@ from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Finding
 from rbxcompose.manifest import test_file as trials
-from rbxcompose.manifest.tree import Entry, Node, Path, Sequence, at, value_span
+from rbxcompose.manifest.tree import Entry, KeyPath, SequenceNode, TreeNode, at, value_span
 from rbxcompose.mission_tests import codes
 from rbxcompose.mission_tests.model import FAILS, SUCCEEDS, Mock
 from rbxcompose.mission_tests.scope import read_value
-from rbxcompose.mission_tests.sections import Context, entries_of
+from rbxcompose.mission_tests.sections import TrialContext, entries_of
 from rbxcompose.missions.program.program import Skill
 
 
-def read_mocks(context: Context, node: Node | None, models: Mapping[str, trials.Mock]) -> dict[str, Mock]:
+def read_mocks(context: TrialContext, node: TreeNode | None, models: Mapping[str, trials.MockModel]) -> dict[str, Mock]:
     """Return the mocks by the name of what they stand for."""
     return {name: _mock(context, name, entry, models[name]) for name, entry in entries_of(node) if name in models}
 
 
-def _mock(context: Context, name: str, entry: Entry, model: trials.Mock) -> Mock:
+def _mock(context: TrialContext, name: str, entry: Entry, model: trials.MockModel) -> Mock:
     report, names, value = context.report, context.names, entry.value
     if name not in names.skills and name not in names.services:
         message, valid = f"the robot has no skill or service '{name}'", {**names.skills, **names.services}
@@ -47,9 +47,9 @@ def _mock(context: Context, name: str, entry: Entry, model: trials.Mock) -> Mock
     )
 
 
-def _outcomes(value: Node, model: trials.Mock, outcomes: Mapping[str, str]) -> Iterator[Finding]:
+def _outcomes(value: TreeNode, model: trials.MockModel, outcomes: Mapping[str, str]) -> Iterator[Finding]:
     """Yield what is wrong with the outcomes."""
-    written: dict[Path, str] = {("result",): model.result}
+    written: dict[KeyPath, str] = {("result",): model.result}
     written |= {("outcome_at", call): outcome for call, outcome in model.outcome_at.items()}
     for path, outcome in written.items():
         if outcome not in outcomes:
@@ -57,9 +57,9 @@ def _outcomes(value: Node, model: trials.Mock, outcomes: Mapping[str, str]) -> I
             yield codes.UNKNOWN.misspelt(value_span(value, path), message, outcome, outcomes, "outcomes")
 
 
-def _values(context: Context, skill: Skill, node: Node | None) -> list[Value]:
+def _values(context: TrialContext, skill: Skill, node: TreeNode | None) -> list[Value]:
     """Return the values of the main argument for which calls fail."""
-    if not isinstance(node, Sequence):
+    if not isinstance(node, SequenceNode):
         return []
     if not skill.main:
         context.report.add(codes.NEVER.at(node.span, f"'{skill.name}' takes no argument"))

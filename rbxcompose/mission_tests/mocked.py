@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
-from rbxcompose.mission_tests.model import FAILS, SUCCEEDS, Mock, Setting
+from rbxcompose.mission_tests.model import FAILS, SUCCEEDS, Mock, ValueSetting
 from rbxcompose.mission_tests.scope import TrialScope, agrees
-from rbxcompose.missions.engine.scopes import Values
+from rbxcompose.missions.engine.scopes import RobotValues
 from rbxcompose.missions.program.program import RobotNames
 from rbxcompose.missions.program.results import Result
 
@@ -17,7 +17,7 @@ ROUNDING = 1e-9  # [s]
 
 
 @dataclass(slots=True)
-class Call:
+class MockedCall:
     """A call that is being answered until `due` [s]; while it is held, `due` is what is left."""
 
     leaf: int
@@ -32,13 +32,13 @@ class Mocked:
 
     def __init__(self, mocks: Mapping[str, Mock]) -> None:
         self.mocks = mocks
-        self._calls: dict[int, Call] = {}
+        self._calls: dict[int, MockedCall] = {}
         self._ended: Counter[str] = Counter()
 
     def start(self, leaf: int, name: str, arguments: Mapping[str, Value], now: float) -> None:
         """Begin to answer."""
         mock = self.mocks[name]
-        self._calls[leaf] = Call(leaf, mock, arguments, now + mock.takes)
+        self._calls[leaf] = MockedCall(leaf, mock, arguments, now + mock.takes)
 
     def halt(self, leaf: int) -> bool:
         """Forget a call; tell whether there was one."""
@@ -62,7 +62,7 @@ class Mocked:
         """Return when the next call ends [s]."""
         return min((call.due for call in self._calls.values() if not call.is_held), default=None)
 
-    def ended(self, now: float) -> Iterator[tuple[Call, Result]]:
+    def ended(self, now: float) -> Iterator[tuple[MockedCall, Result]]:
         """Yield the calls that end now, in the order in which they are due, then in that of their leaves."""
         due = [call for call in self._calls.values() if not call.is_held and call.due <= now + ROUNDING]
         for call in sorted(due, key=lambda call: (call.due, call.leaf)):
@@ -70,7 +70,7 @@ class Mocked:
             self._ended[call.mock.name] += 1
             yield call, self._result(call)
 
-    def _result(self, call: Call) -> Result:
+    def _result(self, call: MockedCall) -> Result:
         mock = call.mock
         outcome = mock.outcome(self._ended[mock.name], call.arguments.get(mock.main), agrees)
         succeeds = mock.outcomes.get(outcome, outcome) == SUCCEEDS
@@ -81,7 +81,7 @@ class Mocked:
 class SetValues:
     """The values that a test has set, over those of the robot."""
 
-    def __init__(self, robot: RobotNames, inputs: Mapping[str, Value], below: Values | None = None) -> None:
+    def __init__(self, robot: RobotNames, inputs: Mapping[str, Value], below: RobotValues | None = None) -> None:
         self._robot = robot
         self._inputs = inputs
         self.below = below  # the robot's own, if it runs
@@ -89,7 +89,7 @@ class SetValues:
         self._times: dict[str, float] = {}
         self._counts: dict[str, int] = {}
 
-    def set(self, settings: Mapping[str, Setting], known: Mapping[str, Value], now: float) -> dict[str, Value]:
+    def set(self, settings: Mapping[str, ValueSetting], known: Mapping[str, Value], now: float) -> dict[str, Value]:
         """Compute all values, then set them; raises what expressions raise. Return what was set."""
         scope = TrialScope({**self._inputs, **known}, self._robot.places, Now(self, now))
         computed = {name: setting(scope) for name, setting in settings.items()}

@@ -15,7 +15,7 @@ from rbxcompose.plan.model import Plan
 SUCCEEDS, FAILS, RUNS = NAMES[SUCCESS], NAMES[FAILURE], NAMES[RUNNING]
 HALTED, SKIPPED = "halted", "skipped"
 
-Setting = Callable[[Scope], Value]
+ValueSetting = Callable[[Scope], Value]
 """Computes the value that a test gives to a name."""
 
 
@@ -31,7 +31,7 @@ class Mock:
     takes: float = 0.0  # [s]
     result: str = SUCCEEDS
     message: str = ""
-    sets: Mapping[str, Setting] = field(default_factory=dict)
+    sets: Mapping[str, ValueSetting] = field(default_factory=dict)
     fails_at: frozenset[int] = frozenset()
     fails_for: tuple[Value, ...] = ()
     outcome_at: Mapping[int, str] = field(default_factory=dict)
@@ -48,26 +48,26 @@ class Mock:
 
 
 @dataclass(frozen=True, slots=True)
-class Deed:
+class EventDeed:
     """One thing that happens: a word of the file, with what belongs to it."""
 
     word: str
-    settings: Mapping[str, Setting] = field(default_factory=dict)
+    settings: Mapping[str, ValueSetting] = field(default_factory=dict)
     topic: str = ""
     message: Message | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class TrialEvent:
     """What happens to the robot at a time [s]."""
 
     at: float
-    deeds: tuple[Deed, ...]
+    deeds: tuple[EventDeed, ...]
     span: Span
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class ExpectedStep:
     """A step that is looked for: a call of a skill, a named node or a state.
 
     `counts_as` tells for the outcomes that this step may have what each counts as.
@@ -83,7 +83,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Sent:
+class ExpectedMessage:
     """A message that is looked for: a topic, and those of its fields that count."""
 
     topic: str
@@ -92,7 +92,7 @@ class Sent:
 
 
 @dataclass(frozen=True, slots=True)
-class Named:
+class ExpectedValue:
     """Something that is expected under a name, with its place."""
 
     name: str
@@ -101,18 +101,18 @@ class Named:
 
 
 @dataclass(frozen=True, slots=True)
-class Expect:
+class Expectations:
     """What must have happened; `until` [s] ends the test before the mission does."""
 
     outcome: str = ""
     outcome_span: Span | None = None
     until: float | None = None
-    steps: tuple[Step, ...] = ()
-    never: tuple[Step, ...] = ()
-    count: tuple[Named, ...] = ()
-    data: tuple[Named, ...] = ()
-    published: tuple[Sent, ...] = ()
-    reports: tuple[Named, ...] = ()
+    steps: tuple[ExpectedStep, ...] = ()
+    never: tuple[ExpectedStep, ...] = ()
+    count: tuple[ExpectedValue, ...] = ()
+    data: tuple[ExpectedValue, ...] = ()
+    published: tuple[ExpectedMessage, ...] = ()
+    reports: tuple[ExpectedValue, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +133,6 @@ class Trial:
     plan: Plan
     inputs: Mapping[str, Value]
     mocks: Mapping[str, Mock]
-    events: tuple[Event, ...]
-    expect: Expect
+    events: tuple[TrialEvent, ...]
+    expect: Expectations
     is_complete: bool

@@ -11,19 +11,18 @@ from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import resolve, shown_name
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.test_file import SECTIONS, TEST, TrialFile
-from rbxcompose.manifest.tree import Entry, Node, Scalar
-from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, validate
 from rbxcompose.mission_tests import codes
 from rbxcompose.mission_tests.event_reader import PUBLISH, read_events
 from rbxcompose.mission_tests.expectation_reader import read_expect
-from rbxcompose.mission_tests.mission_facts import Facts
+from rbxcompose.mission_tests.mission_facts import MissionFacts
 from rbxcompose.mission_tests.mock_reader import read_mocks
-from rbxcompose.mission_tests.model import Event, Mock, Trial
-from rbxcompose.mission_tests.sections import Context
+from rbxcompose.mission_tests.model import Mock, Trial, TrialEvent
+from rbxcompose.mission_tests.sections import TrialContext
 from rbxcompose.missions.engine.inputs import bind_inputs
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.program import Program
@@ -32,17 +31,17 @@ from rbxcompose.plan.model import Plan
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class WrittenTrial:
     """The file of a test, before anything in it is understood; without `root` it cannot be read."""
 
     path: Path
     name: str
-    root: Tree | None
+    root: MappingNode | None
     report: Report
 
 
 @dataclass(slots=True)
-class Reading:
+class TrialReader:
     """Reads the tests of one run; each robot is compiled once, and its findings are told once.
 
     `sources` are the texts of all files, `report` has what is wrong with robots.
@@ -59,14 +58,14 @@ class Reading:
         written = self.open(path)
         return self.understand(written), written.report
 
-    def open(self, path: Path) -> Written:
+    def open(self, path: Path) -> WrittenTrial:
         """Return what is written in a file; a test without a name is called like its file."""
         report = Report()
         root = Documents(report, self.sources).read(path, TEST)
         name = root.get("name") if root else None
-        return Written(path, name.text if isinstance(name, Scalar) and name.text else path.name, root, report)
+        return WrittenTrial(path, name.text if isinstance(name, ScalarNode) and name.text else path.name, root, report)
 
-    def understand(self, written: Written) -> Trial | None:
+    def understand(self, written: WrittenTrial) -> Trial | None:
         """Return the test that is written, None if it cannot run; what is wrong is added to its report."""
         root, report = written.root, written.report
         if root is None:
@@ -90,7 +89,7 @@ class Reading:
             which = "the test" if len(ones) == 1 else f"{len(ones)} tests"
             yield replace(ones[0], message=_no_robot(robot, which))
 
-    def _robot(self, root: Tree, path: Path, report: Report) -> Compilation | None:
+    def _robot(self, root: MappingNode, path: Path, report: Report) -> Compilation | None:
         """Return what the compiler makes of the robot, if it can run."""
         written = _text(root, "robot", "the robot's file", report)
         if written is None:
@@ -117,25 +116,25 @@ def _no_robot(robot: str, which: str) -> str:
     return f"the robot '{robot}' has mistakes, so that {which} cannot run"
 
 
-def _without_values(root: Tree) -> Tree:
+def _without_values(root: MappingNode) -> MappingNode:
     """Return the header and the names of the sections; what these hold is looked at where it is read."""
-    sections = {name: Entry(entry.key, Scalar("", entry.value.span)) for name, entry in root.entries.items()}
-    header = {name: entry for name, entry in root.entries.items() if name in Header.model_fields}
+    sections = {name: Entry(entry.key, ScalarNode("", entry.value.span)) for name, entry in root.entries.items()}
+    header = {name: entry for name, entry in root.entries.items() if name in ManifestHeader.model_fields}
     return replace(root, entries={**sections, **header})
 
 
-def _text(root: Tree, key: str, what: str, report: Report) -> Scalar | None:
+def _text(root: MappingNode, key: str, what: str, report: Report) -> ScalarNode | None:
     value = root.get(key)
     if value is None:
         report.add(MISSING_KEY.at(root.span, f"a test needs '{key}': {what}"))
-    elif isinstance(value, Scalar) and value.text:
+    elif isinstance(value, ScalarNode) and value.text:
         return value
     else:
         report.add(WRONG_TYPE.at(value.span, f"'{key}' must be {what}", label=label_of(value)))
     return None
 
 
-def _read(root: Tree, robot: Robot, plan: Plan, report: Report) -> Trial | None:
+def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial | None:
     chosen = _text(root, "mission", "the name of a mission", report)
     if chosen is None:
         return None
@@ -147,7 +146,7 @@ def _read(root: Tree, robot: Robot, plan: Plan, report: Report) -> Trial | None:
     names, program = robot.names, robot.missions[chosen.text].program
     linked = link(program, names.missions)
     inputs = _inputs(root, robot, chosen, program, report)
-    context = Context(robot, linked, names, Facts.of(linked, names), report)
+    context = TrialContext(robot, linked, names, MissionFacts.of(linked, names), report)
     sections = {key: validate(model, root.entries[key].value, (key,), report) for key, model in _there(root)}
     mocks = read_mocks(context, root.get("mocks"), sections.get("mocks") or {})
     events = read_events(context, root.get("events"), sections.get("events") or ())
@@ -157,7 +156,7 @@ def _read(root: Tree, robot: Robot, plan: Plan, report: Report) -> Trial | None:
         return None
     expect = read_expect(context, root.get("expect"), model)
     _look_at_times(events, expect.until, report)
-    header = {key: value.text for key in ("name", "about") if isinstance(value := root.get(key), Scalar)}
+    header = {key: value.text for key in ("name", "about") if isinstance(value := root.get(key), ScalarNode)}
     return Trial(
         header.get("name", ""),
         header.get("about", ""),
@@ -176,7 +175,7 @@ def _read(root: Tree, robot: Robot, plan: Plan, report: Report) -> Trial | None:
     )
 
 
-def _is_complete(facts: Facts, mocks: Mapping[str, Mock], events: tuple[Event, ...]) -> bool:
+def _is_complete(facts: MissionFacts, mocks: Mapping[str, Mock], events: tuple[TrialEvent, ...]) -> bool:
     """Tell whether the mission asks for nothing but what the test gives, and nothing goes over the bus."""
     deeds = [deed for event in events for deed in event.deeds]
     values = {name for deed in deeds for name in deed.settings} | {name for one in mocks.values() for name in one.sets}
@@ -184,20 +183,22 @@ def _is_complete(facts: Facts, mocks: Mapping[str, Mock], events: tuple[Event, .
     return is_answered and facts.values <= values and not any(deed.word == PUBLISH for deed in deeds)
 
 
-def _there(root: Tree) -> list[tuple[str, Any]]:
+def _there(root: MappingNode) -> list[tuple[str, Any]]:
     """Return the sections that have something in them, with their models."""
     return [(key, model) for key, model in SECTIONS.items() if key in root and not _is_empty(root.entries[key].value)]
 
 
-def _is_empty(node: Node) -> bool:
-    return isinstance(node, Scalar) and node.plain and not node.text
+def _is_empty(node: TreeNode) -> bool:
+    return isinstance(node, ScalarNode) and node.plain and not node.text
 
 
-def _inputs(root: Tree, robot: Robot, chosen: Scalar, program: Program, report: Report) -> Mapping[str, object]:
+def _inputs(
+    root: MappingNode, robot: Robot, chosen: ScalarNode, program: Program, report: Report
+) -> Mapping[str, object]:
     """Return the inputs: those that the test gives, then the robot's, then the defaults."""
     given = root.get("with")
     entries: dict[str, Entry] = {}
-    if isinstance(given, Tree):
+    if isinstance(given, MappingNode):
         entries = given.entries
     elif given is not None and not _is_empty(given):
         report.add(WRONG_TYPE.at(given.span, "'with' must be a map from inputs to values", label=label_of(given)))
@@ -207,7 +208,7 @@ def _inputs(root: Tree, robot: Robot, chosen: Scalar, program: Program, report: 
     return bound
 
 
-def _look_at_times(events: tuple[Event, ...], until: float | None, report: Report) -> None:
+def _look_at_times(events: tuple[TrialEvent, ...], until: float | None, report: Report) -> None:
     """Add what can never happen: an event after the end, an order that the robot refuses."""
     is_stopped = is_paused = False
     latest = 0.0

@@ -19,12 +19,12 @@ from rbxcompose.missions.engine.events import (
     SkillEnded,
     SkillStarted,
 )
-from rbxcompose.missions.engine.story import Story
+from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.program.program import Skill
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class TraceLine:
     """One line of the trace, at a time [s]."""
 
     time: float
@@ -49,13 +49,13 @@ class Done:
 
 
 @dataclass(slots=True)
-class Record:
+class TrialRecord:
     """Hears the events of a mission, and what the test does."""
 
     mission: str
     skills: Mapping[str, Skill]
     now: float = 0.0  # [s] since the start
-    lines: list[Line] = field(default_factory=list)
+    lines: list[TraceLine] = field(default_factory=list)
     steps: list[Done] = field(default_factory=list)
     published: list[tuple[str, Mapping[str, Value]]] = field(default_factory=list)
     reports: list[str] = field(default_factory=list)
@@ -63,22 +63,22 @@ class Record:
     end: MissionEnded | None = None
     trouble: str = ""  # why the run itself could not be brought to its end
     late: int = 0  # events of the test that did not come any more
-    _story: Story = field(init=False)
+    _story: MissionStory = field(init=False)
     _open: dict[int, Done] = field(default_factory=dict)  # steps that run: calls by node, named nodes by its negative
 
     def __post_init__(self) -> None:
         """Begin the story."""
-        self._story = Story(self.mission, self.skills)
+        self._story = MissionStory(self.mission, self.skills)
 
     def note(self, text: str) -> None:
         """Add a line on what the test does."""
-        self.lines.append(Line(self.now, f"* {text}"))
+        self.lines.append(TraceLine(self.now, f"* {text}"))
 
     def hear(self, event: MissionEvent) -> None:
         """Keep what an event tells."""
         level, text = self._story.tell(event)
         if text:
-            self.lines.append(Line(self.now, text, level))
+            self.lines.append(TraceLine(self.now, text, level))
         match event:
             case SkillStarted(leaf=node, skill=name, arguments=arguments):
                 self._begin(node, Done(name, text, dict(arguments), self.now, len(self.lines) - 1))

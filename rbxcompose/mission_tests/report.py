@@ -9,8 +9,8 @@ from typing import Any
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.levels import Level
 from rbxcompose.mission_tests.coverage import Coverage
-from rbxcompose.mission_tests.judge import Problem
-from rbxcompose.mission_tests.record import Record
+from rbxcompose.mission_tests.judge import UnmetExpectation
+from rbxcompose.mission_tests.record import TrialRecord
 from rbxcompose.mission_tests.runner import Verdict
 from rbxcompose.printable import plain
 
@@ -21,7 +21,7 @@ _RESET = "\x1b[0m"
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class FileOutcome:
     """What became of one file: a verdict, or the findings that kept it from running; `took` is real time [s]."""
 
     file: str
@@ -51,7 +51,7 @@ class Teller:
         """Return a text in a colour."""
         return f"{_COLOURS[style]}{text}{_RESET}" if self.colour else text
 
-    def line(self, one: Outcome) -> str:
+    def line(self, one: FileOutcome) -> str:
         """Return the one line on a test."""
         word = self.paint("pass", "passed") if one.passed else self.paint("fail", "FAILED")
         times = f"{one.took * 1e3:.0f} ms" + (f", {one.robot_time:.1f} s of robot time" if one.verdict else "")
@@ -60,7 +60,7 @@ class Teller:
     def trace(self, verdict: Verdict) -> str:
         """Return what happened, with each problem behind the line at which it shows."""
         record = verdict.record
-        placed: dict[int, list[Problem]] = {}
+        placed: dict[int, list[UnmetExpectation]] = {}
         for problem in verdict.problems:
             line = len(record.lines) - 1 if problem.line is None else problem.line
             placed.setdefault(line, []).append(problem)
@@ -75,17 +75,17 @@ class Teller:
             before = index
         return "\n".join(lines)
 
-    def _step(self, record: Record, index: int) -> str:
+    def _step(self, record: TrialRecord, index: int) -> str:
         line = record.lines[index]
         text = plain(line.text)
         told = text if line.level is Level.OK else self.paint("warn", text)
         return f"  {self.paint('time', f'{line.time:9.2f}')}  {told}"
 
-    def _problem(self, problem: Problem) -> str:
+    def _problem(self, problem: UnmetExpectation) -> str:
         where = f"  [{problem.span.file}:{problem.span.line}]" if problem.span else ""
         return f"  {self.paint('fail', f'{MARK:>9}  {plain(problem.message)}')}{where}"
 
-    def summary(self, outcomes: Sequence[Outcome], coverage: Coverage) -> str:
+    def summary(self, outcomes: Sequence[FileOutcome], coverage: Coverage) -> str:
         """Return how many passed, and how much of the missions was tried."""
         failed = sum(not one.passed for one in outcomes)
         took = sum(one.took for one in outcomes)
@@ -98,7 +98,7 @@ class Teller:
         return "\n".join(lines)
 
 
-def _shown(count: int, placed: dict[int, list[Problem]]) -> Iterator[int]:
+def _shown(count: int, placed: dict[int, list[UnmetExpectation]]) -> Iterator[int]:
     """Yield which lines of a trace are shown: all, or of a long one its ends and what surrounds the problems."""
     near = {line + offset for line in placed for offset in range(-5, 6)}
     for index in range(count):
@@ -117,7 +117,7 @@ def coverage_text(coverage: Coverage) -> str:
     return "\n".join(lines)
 
 
-def as_json(outcomes: Sequence[Outcome], coverage: Coverage) -> dict[str, Any]:
+def as_json(outcomes: Sequence[FileOutcome], coverage: Coverage) -> dict[str, Any]:
     """Return all as data for programs."""
     return {
         "tests": [_test(one) for one in outcomes],
@@ -132,7 +132,7 @@ def as_json(outcomes: Sequence[Outcome], coverage: Coverage) -> dict[str, Any]:
     }
 
 
-def _test(one: Outcome) -> dict[str, Any]:
+def _test(one: FileOutcome) -> dict[str, Any]:
     problems = one.verdict.problems if one.verdict else []
     findings = [finding for finding in one.findings if finding.severity is Severity.ERROR]
     lines = one.verdict.record.lines if one.verdict else []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
-from rbxcompose.expressions.tree import Comparison, Expression, Flag, Minus, Node, Text, Variable, Word, walk
+from rbxcompose.expressions.tree import Comparison, Expression, ExpressionNode, Flag, Minus, Text, Variable, Word, walk
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.expressions.values import Value
 from rbxcompose.mission_tests.mission_facts import missions_in
@@ -63,7 +63,7 @@ def _compared(expression: Expression, constants: Mapping[str, Value]) -> Iterato
                     yield one.name, value
 
 
-def _constant(tree: Node, constants: Mapping[str, Value]) -> Value:
+def _constant(tree: ExpressionNode, constants: Mapping[str, Value]) -> Value:
     match tree:
         case Flag(value=flag):
             return flag

@@ -11,8 +11,8 @@ from rbxcompose.executive.world import RobotWorld
 from rbxcompose.expressions.values import NotArrived, Value
 from rbxcompose.manifest.test_file import LONGEST_TEST
 from rbxcompose.mission_tests.mocked import Mocked, SetValues
-from rbxcompose.mission_tests.model import Deed, Event, Trial
-from rbxcompose.mission_tests.record import Record
+from rbxcompose.mission_tests.model import EventDeed, Trial, TrialEvent
+from rbxcompose.mission_tests.record import TrialRecord
 from rbxcompose.mission_tests.watched_run import Setter, Watcher
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.world import World
@@ -25,7 +25,7 @@ from rbxcompose.sdk.registry import declared
 from rbxcompose.testing.bench import Bench
 
 OWNER = "test"
-Ended = Callable[[int, Result], None]
+WhenEnded = Callable[[int, Result], None]
 BEGINS_WITHIN = 60.0  # [s] after the last event of the test, else something never comes
 _COMMANDS = {"pause": PauseMission, "resume": ResumeMission, "cancel": CancelMission}
 
@@ -36,11 +36,11 @@ class RobotRun:
     def __init__(self, trial: Trial, watcher: Watcher) -> None:
         self.trial = trial
         self.watcher = watcher
-        self.record = Record(trial.mission, trial.names.skills)
+        self.record = TrialRecord(trial.mission, trial.names.skills)
         self.mocked = Mocked(trial.mocks)
         self.values = SetValues(trial.names, trial.inputs)
         self.setter = Setter(trial, self.record, self.values)
-        self.ended: Ended = lambda leaf, result: None  # tells the engine, once there is one
+        self.ended: WhenEnded = lambda leaf, result: None  # tells the engine, once there is one
         self.events = list(trial.events)  # that are still to come
         plan = _with_mission(trial.plan, trial)
         self.bench = Bench(plan=plan, start=False)
@@ -57,14 +57,14 @@ class RobotRun:
         """Return robot time [s]."""
         return self.bench.clock.now()
 
-    def make_world(self, ended: Ended, say: Callable[[MissionEvent], None]) -> tuple[World, RobotWorld]:
+    def make_world(self, ended: WhenEnded, say: Callable[[MissionEvent], None]) -> tuple[World, RobotWorld]:
         """Return the world of the test around that of the robot."""
         world, robot = self.make(ended, say)
         self.values.below = world
         self.ended = ended
         return TrialWorld(self, world), robot
 
-    def run(self) -> Record:
+    def run(self) -> TrialRecord:
         """Run until the mission or the test has ended, and return what happened."""
         for event in self.events:
             self.bench.scheduler.at(event.at, OWNER, lambda event=event: self._happens(event))  # type: ignore[misc]
@@ -88,7 +88,7 @@ class RobotRun:
                 self.record.trouble = f"the mission does not begin: nothing has come for {names}"
         return self.record.end is not None or bool(self.record.trouble)
 
-    def _happens(self, event: Event) -> None:
+    def _happens(self, event: TrialEvent) -> None:
         self.record.now = self.now
         self.events.remove(event)
         for deed in event.deeds:
@@ -98,7 +98,7 @@ class RobotRun:
                 self.record.trouble = f"the robot refuses to {deed.word} at {self.now:g} s: {refusal}"
         self.look()
 
-    def _do(self, deed: Deed) -> None:
+    def _do(self, deed: EventDeed) -> None:
         match deed.word:
             case "set":
                 self.setter.set(deed.settings, {}, self.now)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rbxcompose.mission_tests.coverage import Seen
-from rbxcompose.mission_tests.judge import Problem, judge
+from rbxcompose.mission_tests.coverage import SeenWays
+from rbxcompose.mission_tests.judge import UnmetExpectation, judge
 from rbxcompose.mission_tests.model import Trial
-from rbxcompose.mission_tests.record import Record
-from rbxcompose.mission_tests.stage import Stage
+from rbxcompose.mission_tests.record import TrialRecord
+from rbxcompose.mission_tests.stage import TrialStage
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,9 +16,9 @@ class Verdict:
     """A test that ran: what happened, what was not as expected, and which ways its mission took."""
 
     trial: Trial
-    record: Record
-    problems: list[Problem]
-    seen: Seen
+    record: TrialRecord
+    problems: list[UnmetExpectation]
+    seen: SeenWays
 
     @property
     def passed(self) -> bool:
@@ -28,9 +28,9 @@ class Verdict:
 
 def run_trial(trial: Trial) -> Verdict:
     """Run a test: the mission alone if the test answers for all that it needs, else the whole robot."""
-    seen = Seen()
+    seen = SeenWays()
     if trial.is_complete:
-        record = Stage(trial, seen).run()
+        record = TrialStage(trial, seen).run()
     else:
         from rbxcompose.mission_tests.robot_run import RobotRun  # a robot is not needed by every test
 

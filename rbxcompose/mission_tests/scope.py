@@ -8,16 +8,15 @@ from rbxcompose.config import Place
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.text import fill, parse_template
 from rbxcompose.expressions.types import POSE, UNKNOWN, Type, TypeKind
-from rbxcompose.expressions.values import NotArrived, Value, is_number, is_same
-from rbxcompose.expressions.values import Place as Placed
+from rbxcompose.expressions.values import NamedPose, NotArrived, Value, is_number, is_same
 from rbxcompose.findings import Finding
-from rbxcompose.manifest.tree import Node, Scalar
+from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.mission_tests import codes
-from rbxcompose.mission_tests.model import Setting
+from rbxcompose.mission_tests.model import ValueSetting
 from rbxcompose.missions.analysis.scope_types import NodeScope, View
 from rbxcompose.missions.engine import value_text
 from rbxcompose.missions.engine.condition_watches import POSE as POSE_NAME
-from rbxcompose.missions.engine.scopes import Values
+from rbxcompose.missions.engine.scopes import RobotValues
 from rbxcompose.missions.language.argument_types import check_written
 from rbxcompose.missions.language.literals import WrongValue, literal, typed
 from rbxcompose.missions.language.spans import expression_of
@@ -31,7 +30,7 @@ CLOSE = 1e-6  # relative difference of numbers that are equal
 class TrialScope:
     """The inputs of the mission, or the arguments of a call before them, then the robot's values and places."""
 
-    def __init__(self, known: Mapping[str, Value], places: Mapping[str, Place], values: Values) -> None:
+    def __init__(self, known: Mapping[str, Value], places: Mapping[str, Place], values: RobotValues) -> None:
         self._known = known
         self._places = places
         self._values = values
@@ -59,10 +58,10 @@ def names_of(robot: RobotNames) -> Mapping[str, Type]:
 
 
 def check_setting(
-    node: Node, wanted: Type, program: Program, robot: RobotNames, known: Mapping[str, Type]
+    node: TreeNode, wanted: Type, program: Program, robot: RobotNames, known: Mapping[str, Type]
 ) -> Iterator[Finding]:
     """Yield what is wrong with a value that a test gives to something of the type `wanted`."""
-    if not isinstance(node, Scalar):
+    if not isinstance(node, ScalarNode):
         if wanted.kind not in STRUCTURED and wanted != UNKNOWN:
             yield codes.WRONG_VALUE.at(node.span, f"this must be {wanted.phrase}")
         return
@@ -70,9 +69,9 @@ def check_setting(
     yield from check_written(View(program, robot, program.nodes[program.main], scope), node, wanted, codes.WRONG_VALUE)
 
 
-def setting_of(node: Node, wanted: Type, robot: RobotNames) -> Setting:
+def setting_of(node: TreeNode, wanted: Type, robot: RobotNames) -> ValueSetting:
     """Return what computes a value that is written down; only for one without findings."""
-    if not isinstance(node, Scalar):
+    if not isinstance(node, ScalarNode):
         constant = literal(node).value
         return lambda scope: constant
     if wanted.kind is TypeKind.TEXT:
@@ -91,10 +90,10 @@ def _placed(value: Value, robot: RobotNames) -> Value:
 
 
 def _word(value: Value) -> Value:
-    return value.name if isinstance(value, Placed) else value
+    return value.name if isinstance(value, NamedPose) else value
 
 
-def read_value(node: Node, wanted: Type, robot: RobotNames, what: str) -> tuple[Value, list[Finding]]:
+def read_value(node: TreeNode, wanted: Type, robot: RobotNames, what: str) -> tuple[Value, list[Finding]]:
     """Return a value that is expected, of the type `wanted`, and what is wrong with it."""
     if wanted == UNKNOWN:
         return literal(node).value, []

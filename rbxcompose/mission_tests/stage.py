@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from rbxcompose.expressions.values import NotArrived, Value
 from rbxcompose.manifest.test_file import LONGEST_TEST
 from rbxcompose.mission_tests.mocked import ROUNDING, Mocked, SetValues
-from rbxcompose.mission_tests.model import Deed, Trial
-from rbxcompose.mission_tests.record import Record
+from rbxcompose.mission_tests.model import EventDeed, Trial
+from rbxcompose.mission_tests.record import TrialRecord
 from rbxcompose.mission_tests.watched_run import Setter, Watcher
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
@@ -19,7 +19,7 @@ MOST_INSTANTS = 100_000  # at which something happens
 MOST_STEPS = 5000
 
 
-class Stage:
+class TrialStage:
     """The world of a mission that runs alone."""
 
     def __init__(self, trial: Trial, watcher: Watcher) -> None:
@@ -27,7 +27,7 @@ class Stage:
         self.watcher = watcher
         self.now = 0.0
         self.is_paused = False
-        self.record = Record(trial.mission, trial.names.skills)
+        self.record = TrialRecord(trial.mission, trial.names.skills)
         self.mocked = Mocked(trial.mocks)
         self.values = SetValues(trial.names, trial.inputs)
         self.setter = Setter(trial, self.record, self.values)
@@ -78,7 +78,7 @@ class Stage:
 
     # The run.
 
-    def run(self) -> Record:
+    def run(self) -> TrialRecord:
         """Jump from instant to instant until the mission or the test has ended, and return what happened."""
         until = self.trial.expect.until
         for _ in range(MOST_INSTANTS):
@@ -119,7 +119,7 @@ class Stage:
         if not self.is_paused:
             self.engine.tick(self.now)
 
-    def _do(self, deed: Deed) -> None:
+    def _do(self, deed: EventDeed) -> None:
         match deed.word:
             case "set":
                 self.setter.set(deed.settings, {}, self.now)

@@ -7,8 +7,8 @@ from typing import Protocol
 
 from rbxcompose.expressions.values import EvaluationError, NotArrivedError, Value
 from rbxcompose.mission_tests.mocked import SetValues
-from rbxcompose.mission_tests.model import Setting, Trial
-from rbxcompose.mission_tests.record import Record
+from rbxcompose.mission_tests.model import Trial, ValueSetting
+from rbxcompose.mission_tests.record import TrialRecord
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.value_text import show_briefly
 from rbxcompose.missions.engine.world import Observer
@@ -25,12 +25,12 @@ class Watcher(Observer, Protocol):
 class Setter:
     """Sets values for a test and tells it; an expression without a value is the end of the test."""
 
-    def __init__(self, trial: Trial, record: Record, values: SetValues) -> None:
+    def __init__(self, trial: Trial, record: TrialRecord, values: SetValues) -> None:
         self.trial = trial
         self.record = record
         self.values = values
 
-    def set(self, settings: Mapping[str, Setting], known: Mapping[str, Value], now: float) -> set[str]:
+    def set(self, settings: Mapping[str, ValueSetting], known: Mapping[str, Value], now: float) -> set[str]:
         """Set values; return their names."""
         try:
             computed = self.values.set(settings, known, now)

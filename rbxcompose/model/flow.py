@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import at
-from rbxcompose.model.robot import Part, Robot
-from rbxcompose.model.wires import End
+from rbxcompose.model.robot import Robot, RobotComponent
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.sdk.capabilities import CommandsMotion, Drives, Forwards
 from rbxcompose.sdk.ports import In
 
@@ -17,21 +17,21 @@ OTHER_TYPE = "take another type for one of them"  # the remedy where no setting 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A part whose commands reach a base."""
+    """A component whose commands reach a base."""
 
-    driver: Part
+    driver: RobotComponent
     commands: CommandsMotion
-    base: Part
+    base: RobotComponent
     drives: Drives
 
 
 @dataclass(frozen=True, slots=True)
-class Flow:
+class MessageFlow:
     """Which messages of a robot reach whom."""
 
     robot: Robot
 
-    def sources(self, end: End, passed: tuple[End, ...] = ()) -> Iterator[End]:
+    def sources(self, end: PortEnd, passed: tuple[PortEnd, ...] = ()) -> Iterator[PortEnd]:
         """Yield the outputs whose messages reach an input; of a mux, those that it may let through."""
         for writer in self.robot.writers.get(end.topic, ()):
             if writer in passed or writer.type_name != end.type_name:
@@ -42,51 +42,51 @@ class Flow:
             for one in inputs or ():
                 yield from self.sources(one, (*passed, writer))
 
-    def _let_through(self, output: End) -> list[End] | None:
+    def _let_through(self, output: PortEnd) -> list[PortEnd] | None:
         """Return the inputs that a mux lets through to an output; None if it is no output of a mux."""
-        part = self.robot.parts[output.instance]
-        muxed = [one.inputs for one in part.declared(Forwards) if one.output == output.name]
-        return [end for end in part.ends if any(end.name in names for names in muxed)] if muxed else None
+        component = self.robot.components[output.instance]
+        muxed = [one.inputs for one in component.declared(Forwards) if one.output == output.name]
+        return [end for end in component.ends if any(end.name in names for names in muxed)] if muxed else None
 
-    def fed_by(self, part: Part, port: str) -> Iterator[End]:
-        """Yield the outputs whose messages reach an input of a part, through muxes."""
-        end = part.end(port)
+    def fed_by(self, component: RobotComponent, port: str) -> Iterator[PortEnd]:
+        """Yield the outputs whose messages reach an input of a component, through muxes."""
+        end = component.end(port)
         yield from self.sources(end) if end else ()
 
     def drives(self) -> Iterator[Drive]:
         """Yield who commands which base, also through muxes."""
         for base, drives in self.robot.declared(Drives):
             for source in self.fed_by(base, drives.commands):
-                driver = self.robot.parts[source.instance]
+                driver = self.robot.components[source.instance]
                 for one in driver.declared(CommandsMotion):
                     if one.commands == source.name:
                         yield Drive(driver, one, base, drives)
 
 
-def period_of(part: Part) -> float | None:
-    """Return the time between two messages of a part [s], if it sends at its own rate only."""
-    listens = any(isinstance(end.port, In) for end in part.ends)
-    return None if listens or part.cls.rate <= 0 else 1 / part.cls.rate
+def period_of(component: RobotComponent) -> float | None:
+    """Return the time between two messages of a component [s], if it sends at its own rate only."""
+    listens = any(isinstance(end.port, In) for end in component.ends)
+    return None if listens or component.cls.rate <= 0 else 1 / component.cls.rate
 
 
-def setting(part: Part, name: str) -> float | None:
-    """Return a number of a part's configuration, in SI; None if its type has none of this name."""
-    value = getattr(part.config, name, None)
+def setting(component: RobotComponent, name: str) -> float | None:
+    """Return a number of a component's configuration, in SI; None if its type has none of this name."""
+    value = getattr(component.config, name, None)
     return value if isinstance(value, float) else None
 
 
-def setting_span(robot: Robot, *settings: tuple[Part, str]) -> Span:
-    """Return the place of the first of these settings that is written down, else that of the first one's part.
+def setting_span(robot: Robot, *settings: tuple[RobotComponent, str]) -> Span:
+    """Return the place of the first of these settings that is written down, else that of the first one's component.
 
-    A setting is the name of a field of the configuration; without one the value is that of the part's type.
+    A setting is the name of a field of the configuration; without one the value is that of the component's type.
     """
-    for part, name in settings:
-        if is_written(robot, part, name):
-            return robot.value(*part.path, *name.split("."))
-    part, name = settings[0]
-    return robot.part_span(part.name) if name else robot.value(*part.path, "type")
+    for component, name in settings:
+        if is_written(robot, component, name):
+            return robot.value(*component.path, *name.split("."))
+    component, name = settings[0]
+    return robot.component_span(component.name) if name else robot.value(*component.path, "type")
 
 
-def is_written(robot: Robot, part: Part, name: str) -> bool:
+def is_written(robot: Robot, component: RobotComponent, name: str) -> bool:
     """Tell whether a field of the configuration is written down in the manifest."""
-    return bool(name) and at(robot.manifest.root, (*part.path, *name.split("."))) is not None
+    return bool(name) and at(robot.manifest.root, (*component.path, *name.split("."))) is not None

@@ -15,7 +15,7 @@ from rbxcompose.model.robot import RobotMission
 
 
 @dataclass(frozen=True, slots=True)
-class Missions:
+class ReadMissions:
     """The missions that could be read, and the names of those that others cannot `use`: unread, or in a circle."""
 
     read: Mapping[str, RobotMission] = field(default_factory=dict)
@@ -28,7 +28,7 @@ def read_missions(
     report: Report,
     sources: dict[str, str],
     skills: Collection[str],
-) -> Missions:
+) -> ReadMissions:
     """Read the robot's mission files; one with mistakes is kept as far as it could be read.
 
     `skills` are the names of all skills that there are.
@@ -52,4 +52,4 @@ def read_missions(
             found[name] = RobotMission(name, program, inputs)
     using = Using({name: one.program for name, one in found.items()})
     report.extend(using.findings)
-    return Missions(found, frozenset((manifest.missions.keys() - found.keys()) | using.broken))
+    return ReadMissions(found, frozenset((manifest.missions.keys() - found.keys()) | using.broken))

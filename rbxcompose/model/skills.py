@@ -8,35 +8,35 @@ from typing import Any
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.missions.program.goals import service_skill, skill_of, topic_skill
 from rbxcompose.missions.program.program import Program, Skill
-from rbxcompose.missions.program.sources import Orders, OrderTopic, SkillSource, TopicSource, Way
-from rbxcompose.model.robot import Part
-from rbxcompose.model.wires import End
+from rbxcompose.missions.program.sources import Orders, OrderTopic, SkillSource, SkillWay, TopicSource
+from rbxcompose.model.robot import RobotComponent
+from rbxcompose.model.wires import PortEnd
 from rbxcompose.plugins import BrokenPluginError
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.ports import In, Out, Serves, ServesAction, ServesTopic
 from rbxcompose.sdk.skills import SkillType, skill_names, skill_type
 
 
-def skills_of(parts: Mapping[str, Part], programs: Iterable[Program]) -> dict[str, SkillSource]:
+def skills_of(components: Mapping[str, RobotComponent], programs: Iterable[Program]) -> dict[str, SkillSource]:
     """Return the skills of the robot: actions, services, topics, and those in Python that a mission names."""
     asked = {node.skill for program in programs for node in program.nodes if node.skill}
     found: dict[str, SkillSource] = {}
-    for source in [*_served(parts), *python_skills(asked)]:
+    for source in [*_served(components), *python_skills(asked)]:
         found.setdefault(source.skill.name, source)
     return found
 
 
-def names_of_skills(parts: Mapping[str, Part]) -> frozenset[str]:
+def names_of_skills(components: Mapping[str, RobotComponent]) -> frozenset[str]:
     """Return the names of all skills that a mission of the robot may use."""
-    return frozenset((*(source.skill.name for source in _served(parts)), *skill_names()))
+    return frozenset((*(source.skill.name for source in _served(components)), *skill_names()))
 
 
-def _served(parts: Mapping[str, Part]) -> Iterable[SkillSource]:
-    return (*_actions(parts), *_services(parts), *_topics(parts))
+def _served(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
+    return (*_actions(components), *_services(components), *_topics(components))
 
 
-def _actions(parts: Mapping[str, Part]) -> Iterable[SkillSource]:
-    for end in _ends(parts):
+def _actions(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
+    for end in _ends(components):
         port = end.port
         if isinstance(port, ServesAction) and port.interface is not None:
             name = end.topic.rsplit("/", 1)[-1]
@@ -51,29 +51,29 @@ def _actions(parts: Mapping[str, Part]) -> Iterable[SkillSource]:
             yield SkillSource(skill, end.type_name, end.topic)
 
 
-def _services(parts: Mapping[str, Part]) -> Iterable[SkillSource]:
-    for end in _ends(parts):
+def _services(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
+    for end in _ends(components):
         if isinstance(end.port, Serves) and end.port.interface is not None:
             skill = service_skill(end.port.interface, end.topic.rsplit("/", 1)[-1])
             if skill is not None:
-                yield SkillSource(skill, end.type_name, end.topic, Way.SERVICE)
+                yield SkillSource(skill, end.type_name, end.topic, SkillWay.SERVICE)
 
 
-def _topics(parts: Mapping[str, Part]) -> Iterable[SkillSource]:
-    for end in _ends(parts):
+def _topics(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
+    for end in _ends(components):
         port = end.port
         if not isinstance(port, ServesTopic) or port.interface is None:
             continue
         told = port.ends.interface if port.ends is not None else None
         name = end.topic.rsplit("/", 1)[-1]
         skill = topic_skill(port.interface, name, told, port.claims, port.restartable, outcomes=port.outcomes)
-        yield SkillSource(skill, end.type_name, end.topic, Way.TOPIC, _orders(parts, end, port))
+        yield SkillSource(skill, end.type_name, end.topic, SkillWay.TOPIC, _orders(components, end, port))
 
 
-def _orders(parts: Mapping[str, Part], end: End, port: ServesTopic[Any]) -> Orders:
+def _orders(components: Mapping[str, RobotComponent], end: PortEnd, port: ServesTopic[Any]) -> Orders:
     """Return who carries orders out, and where the ports stand that belong to them."""
-    servers = [one for one in _ends(parts) if isinstance(one.port, ServesTopic) and one.topic == end.topic]
-    own = parts[end.instance].ends
+    servers = [one for one in _ends(components) if isinstance(one.port, ServesTopic) and one.topic == end.topic]
+    own = components[end.instance].ends
     return Orders(
         str(port.qos),
         tuple(dict.fromkeys(one.instance for one in servers)),
@@ -82,7 +82,7 @@ def _orders(parts: Mapping[str, Part], end: End, port: ServesTopic[Any]) -> Orde
     )
 
 
-def _beside(own: Iterable[End], port: In[Any] | Out[Any]) -> OrderTopic:
+def _beside(own: Iterable[PortEnd], port: In[Any] | Out[Any]) -> OrderTopic:
     found = next((one for one in own if one.port is port), None)
     if found is None:
         raise ValueError(f"the port '{port.name}' of '{port.topic}' belongs to orders of a component that lacks it")
@@ -94,7 +94,7 @@ def python_skills(names: Iterable[str]) -> list[SkillSource]:
     found = []
     for name in sorted(set(names) & set(skill_names())):
         try:
-            found.append(SkillSource(as_skill(skill_type(name)), "", "", Way.PYTHON))
+            found.append(SkillSource(as_skill(skill_type(name)), "", "", SkillWay.PYTHON))
         except BrokenPluginError:  # a mission that uses it is told that nobody provides it
             continue
     return found
@@ -114,10 +114,10 @@ def as_skill(declared: SkillType) -> Skill:
     )
 
 
-def topics_of(manifest: RobotManifest, parts: Mapping[str, Part]) -> dict[str, TopicSource]:
+def topics_of(manifest: RobotManifest, components: Mapping[str, RobotComponent]) -> dict[str, TopicSource]:
     """Return the topics whose type is known, with and without the robot's namespace."""
     found: dict[str, TopicSource] = {}
-    for end in _ends(parts):
+    for end in _ends(components):
         if isinstance(end.port, In | Out) and end.type_name:
             qos = end.port.qos if isinstance(end.port, In) else Qos.EVENT
             for name in _written(end.topic, manifest):
@@ -126,14 +126,14 @@ def topics_of(manifest: RobotManifest, parts: Mapping[str, Part]) -> dict[str, T
     return found
 
 
-def services_of(manifest: RobotManifest, parts: Mapping[str, Part]) -> dict[str, str]:
+def services_of(manifest: RobotManifest, components: Mapping[str, RobotComponent]) -> dict[str, str]:
     """Return the services with their types, with and without the robot's namespace."""
-    ends = [end for end in _ends(parts) if isinstance(end.port, Serves) and end.type_name]
+    ends = [end for end in _ends(components) if isinstance(end.port, Serves) and end.type_name]
     return {name: end.type_name for end in ends for name in _written(end.topic, manifest)}
 
 
-def _ends(parts: Mapping[str, Part]) -> Iterable[End]:
-    return (end for part in parts.values() for end in part.ends)
+def _ends(components: Mapping[str, RobotComponent]) -> Iterable[PortEnd]:
+    return (end for component in components.values() for end in component.ends)
 
 
 def _written(topic: str, manifest: RobotManifest) -> tuple[str, ...]:

@@ -7,11 +7,11 @@ from collections.abc import Collection, Iterable, Mapping
 from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, choice_of, quantity_of
 from rbxcompose.levels import Level
 from rbxcompose.missions.program.sources import ValueSource
-from rbxcompose.model.robot import Part
-from rbxcompose.model.wires import End, resolve
+from rbxcompose.model.robot import RobotComponent
+from rbxcompose.model.wires import PortEnd, resolve
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.ports import In, Out
-from rbxcompose.sections.values import Value as ValueEntry
+from rbxcompose.sections.values import ValueModel
 from rbxcompose.units import UNITS
 
 # The message that carries data from outside, where nobody in the robot says which it is.
@@ -24,7 +24,11 @@ DATA = "data"  # the field of the standard messages
 
 
 def value_of(
-    entry: ValueEntry, parts: Mapping[str, Part], ends: Iterable[End], namespace: str, groups: Collection[str] = ()
+    entry: ValueModel,
+    components: Mapping[str, RobotComponent],
+    ends: Iterable[PortEnd],
+    namespace: str,
+    groups: Collection[str] = (),
 ) -> ValueSource | None:
     """Return what a value is, or None if its source is not there (a check says so).
 
@@ -34,7 +38,7 @@ def value_of(
         component, _, port = entry.port.partition(".")
         if component == DIAGNOSTICS and port in groups:
             return ValueSource(LEVELS_TOPIC, LEVELS_TYPE, "level", type=choice_of(*LEVEL_WORDS), group=port)
-        end = parts[component].end(port) if component in parts else None
+        end = components[component].end(port) if component in components else None
         return _of_port(end, entry.unit) if end else None
     if entry.topic is None:
         return None
@@ -44,7 +48,7 @@ def value_of(
     return _value(topic, message, entry.field or DATA, entry.unit or "", TYPES.get(entry.type or ""))
 
 
-def _of_port(end: End, unit: str | None) -> ValueSource | None:
+def _of_port(end: PortEnd, unit: str | None) -> ValueSource | None:
     port = end.port
     if not isinstance(port, Out | In):
         return None

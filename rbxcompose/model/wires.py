@@ -12,7 +12,7 @@ from rbxcompose.sdk.ports import In, Out, Port
 
 
 @dataclass(frozen=True, slots=True)
-class End:
+class PortEnd:
     """A port of an instance and the absolute ROS name that it stands at; empty for a look-up."""
 
     instance: str
@@ -35,19 +35,19 @@ def resolve(topic: str, namespace: str) -> str:
 
 def ends_of(
     instance: str, cls: type[Component[Any]], config: Config, namespace: str, connect: Mapping[str, str]
-) -> tuple[End, ...]:
+) -> tuple[PortEnd, ...]:
     """Return the ends of an instance; `connect` gives ports another topic than their type does."""
     return tuple(
-        End(instance, name, port, resolve(connect.get(name, port.topic), namespace))
+        PortEnd(instance, name, port, resolve(connect.get(name, port.topic), namespace))
         for name, port in sorted(cls.ports(config).items())
     )
 
 
-def writers(ends: Iterable[End], topic: str) -> list[End]:
+def writers(ends: Iterable[PortEnd], topic: str) -> list[PortEnd]:
     """Return who publishes on a topic."""
     return [end for end in ends if isinstance(end.port, Out) and end.topic == topic]
 
 
-def readers(ends: Iterable[End], topic: str) -> list[End]:
+def readers(ends: Iterable[PortEnd], topic: str) -> list[PortEnd]:
     """Return who subscribes to a topic."""
     return [end for end in ends if isinstance(end.port, In) and end.topic == topic]

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rbxcompose.msgs.definitions import OCTETS, PRIMITIVES, FieldType, Shape, attribute, parse_type
+from rbxcompose.msgs.definitions import OCTETS, PRIMITIVES, FieldShape, FieldType, attribute, parse_type
 from rbxcompose.msgs.types import Message
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def zeros(dtype: str, length: int) -> NDArray[Any]:
 
 def holds_numbers(type_: FieldType) -> bool:
     """Tell whether a field of this type is a numpy array."""
-    return type_.shape is not Shape.SINGLE and type_.base in PRIMITIVES and type_.base not in _NO_NUMBERS
+    return type_.shape is not FieldShape.SINGLE and type_.base in PRIMITIVES and type_.base not in _NO_NUMBERS
 
 
 class ArrayMessage(Message):
@@ -49,7 +49,7 @@ class ArrayMessage(Message):
     def __post_init__(self) -> None:
         for name, type_ in self.ARRAYS.items():
             array = _read_only(getattr(self, name), type_.base)
-            if type_.shape is Shape.ARRAY and array.size != type_.length:
+            if type_.shape is FieldShape.ARRAY and array.size != type_.length:
                 raise ValueError(f"{name} of {self.TYPE} has {array.size} values, not {type_.length}")
             object.__setattr__(self, name, array)
 

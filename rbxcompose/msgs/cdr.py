@@ -14,7 +14,7 @@ from operator import attrgetter
 from typing import Any, Protocol, TypeVar
 
 from rbxcompose.msgs.arrays import ArrayMessage, holds_numbers
-from rbxcompose.msgs.definitions import OCTETS, FieldType, Shape, attribute, parse_type
+from rbxcompose.msgs.definitions import OCTETS, FieldShape, FieldType, attribute, parse_type
 from rbxcompose.msgs.types import Message, declared
 
 HEADER = b"\x00\x01\x00\x00"  # little-endian CDR, no options
@@ -163,16 +163,16 @@ class _Many:
     def __init__(self, type_: FieldType, size: int = 1) -> None:
         self._type = type_
         self._size = size  # fewest bytes of an element
-        self.least = type_.length * size if type_.shape is Shape.ARRAY else 4
+        self.least = type_.length * size if type_.shape is FieldShape.ARRAY else 4
 
     def _write_count(self, count: int, out: bytearray) -> None:
         self._check(count)
-        if self._type.shape is not Shape.ARRAY:
+        if self._type.shape is not FieldShape.ARRAY:
             out += bytes(-len(out) % 4) + _COUNT.pack(count)
 
     def _read_count(self, data: bytes, at: int) -> tuple[int, int]:
         count = self._type.length
-        if self._type.shape is not Shape.ARRAY:
+        if self._type.shape is not FieldShape.ARRAY:
             at += -at % 4
             (count,) = _COUNT.unpack_from(data, at)
             at += 4
@@ -183,7 +183,7 @@ class _Many:
 
     def _check(self, count: int) -> None:
         shape, length = self._type.shape, self._type.length
-        if (shape is Shape.ARRAY and count != length) or (shape is Shape.BOUNDED and count > length):
+        if (shape is FieldShape.ARRAY and count != length) or (shape is FieldShape.BOUNDED and count > length):
             raise CdrError(f"{count} elements where {self._type} is expected")
 
 
@@ -320,9 +320,9 @@ class _Layout:
         return made
 
     def _add_field(self, type_: FieldType, path: str) -> str:
-        if type_.shape is Shape.SINGLE and type_.is_message:
+        if type_.shape is FieldShape.SINGLE and type_.is_message:
             return self._add(declared[type_.base], f"{path}.")
-        if type_.shape is Shape.SINGLE and type_.base in _CODES:
+        if type_.shape is FieldShape.SINGLE and type_.base in _CODES:
             self._numbers.append((path, type_.base))
         else:
             self._add_step(attrgetter(path), _codec(type_))
@@ -365,7 +365,7 @@ def _codec(type_: FieldType) -> _Codec:
     if type_.base == "bool":
         return _Flags(type_)
     element: _Codec = _layout(declared[type_.base]) if type_.is_message else _Text(type_.text_limit)
-    return element if type_.shape is Shape.SINGLE else _Elements(type_, element)
+    return element if type_.shape is FieldShape.SINGLE else _Elements(type_, element)
 
 
 def _aligned(codes: list[str], phase: int) -> str:

@@ -33,7 +33,7 @@ class DefinitionError(ValueError):
     """Raised when an interface text is not valid ROS 2."""
 
 
-class Shape(Enum):
+class FieldShape(Enum):
     """How many values a field holds."""
 
     SINGLE = "one"
@@ -47,7 +47,7 @@ class FieldType:
     """The type of a field: `base` is a primitive or the full name of a message."""
 
     base: str
-    shape: Shape = Shape.SINGLE
+    shape: FieldShape = FieldShape.SINGLE
     length: int = 0  # of an array or bounded sequence
     text_limit: int = 0  # most bytes of a string, 0: any number
 
@@ -58,7 +58,11 @@ class FieldType:
 
     def __str__(self) -> str:
         limit = f"<={self.text_limit}" if self.text_limit else ""
-        most = {Shape.ARRAY: f"[{self.length}]", Shape.BOUNDED: f"[<={self.length}]", Shape.UNBOUNDED: "[]"}
+        most = {
+            FieldShape.ARRAY: f"[{self.length}]",
+            FieldShape.BOUNDED: f"[<={self.length}]",
+            FieldShape.UNBOUNDED: "[]",
+        }
         return f"{self.base}{limit}{most.get(self.shape, '')}"
 
 
@@ -72,7 +76,7 @@ class Constant:
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class FieldDefinition:
     """A field of a structure; without a default of its own it starts at zero, empty or false."""
 
     name: str
@@ -86,7 +90,7 @@ class Structure:
     """What CDR writes at once: a message, or one part of a service or an action."""
 
     name: str  # such as "geometry_msgs/msg/Twist" or "std_srvs/srv/SetBool_Request"
-    fields: tuple[Field, ...] = ()
+    fields: tuple[FieldDefinition, ...] = ()
     constants: tuple[Constant, ...] = ()
     comment: str = ""
 
@@ -108,9 +112,9 @@ def parse_type(text: str, package: str = "") -> FieldType:
         raise DefinitionError(f"no such type: {text!r}")
     if found["most"] and not found["length"]:
         raise DefinitionError(f"a bound without a number: {text!r}")
-    shape = Shape.SINGLE
+    shape = FieldShape.SINGLE
     if found["array"]:
-        shape = Shape.BOUNDED if found["most"] else Shape.ARRAY if found["length"] else Shape.UNBOUNDED
+        shape = FieldShape.BOUNDED if found["most"] else FieldShape.ARRAY if found["length"] else FieldShape.UNBOUNDED
     full = base if base in PRIMITIVES else _full_name(base, package)
     return FieldType(full, shape, int(found["length"] or 0), int(found["limit"] or 0))
 
@@ -147,7 +151,7 @@ def parse(name: str, text: str) -> tuple[Structure, ...]:
 
 def _structure(name: str, lines: list[tuple[int, str]]) -> Structure:
     heading: list[str] = []
-    members: list[Constant | Field] = []
+    members: list[Constant | FieldDefinition] = []
     for number, line in lines:
         try:
             code, comment = _split(line)
@@ -157,7 +161,7 @@ def _structure(name: str, lines: list[tuple[int, str]]) -> Structure:
                 heading.append(comment)
         except ValueError as error:
             raise DefinitionError(f"{name}, line {number}: {error}") from error
-    fields = tuple(member for member in members if isinstance(member, Field))
+    fields = tuple(member for member in members if isinstance(member, FieldDefinition))
     constants = tuple(member for member in members if isinstance(member, Constant))
     return Structure(name, fields, constants, " ".join(heading))
 
@@ -169,18 +173,18 @@ def _split(line: str) -> tuple[str, str]:
     return found["code"].strip(), (found["comment"] or "").strip()
 
 
-def _member(code: str, comment: str, package: str) -> Constant | Field:
+def _member(code: str, comment: str, package: str) -> Constant | FieldDefinition:
     if constant := _CONSTANT.fullmatch(code):
         return Constant(constant["name"], _value(parse_type(constant["type"]), constant["value"]), comment)
     if field := _FIELD.fullmatch(code):
         type_ = parse_type(field["type"], package)
         default = _value(type_, field["default"]) if field["default"] else None
-        return Field(field["name"], type_, default, comment)
+        return FieldDefinition(field["name"], type_, default, comment)
     raise DefinitionError(f"neither a field nor a constant: {code!r}")
 
 
 def _value(type_: FieldType, text: str) -> Value:
-    if type_.shape is not Shape.SINGLE or type_.is_message:
+    if type_.shape is not FieldShape.SINGLE or type_.is_message:
         raise DefinitionError(f"{type_} cannot have a value here")
     if type_.base == "string":
         return text[1:-1] if text[0] == text[-1] and text[0] in "\"'" and len(text) > 1 else text
@@ -237,7 +241,7 @@ def _action(name: str) -> Iterator[Structure]:
 
 
 def _of(structure: str, **types: str) -> Structure:
-    return Structure(structure, tuple(Field(name, parse_type(text)) for name, text in types.items()))
+    return Structure(structure, tuple(FieldDefinition(name, parse_type(text)) for name, text in types.items()))
 
 
 def interface_names(kind: str, root: Path = INTERFACES) -> list[str]:

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 from rbxcompose.msgs import registry
-from rbxcompose.msgs.definitions import Field, Structure, parse_type
+from rbxcompose.msgs.definitions import FieldDefinition, Structure, parse_type
 from rbxcompose.msgs.hashes import type_hash
 from rbxcompose.msgs.service_msgs import ServiceEventInfo
 from rbxcompose.msgs.types import Fields, Message, Service
@@ -47,7 +47,7 @@ def _event_of(service: Any) -> type[Any]:
 
 def _describe(name: str, fields: Fields, found: dict[str, Structure]) -> None:
     """Enter a message and all that it is made of."""
-    found[name] = Structure(name, tuple(Field(each, parse_type(text)) for each, text in fields.items()))
+    found[name] = Structure(name, tuple(FieldDefinition(each, parse_type(text)) for each, text in fields.items()))
     for each in found[name].fields:
         if each.type.is_message and each.type.base not in found:
             _describe(each.type.base, registry.message(each.type.base).FIELDS, found)

@@ -8,7 +8,7 @@ from operator import attrgetter
 from typing import Any
 
 from rbxcompose.msgs.arrays import holds_numbers
-from rbxcompose.msgs.definitions import FLOATS, FieldType, Shape, attribute, parse_type
+from rbxcompose.msgs.definitions import FLOATS, FieldShape, FieldType, attribute, parse_type
 from rbxcompose.msgs.types import Message, declared
 
 Get = Callable[[Any], Any]
@@ -56,11 +56,11 @@ def _tests_of(message: type[Message]) -> Tests:
 def _collect(message: type[Message], prefix: str, singles: list[str], others: list[tuple[Get, Test]]) -> None:
     for name, text in message.FIELDS.items():
         type_, path = parse_type(text), prefix + attribute(name)
-        if type_.shape is Shape.SINGLE and type_.is_message:
+        if type_.shape is FieldShape.SINGLE and type_.is_message:
             _collect(declared[type_.base], f"{path}.", singles, others)
-        elif type_.shape is Shape.SINGLE and type_.base in FLOATS:
+        elif type_.shape is FieldShape.SINGLE and type_.base in FLOATS:
             singles.append(path)
-        elif type_.shape is not Shape.SINGLE and (test := _test_of_many(type_)) is not None:
+        elif type_.shape is not FieldShape.SINGLE and (test := _test_of_many(type_)) is not None:
             others.append((attrgetter(path), test))
 
 

@@ -13,9 +13,9 @@ from rbxcompose.msgs.definitions import (
     KINDS,
     OCTETS,
     Constant,
-    Field,
+    FieldDefinition,
+    FieldShape,
     FieldType,
-    Shape,
     Structure,
     Value,
     attribute,
@@ -157,7 +157,7 @@ class _Module:
         value = _literal(constant.value)
         return _commented(f"{constant.name}: ClassVar[{type(constant.value).__name__}] = {value}", constant.comment)
 
-    def _field(self, field: Field) -> str:
+    def _field(self, field: FieldDefinition) -> str:
         python_type, default = self._python(field.type)
         if field.default is not None:
             default = _literal(field.default)
@@ -169,10 +169,10 @@ class _Module:
             self._use("TYPE_CHECKING", "typing")
             zeros = f'{self._use("zeros", ARRAYS)}("{type_.base}", {_least(type_)})'
             return f"NDArray[np.{type_.base}]", self._made_by(f"lambda: {zeros}")
-        if type_.shape is not Shape.SINGLE and type_.base in OCTETS:
+        if type_.shape is not FieldShape.SINGLE and type_.base in OCTETS:
             return "bytes", f"bytes({_least(type_)})" if _least(type_) else 'b""'
         one, default = self._python_single(type_)
-        if type_.shape is Shape.SINGLE:
+        if type_.shape is FieldShape.SINGLE:
             return one, self._made_by(default) if type_.is_message else default
         if not _least(type_):
             return f"tuple[{one}, ...]", "()"
@@ -213,7 +213,7 @@ def _python_path(name: str) -> str:
 
 
 def _least(type_: FieldType) -> int:
-    return type_.length if type_.shape is Shape.ARRAY else 0
+    return type_.length if type_.shape is FieldShape.ARRAY else 0
 
 
 def _literal(value: Value) -> str:

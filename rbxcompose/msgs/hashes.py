@@ -10,7 +10,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from rbxcompose.msgs.definitions import FieldType, Shape, Structure
+from rbxcompose.msgs.definitions import FieldShape, FieldType, Structure
 
 _MESSAGE = 1
 _BOUNDED_TEXT = 21
@@ -30,7 +30,7 @@ _IDS = {
     "byte": 16,
     "string": 17,
 }
-_OFFSETS = {Shape.SINGLE: 0, Shape.ARRAY: 48, Shape.BOUNDED: 96, Shape.UNBOUNDED: 144}
+_OFFSETS = {FieldShape.SINGLE: 0, FieldShape.ARRAY: 48, FieldShape.BOUNDED: 96, FieldShape.UNBOUNDED: 144}
 # An empty structure would take no room on the wire, so ROS gives it one byte.
 _PLACEHOLDER = ("structure_needs_at_least_one_member", FieldType("uint8"))
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
 from rbxcompose.findings import Finding, Span, kind, suggest
-from rbxcompose.msgs.definitions import FLOATS, OCTETS, FieldType, Shape, attribute, parse_type
+from rbxcompose.msgs.definitions import FLOATS, OCTETS, FieldShape, FieldType, attribute, parse_type
 from rbxcompose.msgs.types import Message, declared
 
 M = TypeVar("M", bound=Message)
 Key = str | int
-Path = tuple[Key, ...]  # from the message: ("pose", "position", "x") or ("transforms", 0)
+KeyPath = tuple[Key, ...]  # from the message: ("pose", "position", "x") or ("transforms", 0)
 
 NO_FIELD = kind(
     "RBX9023",
@@ -50,25 +50,25 @@ _FLOAT32 = struct.Struct("<f")
 _DIGITS = range(6, 9)  # significant ones, of which a float32 never needs more than nine
 
 
-class Places(Protocol):
+class TextPlaces(Protocol):
     """Where in a text the parts of plain data stand."""
 
-    def key(self, path: Path) -> Span | None:
+    def key(self, path: KeyPath) -> Span | None:
         """Return the place of a key."""
         ...
 
-    def value(self, path: Path) -> Span | None:
+    def value(self, path: KeyPath) -> Span | None:
         """Return the place of a value."""
         ...
 
 
-class Nowhere:
+class NoPlaces:
     """The places of data that have no text."""
 
-    def key(self, path: Path) -> None:
+    def key(self, path: KeyPath) -> None:
         """Return no place."""
 
-    def value(self, path: Path) -> None:
+    def value(self, path: KeyPath) -> None:
         """Return no place."""
 
 
@@ -80,7 +80,7 @@ def to_plain(message: Message) -> dict[str, Any]:
 
 
 def _plain(type_: FieldType, value: Any) -> Any:
-    if type_.shape is not Shape.SINGLE:
+    if type_.shape is not FieldShape.SINGLE:
         single = FieldType(type_.base)
         return [_plain(single, one) for one in (value.tolist() if hasattr(value, "tolist") else value)]
     if type_.is_message:
@@ -107,10 +107,10 @@ def _is_same(short: float, value: float) -> bool:
 class _Reading(Generic[M]):
     """One reading of plain data: where it stands, and the mistakes so far."""
 
-    places: Places
+    places: TextPlaces
     findings: list[Finding] = field(default_factory=list)
 
-    def message(self, message: type[M], data: object, path: Path) -> M | None:
+    def message(self, message: type[M], data: object, path: KeyPath) -> M | None:
         """Return the message, or None with a finding."""
         if data is None:
             data = {}  # an empty text: all defaults
@@ -127,8 +127,8 @@ class _Reading(Generic[M]):
                 values[attribute(name)] = self._value(parse_type(message.FIELDS[name]), value, (*path, name))
         return None if self.findings else message(**values)
 
-    def _value(self, type_: FieldType, value: object, path: Path) -> Any:
-        if type_.shape is not Shape.SINGLE:
+    def _value(self, type_: FieldType, value: object, path: KeyPath) -> Any:
+        if type_.shape is not FieldShape.SINGLE:
             return self._list(type_, value, path)
         if type_.is_message:
             return self.message(declared[type_.base], value, path)
@@ -138,12 +138,14 @@ class _Reading(Generic[M]):
             return value if isinstance(value, bool) else self._wrong(path, "true or false is expected")
         return self._number(type_.base, value, path)
 
-    def _list(self, type_: FieldType, value: object, path: Path) -> Any:
+    def _list(self, type_: FieldType, value: object, path: KeyPath) -> Any:
         if not isinstance(value, list | tuple):
             return self._wrong(path, f"a list is expected ({type_})")
         count, length = len(value), type_.length
-        if (type_.shape is Shape.ARRAY and count != length) or (type_.shape is Shape.BOUNDED and count > length):
-            most = "at most " if type_.shape is Shape.BOUNDED else ""
+        if (type_.shape is FieldShape.ARRAY and count != length) or (
+            type_.shape is FieldShape.BOUNDED and count > length
+        ):
+            most = "at most " if type_.shape is FieldShape.BOUNDED else ""
             return self._wrong(path, f"{most}{length} values are expected, these are {count}")
         single = FieldType(type_.base, text_limit=type_.text_limit)
         values = [self._value(single, one, (*path, index)) for index, one in enumerate(value)]
@@ -151,7 +153,7 @@ class _Reading(Generic[M]):
             return None
         return bytes(values) if type_.base in OCTETS else tuple(values)
 
-    def _text(self, type_: FieldType, value: object, path: Path) -> Any:
+    def _text(self, type_: FieldType, value: object, path: KeyPath) -> Any:
         if not isinstance(value, str):
             return self._wrong(path, "text is expected; a number or a flag that is meant as text stands in quotes")
         limit = type_.text_limit
@@ -159,7 +161,7 @@ class _Reading(Generic[M]):
             return self._wrong(path, f"at most {limit} bytes of text are expected, these are {len(value.encode())}")
         return value
 
-    def _number(self, base: str, value: object, path: Path) -> Any:
+    def _number(self, base: str, value: object, path: KeyPath) -> Any:
         if isinstance(value, bool) or not isinstance(value, int | float):
             return self._wrong(path, f"a number is expected ({base}), without a unit")
         if base in FLOATS:
@@ -169,20 +171,20 @@ class _Reading(Generic[M]):
             return self._wrong(path, f"a whole number from {low} to {high} is expected ({base})")
         return value
 
-    def _float(self, base: str, value: float, path: Path) -> Any:
+    def _float(self, base: str, value: float, path: KeyPath) -> Any:
         try:
             number = float(value)
             return number if base == "float64" else _FLOAT32.unpack(_FLOAT32.pack(number))[0]
         except OverflowError:
             return self._wrong(path, f"this number is too large for a {base}")
 
-    def _wrong(self, path: Path, message: str) -> None:
+    def _wrong(self, path: KeyPath, message: str) -> None:
         where = ".".join(map(str, path))
         self.findings.append(WRONG_VALUE.at(self.places.value(path), f"{where}: {message}" if where else message))
 
 
-def from_plain(message: type[M], data: object, places: Places | None = None) -> tuple[M | None, list[Finding]]:
+def from_plain(message: type[M], data: object, places: TextPlaces | None = None) -> tuple[M | None, list[Finding]]:
     """Return the message that plain data stand for, or None and what is wrong with them."""
-    reading: _Reading[M] = _Reading(places or Nowhere())
+    reading: _Reading[M] = _Reading(places or NoPlaces())
     made = reading.message(message, data, ())
     return (None if reading.findings else made), reading.findings

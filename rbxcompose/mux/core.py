@@ -15,7 +15,7 @@ M = TypeVar("M")
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class MuxSource:
     """Something that is heard of again and again: silent for more than `timeout` [s] it counts as gone."""
 
     priority: int
@@ -31,11 +31,11 @@ class MuxCore(Generic[M]):
 
     def __init__(
         self,
-        inputs: Mapping[str, Source],
+        inputs: Mapping[str, MuxSource],
         *,
         zero: M,
         is_zero: Callable[[M], bool],
-        locks: Mapping[str, Source] | None = None,
+        locks: Mapping[str, MuxSource] | None = None,
         stopped: bool = False,
     ) -> None:
         self._inputs = dict(inputs)

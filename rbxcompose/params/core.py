@@ -36,7 +36,7 @@ class UnsettableError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class ParameterField:
     """A parameter: a field of the configuration, or one below a field (`inputs.teleop.priority`)."""
 
     name: str
@@ -109,16 +109,16 @@ def _si_unit(dimension: Dimension | None) -> str:
     return next((name for name, unit in UNITS.items() if unit.dimension == dimension and unit.to_si(1.0) == 1.0), "")
 
 
-def settings(config: Config) -> dict[str, Setting]:
+def settings(config: Config) -> dict[str, ParameterField]:
     """Return all parameters by name; what is no plain value, such as a secret, is none."""
-    found: dict[str, Setting] = {}
+    found: dict[str, ParameterField] = {}
     for name, field in type(config).model_fields.items():
         for one in _settings_of(name, getattr(config, name), field):
             found[one.name] = one
     return found
 
 
-def _settings_of(name: str, value: object, field: FieldInfo | None) -> Iterator[Setting]:
+def _settings_of(name: str, value: object, field: FieldInfo | None) -> Iterator[ParameterField]:
     match value:
         case Config():
             for key in type(value).model_fields:
@@ -127,10 +127,10 @@ def _settings_of(name: str, value: object, field: FieldInfo | None) -> Iterator[
             for key, each in value.items():
                 yield from _settings_of(f"{name}{SEPARATOR}{key}", each, None)
         case _ if parameter_type(value) is not None:
-            yield Setting(name, value, field)
+            yield ParameterField(name, value, field)
 
 
-def values_of(known: Mapping[str, Setting], names: Iterable[str]) -> tuple[ParameterValue, ...]:
+def values_of(known: Mapping[str, ParameterField], names: Iterable[str]) -> tuple[ParameterValue, ...]:
     """Return the values of parameters; one that does not exist is not set."""
     found = (to_message(known[name].value) if name in known else None for name in names)
     return tuple(value or ParameterValue() for value in found)
@@ -169,7 +169,7 @@ def changed(config: Config, parameters: Sequence[Parameter]) -> Config:
         raise UnsettableError(_reason(error.errors(include_url=False)[0])) from error
 
 
-def _wanted(known: Mapping[str, Setting], parameter: Parameter) -> object:
+def _wanted(known: Mapping[str, ParameterField], parameter: Parameter) -> object:
     setting = known.get(parameter.name)
     if setting is None:
         help_text = suggest(parameter.name, known, "parameters")

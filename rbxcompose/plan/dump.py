@@ -20,7 +20,7 @@ from pydantic_core import to_jsonable_python
 
 from rbxcompose.config import HIDDEN, Config, Dimensioned, Place, Secret
 from rbxcompose.findings import Report
-from rbxcompose.manifest.tree import Mapping as LocatedMapping
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program
 from rbxcompose.plan.located import node_of_data, node_to_data
@@ -34,7 +34,7 @@ VERSION = 1
 VERSION_KEY = "rbxcompose_plan"
 
 
-Order = Callable[[Iterable[tuple[str, Any]]], list[tuple[str, Any]]]  # brings the entries of a map in order
+EntryOrder = Callable[[Iterable[tuple[str, Any]]], list[tuple[str, Any]]]  # brings the entries of a map in order
 
 
 class PlanTextError(ValueError):
@@ -76,7 +76,7 @@ def load(text: str) -> Plan:
     return plan
 
 
-def _encode(value: Any, hint: Any, order: Order) -> Any:
+def _encode(value: Any, hint: Any, order: EntryOrder) -> Any:
     """Return a value of a field's type as data for JSON."""
     hint = _plain_hint(hint)
     if hint in (Any, object):
@@ -182,7 +182,7 @@ def _decode_free(data: Any) -> Any:
 def _program(data: Any) -> Program:
     report = Report()
     root = node_of_data(data)
-    program = read_program(root, report) if isinstance(root, LocatedMapping) else None
+    program = read_program(root, report) if isinstance(root, MappingNode) else None
     if program is None or report.has_errors:
         raise PlanTextError("a mission of this plan cannot be read")
     return program

@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.plan.units import quantity_of_data, quantity_to_data
 from rbxcompose.units import Quantity
 
 
-def node_to_data(node: Node, file: str = "") -> dict[str, Any]:
+def node_to_data(node: TreeNode, file: str = "") -> dict[str, Any]:
     """Return a node as data; what is as usual is left out, and `file` is that of the node around it."""
     data = _place(node.span, file)
     match node:
-        case Scalar():
+        case ScalarNode():
             data["text"] = node.text
             if not node.plain:
                 data["quoted"] = True
@@ -23,9 +23,9 @@ def node_to_data(node: Node, file: str = "") -> dict[str, Any]:
             if node.scope:
                 data["scope"] = node.scope
             return data
-        case Sequence():
+        case SequenceNode():
             data["items"] = [node_to_data(item, node.span.file) for item in node.items]
-        case Mapping():
+        case MappingNode():
             data["entries"] = [
                 [node_to_data(one, node.span.file) for one in (entry.key, entry.value)]
                 for entry in node.entries.values()
@@ -35,7 +35,7 @@ def node_to_data(node: Node, file: str = "") -> dict[str, Any]:
     return data
 
 
-def node_of_data(data: Any, file: str = "") -> Node:
+def node_of_data(data: Any, file: str = "") -> TreeNode:
     """Return the node that `node_to_data` wrote down.
 
     Raises:
@@ -44,20 +44,20 @@ def node_of_data(data: Any, file: str = "") -> Node:
     span = _span(data, file)
     if "entries" in data:
         pairs = [(_scalar(key, span.file), node_of_data(value, span.file)) for key, value in data["entries"]]
-        return Mapping({key.text: Entry(key, value) for key, value in pairs}, span, str(data.get("tag", "")))
+        return MappingNode({key.text: Entry(key, value) for key, value in pairs}, span, str(data.get("tag", "")))
     if "items" in data:
         items = tuple(node_of_data(item, span.file) for item in data["items"])
-        return Sequence(items, span, str(data.get("tag", "")))
+        return SequenceNode(items, span, str(data.get("tag", "")))
     return _scalar(data, file)
 
 
-def _scalar(data: Any, file: str) -> Scalar:
+def _scalar(data: Any, file: str) -> ScalarNode:
     filled = data.get("filled")
     if isinstance(filled, dict):
         filled = quantity_of_data(filled)
     elif not isinstance(filled, bool | int | float | str | None):
         raise ValueError("a value must be a number, a flag or a text")
-    return Scalar(
+    return ScalarNode(
         text=str(data["text"]),
         span=_span(data, file),
         plain=not data.get("quoted", False),

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.topics import RecordedTopic
 
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
     """A message as bytes, with the times [ns since 1970] when it arrived and when it was published."""
 
-    topic: Topic
+    topic: RecordedTopic
     log_time: int
     publish_time: int
     sequence: int  # counted by its publisher; 0 if it did not

@@ -15,7 +15,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from rbxcompose.printable import plain
 from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.topics import HASH, NODE, Topic, qos_of_metadata
+from rbxcompose.recording.topics import HASH, NODE, RecordedTopic, qos_of_metadata
 
 LARGEST = 64 * 1024 * 1024  # bytes of a record, and of a chunk once it is unpacked
 _MAGIC = b"\x89MCAP0\r\n"
@@ -32,7 +32,7 @@ class RecordingReader:
     """Reads one file once, from its beginning. `damage` tells afterwards why it ended early, if it did."""
 
     @property
-    def topics(self) -> Collection[Topic]:
+    def topics(self) -> Collection[RecordedTopic]:
         """Return the topics, as far as the file was read; also those without messages."""
         return self._channels.values()
 
@@ -51,7 +51,7 @@ class RecordingReader:
         self._file = file
         self._reader = StreamReader(file, emit_chunks=True, record_size_limit=LARGEST)
         self._schemas: dict[int, Schema] = {}
-        self._channels: dict[int, Topic] = {}
+        self._channels: dict[int, RecordedTopic] = {}
 
     def messages(self) -> Iterator[Recorded]:
         """Yield the messages in the order of the file, until it ends or makes no sense."""
@@ -85,9 +85,9 @@ class RecordingReader:
                     record.data,
                 )
 
-    def _topic(self, channel: Channel) -> Topic:
+    def _topic(self, channel: Channel) -> RecordedTopic:
         schema = self._schemas.get(channel.schema_id)
-        return Topic(
+        return RecordedTopic(
             channel.topic,
             schema.name if schema else "",
             channel.metadata.get(HASH, ""),

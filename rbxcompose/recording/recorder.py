@@ -11,7 +11,7 @@ from typing import IO
 
 from rbxcompose.recording.files import complete, create
 from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.topics import RecordedTopic
 from rbxcompose.recording.writer import RecordingWriter
 
 FLUSH, SYNC = 0.5, 5.0  # [s] what a killed recorder, and a computer without power, may lose
@@ -35,7 +35,7 @@ class Recorder:
     """
 
     def __init__(self, path: Path, now: float, split: Split | None = None) -> None:
-        self.counts: Counter[Topic] = Counter()
+        self.counts: Counter[RecordedTopic] = Counter()
         self.paths: list[Path] = []
         self._wanted, self._split = path, split or Split()
         self._opened = self._flushed = self._synced = now
@@ -50,7 +50,7 @@ class Recorder:
         """Add a file to the present recording."""
         self._writer.attach(name, data)
 
-    def declare(self, topic: Topic) -> None:
+    def declare(self, topic: RecordedTopic) -> None:
         """Make a topic known, also if it will have no messages."""
         self._writer.declare(topic)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from rbxcompose.clock import NANOSECONDS
 from rbxcompose.qos import Qos
 from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.topics import RecordedTopic
 
 
 def playlist(
@@ -19,7 +19,7 @@ def playlist(
     due at once. A message whose time lies before that of the one before it is due together with that one.
     """
     first: int | None = None
-    latched: dict[Topic, Recorded] = {}
+    latched: dict[RecordedTopic, Recorded] = {}
     due = 0.0
     for message in messages:
         first = message.log_time if first is None else first

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 
 from rbxcompose.clock import NANOSECONDS
 from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.topics import RecordedTopic
 
 
 @dataclass(slots=True)
-class Summary:
+class RecordingSummary:
     """The topics of a recording with the number of their messages, and its times [ns since 1970]."""
 
-    counts: Counter[Topic] = field(default_factory=Counter)
+    counts: Counter[RecordedTopic] = field(default_factory=Counter)
     start: int = 0
     end: int = 0
 
@@ -30,9 +30,9 @@ class Summary:
         return sum(self.counts.values())
 
 
-def summary_of(messages: Iterable[Recorded]) -> Summary:
+def summary_of(messages: Iterable[Recorded]) -> RecordingSummary:
     """Look through a recording."""
-    summary = Summary()
+    summary = RecordingSummary()
     for message in messages:
         if not summary.counts:
             summary.start = summary.end = message.log_time

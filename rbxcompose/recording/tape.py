@@ -13,8 +13,16 @@ from dataclasses import replace
 from rbxcompose.bus.attachment import decode_attachment
 from rbxcompose.bus.names import ADMIN
 from rbxcompose.bus.tokens import EndpointToken, gid, parse_token
-from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Arrival, Closable, Question, RemotePublisher, Transport
-from rbxcompose.bus.witness import Call
+from rbxcompose.bus.transport import (
+    LONGEST_WAIT,
+    Arrival,
+    Closable,
+    Question,
+    RemotePublisher,
+    Transport,
+    TransportReply,
+)
+from rbxcompose.bus.witness import WitnessedCall
 from rbxcompose.clock import NANOSECONDS, Clock
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.events import TOPIC, event_of
@@ -25,7 +33,7 @@ from rbxcompose.msgs.types import Message
 from rbxcompose.qos import Qos
 from rbxcompose.recording.definitions import definition_of
 from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.topics import Topic, topic_of
+from rbxcompose.recording.topics import RecordedTopic, topic_of
 
 PLAN = "plan.json"  # name of the attachment that tells how the robot was composed
 ORDERS = "/rbxcompose/orders"
@@ -35,16 +43,18 @@ INSTANTS = "/rbxcompose/instants"
 class Tape:
     """Hands what happens to `write`, and topics as soon as they have a publisher to `declare`."""
 
-    def __init__(self, clock: Clock, declare: Callable[[Topic], None], write: Callable[[Recorded], None]) -> None:
+    def __init__(
+        self, clock: Clock, declare: Callable[[RecordedTopic], None], write: Callable[[Recorded], None]
+    ) -> None:
         self._clock, self._declare, self._write = clock, declare, write
         self._instant = 0.0  # [s], the last one that was told
-        self._topics: dict[bytes, Topic] = {}  # by the GID of the publisher
+        self._topics: dict[bytes, RecordedTopic] = {}  # by the GID of the publisher
 
     def around(self, transport: Transport) -> Transport:
         """Return a transport that does what this one does, and is recorded."""
         return _Taped(self, transport)
 
-    def witness(self, call: Call) -> None:
+    def witness(self, call: WitnessedCall) -> None:
         """Record a request or a reply."""
         event = event_of(call.service)
         kind = ServiceEventInfo.RESPONSE_SENT if call.is_reply else ServiceEventInfo.REQUEST_SENT
@@ -73,10 +83,10 @@ class Tape:
         self._keep(self._topics[source.gid], source.sequence, payload)
 
     def _say(self, name: str, message: Message, *, node: str = "", sequence: int = 0) -> None:
-        topic = Topic(name, message.TYPE, message.HASH, Qos.EVENT, definition_of(message.TYPE), node=node)
+        topic = RecordedTopic(name, message.TYPE, message.HASH, Qos.EVENT, definition_of(message.TYPE), node=node)
         self._keep(topic, sequence, encode(message))
 
-    def _keep(self, topic: Topic, sequence: int, payload: bytes) -> None:
+    def _keep(self, topic: RecordedTopic, sequence: int, payload: bytes) -> None:
         now, stamp = self._clock.now(), self._clock.stamp()
         if now != self._instant:
             self._instant = now
@@ -111,7 +121,7 @@ class _Taped:
         key: str,
         payload: bytes,
         attachment: bytes,
-        answered: Callable[[Answer], None],
+        answered: Callable[[TransportReply], None],
         *,
         of_all: bool = True,
         within: float = LONGEST_WAIT,

@@ -25,7 +25,7 @@ _IS_LATCHED = re.compile(r"^[ \t-]*+durability: *+(1|transient_local)[ \t\r]*+$"
 
 
 @dataclass(frozen=True, slots=True)
-class Topic:
+class RecordedTopic:
     """A topic with one type; another type, or another publisher, under the same name is another topic."""
 
     name: str  # with its leading slash
@@ -57,29 +57,29 @@ def qos_of_metadata(metadata: Mapping[str, str]) -> Qos:
     return Qos.LATCHED if _IS_LATCHED.search(metadata.get(ROS_QOS, "")) else Qos.STATE
 
 
-def by_name(counts: Mapping[Topic, int]) -> dict[Topic, int]:
+def by_name(counts: Mapping[RecordedTopic, int]) -> dict[RecordedTopic, int]:
     """Return the numbers of messages with those of all publishers of a topic together."""
-    found: dict[Topic, int] = {}
+    found: dict[RecordedTopic, int] = {}
     for topic, count in counts.items():
         whole = replace(topic, node="")
         found[whole] = found.get(whole, 0) + count
     return found
 
 
-def is_replayable(topic: Topic) -> bool:
+def is_replayable(topic: RecordedTopic) -> bool:
     """Tell whether a recorded topic can be published: its names must be fit for the bus, which has only CDR."""
     is_named = _TYPE.fullmatch(topic.type) and _HASH.fullmatch(topic.hash) and not name_problem(topic.name)
     return bool(is_named) and topic.encoding == CDR
 
 
-def topic_of(token: EndpointToken) -> Topic | None:
+def topic_of(token: EndpointToken) -> RecordedTopic | None:
     """Return the topic of a publisher, without a definition; None for other endpoints and for names that are none."""
     found = _DDS_TYPE.fullmatch(token.dds_type)
     if token.kind is not EntityKind.PUBLISHER or not found or name_problem(token.name):
         return None
     if not _HASH.fullmatch(token.type_hash):  # it becomes part of a key
         return None
-    return Topic(token.name, "/".join(found.groups()), token.type_hash, qos_of_token(token.qos))
+    return RecordedTopic(token.name, "/".join(found.groups()), token.type_hash, qos_of_token(token.qos))
 
 
 def qos_of_token(text: str) -> Qos:
@@ -103,11 +103,11 @@ class Selection:
     patterns: Sequence[str] = ()
     classes: Sequence[Qos] = ()
 
-    def takes(self, topic: Topic) -> bool:
+    def takes(self, topic: RecordedTopic) -> bool:
         """Tell whether a topic is wanted."""
         return self.names(topic) and (not self.classes or topic.qos in self.classes)
 
-    def names(self, topic: Topic) -> bool:
+    def names(self, topic: RecordedTopic) -> bool:
         """Tell whether a topic has one of the names that are wanted."""
         name = topic.name.lstrip("/")
         return not self.patterns or any(fnmatchcase(name, pattern.lstrip("/")) for pattern in self.patterns)

@@ -9,7 +9,7 @@ from mcap.writer import CompressionType, Writer
 
 import rbxcompose
 from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.topics import RecordedTopic
 
 PROFILE = "ros2"
 SCHEMA = "ros2msg"
@@ -21,9 +21,9 @@ class RecordingWriter:
     """Writes one file. Errors of the file are passed on as `OSError`."""
 
     def __init__(self, file: IO[bytes]) -> None:
-        self.counts: Counter[Topic] = Counter()
+        self.counts: Counter[RecordedTopic] = Counter()
         self._file = file
-        self._channels: dict[Topic, int] = {}
+        self._channels: dict[RecordedTopic, int] = {}
         self._schemas: dict[tuple[str, str], int] = {}
         self._writer = Writer(file, chunk_size=CHUNK, compression=CompressionType.ZSTD)
         self._writer.start(PROFILE, f"rbxcompose {rbxcompose.__version__}")
@@ -37,7 +37,7 @@ class RecordingWriter:
         """Add a file of JSON, which readers find by its name."""
         self._writer.add_attachment(0, 0, name, "application/json", data)
 
-    def declare(self, topic: Topic) -> None:
+    def declare(self, topic: RecordedTopic) -> None:
         """Make a topic known, also if it will have no messages."""
         if topic not in self._channels:
             self._channels[topic] = self._register(topic)
@@ -64,7 +64,7 @@ class RecordingWriter:
         self._writer.finish()  # type: ignore[no-untyped-call]
         self._file.flush()
 
-    def _register(self, topic: Topic) -> int:
+    def _register(self, topic: RecordedTopic) -> int:
         key = (topic.type, topic.definition)
         if key not in self._schemas:
             encoding = SCHEMA if topic.definition else ""

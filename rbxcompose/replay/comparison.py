@@ -19,7 +19,7 @@ NOTHING = "nothing"
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class RunDifference:
     """The first thing that was not as recorded: robot time [s], topic, field (empty: the message as a whole)."""
 
     time: float
@@ -29,12 +29,12 @@ class Difference:
     now: str
 
 
-class Comparison:
+class RunComparison:
     """Takes both sides as they come."""
 
     def __init__(self, aliases: Aliases) -> None:
         self.equal = 0  # messages
-        self.difference: Difference | None = None
+        self.difference: RunDifference | None = None
         self._aliases = aliases
         self._recorded: deque[Recorded] = deque()
         self._now: deque[Recorded] = deque()
@@ -64,7 +64,7 @@ class Comparison:
             self.difference = self._between(recorded, now)
             self.equal += self.difference is None
 
-    def _between(self, recorded: Recorded, now: Recorded) -> Difference | None:
+    def _between(self, recorded: Recorded, now: Recorded) -> RunDifference | None:
         if recorded.topic.name != now.topic.name:
             first = min(recorded, now, key=lambda one: one.log_time)
             return _whole(first, f"a message on {recorded.topic.name}", f"a message on {now.topic.name}")
@@ -81,11 +81,11 @@ def _at(record: Recorded) -> str:
     return f"at {record.log_time / NANOSECONDS:.6f} s"
 
 
-def _whole(record: Recorded, recorded: str, now: str) -> Difference:
-    return Difference(record.log_time / NANOSECONDS, record.topic.name, "", recorded, now)
+def _whole(record: Recorded, recorded: str, now: str) -> RunDifference:
+    return RunDifference(record.log_time / NANOSECONDS, record.topic.name, "", recorded, now)
 
 
-def _in_a_field(record: Recorded, payload: bytes) -> Difference:
+def _in_a_field(record: Recorded, payload: bytes) -> RunDifference:
     try:
         cls = registry.message(record.topic.type)
         pairs = zip(
@@ -94,7 +94,7 @@ def _in_a_field(record: Recorded, payload: bytes) -> Difference:
         field, before, after = next((one, a, b) for (one, a), (other, b) in pairs if (one, a) != (other, b))
     except (KeyError, CdrError, StopIteration):  # a type that is not installed, bytes that no field tells of
         return _whole(record, f"{len(record.payload)} bytes", f"{len(payload)} other bytes")
-    return Difference(record.log_time / NANOSECONDS, record.topic.name, field, f"{before}", f"{after}")
+    return RunDifference(record.log_time / NANOSECONDS, record.topic.name, field, f"{before}", f"{after}")
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:

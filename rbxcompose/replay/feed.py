@@ -13,7 +13,7 @@ from typing import Any
 
 from rbxcompose.bus.attachment import Attachment
 from rbxcompose.bus.names import data_key
-from rbxcompose.bus.transport import Answer
+from rbxcompose.bus.transport import TransportReply
 from rbxcompose.clock import NANOSECONDS
 from rbxcompose.levels import Level
 from rbxcompose.msgs.cdr import decode, encode
@@ -23,8 +23,8 @@ from rbxcompose.msgs.std_msgs import Float64, String
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.tape import INSTANTS, ORDERS
 from rbxcompose.replay.aliases import Aliases
-from rbxcompose.replay.services import Known, Services
-from rbxcompose.replay.stage import Fed, Stage
+from rbxcompose.replay.services import Known, ReplayedServices
+from rbxcompose.replay.stage import Fed, ReplayStage
 from rbxcompose.requests import Refused
 from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.scheduler import Scheduler
@@ -32,7 +32,7 @@ from rbxcompose.scheduler import Scheduler
 LAST = "\U0010ffff"  # an owner whose events come after those of all others
 
 
-class Feed:
+class ReplayFeed:
     """Goes through the records of a run, once; those of the component itself go to `expect`."""
 
     def __init__(
@@ -40,8 +40,8 @@ class Feed:
         records: Iterator[Recorded],
         name: str,
         domain: int,
-        stage: Stage,
-        services: Services,
+        stage: ReplayStage,
+        services: ReplayedServices,
         aliases: Aliases,
         expect: Callable[[Recorded], None],
     ) -> None:
@@ -165,8 +165,8 @@ class Feed:
         elif info.event_type == ServiceEventInfo.RESPONSE_SENT:
             answered = self._stage.waiting.pop((key, info.client_gid, info.sequence_number), None)
             if answered is not None:
-                failed = Answer(error="the recorded request failed")
-                answered(Answer(encode(event.response[0])) if event.response else failed)
+                failed = TransportReply(error="the recorded request failed")
+                answered(TransportReply(encode(event.response[0])) if event.response else failed)
 
 
 def _belong_together(first: Recorded, record: Recorded) -> bool:

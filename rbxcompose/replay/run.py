@@ -10,12 +10,12 @@ from rbxcompose.levels import Level
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.tape import Tape
-from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.topics import RecordedTopic
 from rbxcompose.replay.aliases import Aliases
-from rbxcompose.replay.comparison import Comparison, Difference
-from rbxcompose.replay.feed import Feed
-from rbxcompose.replay.services import Services
-from rbxcompose.replay.stage import Stage, StageBus
+from rbxcompose.replay.comparison import RunComparison, RunDifference
+from rbxcompose.replay.feed import ReplayFeed
+from rbxcompose.replay.services import ReplayedServices
+from rbxcompose.replay.stage import ReplayStage, StageBus
 from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
@@ -30,11 +30,11 @@ class Rerun:
     """What came of it: the number of messages that were as recorded, the first that was not, what went wrong."""
 
     equal: int
-    difference: Difference | None
+    difference: RunDifference | None
     errors: tuple[str, ...]
 
 
-def missing_topics(plan: Plan, instance: Instance, topics: Iterable[Topic]) -> list[str]:
+def missing_topics(plan: Plan, instance: Instance, topics: Iterable[RecordedTopic]) -> list[str]:
     """Return the inputs of a component that somebody in the robot publishes, and that the recording does not have."""
     recorded = {topic.name for topic in topics}
     published = {wire.topic for one in plan.instances for wire in one.wires if wire.kind == "out"}
@@ -56,8 +56,8 @@ def rerun(
     """
     alone = plan.in_one_process()
     only = next(one for one in alone.instances if one.name == instance.name)
-    clock, scheduler, aliases, services = SteppedClock(), Scheduler(), Aliases(), Services(plan, only)
-    comparison = Comparison(aliases)
+    clock, scheduler, aliases, services = SteppedClock(), Scheduler(), Aliases(), ReplayedServices(plan, only)
+    comparison = RunComparison(aliases)
     errors: list[str] = []
 
     def sent(record: Recorded) -> None:
@@ -70,11 +70,11 @@ def rerun(
         if record.level is Level.ERROR:
             errors.append(f"{record.source}: {record.text}")
 
-    stage = Stage(scheduler, services.is_served)
+    stage = ReplayStage(scheduler, services.is_served)
     tape = Tape(clock, lambda topic: None, sent)
     bus = StageBus(scheduler, clock, alone, only.name, stage, tape)
     host = Host(alone, [only], scheduler, clock, bus, log, lambda notice: None)
-    feed = Feed(iter(records), only.name, alone.bus.domain, stage, services, aliases, comparison.expect)
+    feed = ReplayFeed(iter(records), only.name, alone.bus.domain, stage, services, aliases, comparison.expect)
     host.configure()
     feed.begin(scheduler, host)
     while (due := scheduler.next_due()) is not None and not feed.is_past(due):

@@ -18,7 +18,7 @@ from rbxcompose.sdk.registry import component_type
 Known = tuple[str, type[Service[Any, Any]]]  # key on the bus, type
 
 
-class Services:
+class ReplayedServices:
     """What the events of a recording are to one component."""
 
     def __init__(self, plan: Plan, instance: Instance) -> None:

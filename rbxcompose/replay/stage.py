@@ -9,7 +9,7 @@ from typing import TypeVar
 from rbxcompose.bus.attachment import Attachment, decode_attachment
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.topics import Publisher
-from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Arrival, Nowhere, Question
+from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, NoTransport, Question, TransportReply
 from rbxcompose.clock import Clock
 from rbxcompose.msgs.types import Message
 from rbxcompose.plan.model import Plan
@@ -35,7 +35,7 @@ class Fed:
 
 
 @dataclass(slots=True)
-class Stage(Nowhere):
+class ReplayStage(NoTransport):
     """A transport whose other side is a recording. Keys are those of topics and services."""
 
     scheduler: Scheduler
@@ -43,18 +43,18 @@ class Stage(Nowhere):
     session: str = "0"
     subscribers: dict[str, list[Callable[[Arrival], None]]] = field(default_factory=dict)
     servers: dict[str, Callable[[Question], None]] = field(default_factory=dict)
-    waiting: dict[tuple[str, bytes, int], Callable[[Answer], None]] = field(default_factory=dict)
+    waiting: dict[tuple[str, bytes, int], Callable[[TransportReply], None]] = field(default_factory=dict)
 
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
         """Have the callback run at this instant."""
         self.scheduler.post(owner, callback)
 
-    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Nowhere:
+    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> NoTransport:
         """Receive what was recorded."""
         self.subscribers.setdefault(key, []).append(arrived)
         return self
 
-    def serve(self, key: str, asked: Callable[[Question], None]) -> Nowhere:
+    def serve(self, key: str, asked: Callable[[Question], None]) -> NoTransport:
         """Receive the requests that were recorded."""
         self.servers[key] = asked
         return self
@@ -64,17 +64,17 @@ class Stage(Nowhere):
         key: str,
         payload: bytes,
         attachment: bytes,
-        answered: Callable[[Answer], None],
+        answered: Callable[[TransportReply], None],
         *,
         of_all: bool = True,
         within: float = LONGEST_WAIT,
-    ) -> Nowhere:
+    ) -> NoTransport:
         """Wait for the reply that was recorded."""
         source = decode_attachment(attachment)
         self.waiting[key, source.gid, source.sequence] = answered
         return self
 
-    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Nowhere:
+    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> NoTransport:
         """See a server where the robot has one."""
         if self.served(pattern):
             changed(pattern.replace("*", "recorded"), True)
@@ -89,7 +89,9 @@ class Stage(Nowhere):
 class StageBus(Bus):
     """The bus of one component. What its host says of it reaches nobody: the recording has what the whole host said."""
 
-    def __init__(self, scheduler: Scheduler, clock: Clock, plan: Plan, owner: str, stage: Stage, tape: Tape) -> None:
+    def __init__(
+        self, scheduler: Scheduler, clock: Clock, plan: Plan, owner: str, stage: ReplayStage, tape: Tape
+    ) -> None:
         names, wire = plan.bus, plan.bus.wire
         super().__init__(
             scheduler,

@@ -199,7 +199,7 @@ class Alive:
     runs: dict[str, str] = field(default_factory=dict)
 
 
-Order = (
+ChannelOrder = (
     Configure
     | Activate
     | Start
@@ -215,7 +215,7 @@ Order = (
     | Blocked
     | Shutdown
 )
-Word = (
+ChannelWord = (
     Configured
     | States
     | StoppedByBus
@@ -231,9 +231,9 @@ Word = (
     | Reconfigured
     | Alive
 )
-Message = Order | Word
+ChannelMessage = ChannelOrder | ChannelWord
 
-MESSAGES: Family[Message] = Family(get_args(Message))
+MESSAGES: Family[ChannelMessage] = Family(get_args(ChannelMessage))
 
 
 @dataclass
@@ -252,7 +252,7 @@ class Channel:
         """Return the descriptor to wait for."""
         return self.connection.fileno()
 
-    def send(self, message: Message) -> None:
+    def send(self, message: ChannelMessage) -> None:
         """Send a message; to a closed channel nothing is sent."""
         if self.is_open:
             self._unsent += MESSAGES.to_line(message)
@@ -273,7 +273,7 @@ class Channel:
         except (BrokenPipeError, ConnectionResetError):
             self.is_open = False
 
-    def receive(self) -> list[Message]:
+    def receive(self) -> list[ChannelMessage]:
         """Return the messages that have come; `is_open` turns false at the end of the other side."""
         with contextlib.suppress(BlockingIOError):
             while self.is_open:

@@ -51,4 +51,4 @@ class Record:
             raise ValueError(f"not a log record: {line!r}") from error
 
 
-Log = Callable[[Record], None]
+WriteRecord = Callable[[Record], None]

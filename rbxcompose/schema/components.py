@@ -9,7 +9,7 @@ from typing import Any
 
 from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping as MappingNode
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.schema.scalars import DEFINITIONS, Schema
 from rbxcompose.schema.settle import opened, schemas_of

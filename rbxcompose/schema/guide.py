@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from rbxcompose.manifest.tree import Mapping as MappingNode
-from rbxcompose.manifest.tree import Node, Path, Scalar, at
+from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.schema.scalars import DIMENSION, Schema
 from rbxcompose.schema.settle import referred
 from rbxcompose.units import DIMENSIONS, Dimension
@@ -25,7 +24,7 @@ class Guide:
         self.root = root
         self.types = types
 
-    def keys(self, path: Path) -> dict[str, Schema]:
+    def keys(self, path: KeyPath) -> dict[str, Schema]:
         """Return what the map at `path` may have, by key; names that the user gives are not among them."""
         shapes = [one for one in self._shapes(path) if "properties" in one]
         closed = [one for one in shapes if one.get("additionalProperties") is False]
@@ -46,20 +45,20 @@ class Guide:
             whole = {**one, **whole}
         return whole
 
-    def describe(self, path: Path) -> str:
+    def describe(self, path: KeyPath) -> str:
         """Return what the value at `path` is for."""
         return next((one["description"] for one in self._last(path) if one.get("description")), "")
 
-    def value(self, path: Path) -> Value:
+    def value(self, path: KeyPath) -> GuidedValue:
         """Return what may stand at `path`."""
-        return Value([*self._shapes(path)])
+        return GuidedValue([*self._shapes(path)])
 
-    def _shapes(self, path: Path) -> Iterator[Schema]:
+    def _shapes(self, path: KeyPath) -> Iterator[Schema]:
         node = at(self.root, path)
         for schema in self._last(path):
             yield from self._opened(schema, node, path)
 
-    def _last(self, path: Path) -> list[Schema]:
+    def _last(self, path: KeyPath) -> list[Schema]:
         """Return the schemas of the place itself, before references and choices in them are opened."""
         found = [self.schema]
         for length, key in enumerate(path):
@@ -73,7 +72,7 @@ class Guide:
         """Return the key of a definition for which a schema stands, or the schema itself."""
         return referred(schema, self.schema) if "/properties/" in schema.get("$ref", "") else schema
 
-    def _opened(self, schema: Schema, node: Node | None, path: Path, depth: int = 0) -> Iterator[Schema]:
+    def _opened(self, schema: Schema, node: TreeNode | None, path: KeyPath, depth: int = 0) -> Iterator[Schema]:
         """Yield a schema, and all that it stands for or that holds beside it."""
         if depth > _DEEPEST:
             return
@@ -87,7 +86,7 @@ class Guide:
         for one in inner:
             yield from self._opened(one, node, path, depth + 1)
 
-    def _holds(self, condition: Schema, node: Node | None, path: Path) -> bool:
+    def _holds(self, condition: Schema, node: TreeNode | None, path: KeyPath) -> bool:
         if "not" in condition:
             return not any(self._holds(one, node, path) for one in condition["not"]["anyOf"])
         wanted = {name: one.get("const") for name, one in condition.get("properties", {}).items()}
@@ -97,11 +96,11 @@ class Guide:
             return False
         return all(self._word(node, name, path) == const for name, const in wanted.items())
 
-    def _word(self, node: MappingNode, name: str, path: Path) -> str:
+    def _word(self, node: MappingNode, name: str, path: KeyPath) -> str:
         value = node.get(name)
         if value is None and name == "type" and path:
             return self.types.get(str(path[-1]), "")
-        return value.text if isinstance(value, Scalar) else ""
+        return value.text if isinstance(value, ScalarNode) else ""
 
 
 def _below(schema: Schema, key: str | int) -> Iterator[Schema]:
@@ -116,7 +115,7 @@ def _below(schema: Schema, key: str | int) -> Iterator[Schema]:
         yield others
 
 
-class Value:
+class GuidedValue:
     """What may stand at one place."""
 
     def __init__(self, shapes: list[Schema]) -> None:

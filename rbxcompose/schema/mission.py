@@ -9,7 +9,7 @@ from typing import Any
 from rbxcompose.config import Name
 from rbxcompose.expressions.types import FLAG, TYPES
 from rbxcompose.manifest.arguments import ArgumentModel
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.missions.engine.resume_points import HISTORIES
 from rbxcompose.missions.language.machine_reader import RESULTS
 from rbxcompose.missions.language.reader import INTERRUPT_KEYS, KEYS
@@ -70,7 +70,7 @@ _STATE = {
 }
 
 
-class MissionFile(Header):
+class MissionFile(ManifestHeader):
     """A mission: what the robot does, as a tree of nodes."""
 
 

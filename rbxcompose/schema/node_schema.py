@@ -7,17 +7,17 @@ from collections.abc import Iterable
 from rbxcompose.expressions.text import Template
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import COUNT, FLAG, UNKNOWN, Type, TypeKind
-from rbxcompose.manifest.tree import Entry, Mapping, Scalar
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode
 from rbxcompose.missions.language.asked import Asked, Assignment
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.layout import Nobody
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.value_reader import UNREADABLE
 from rbxcompose.missions.modifiers.registry import modifiers
-from rbxcompose.missions.program.messages import Message
+from rbxcompose.missions.program.messages import MessageTemplate
 from rbxcompose.missions.program.modifier import Modifier
 from rbxcompose.missions.program.moments import Moments
-from rbxcompose.missions.program.registry import Kind
+from rbxcompose.missions.program.registry import StepType
 from rbxcompose.schema.scalars import DEFINITIONS, Schema, computed
 
 NODE: Schema = {"$ref": f"{DEFINITIONS}node"}
@@ -41,8 +41,8 @@ class Asking(NodeReader):
     """A reader that has every key, and keeps for each the schema of what it is asked for."""
 
     def __init__(self, key: str) -> None:
-        word = Scalar(key, Mapping().span)
-        super().__init__(Mapping({key: Entry(word, word)}), key, 0, Nobody())
+        word = ScalarNode(key, MappingNode().span)
+        super().__init__(MappingNode({key: Entry(word, word)}), key, 0, Nobody())
         self.schemas: dict[str, Schema] = {}
         self.optional: set[str] = set()
 
@@ -51,7 +51,7 @@ class Asking(NodeReader):
         self.optional.add(key)
         return True
 
-    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Scalar | None:
+    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> ScalarNode | None:
         """Note a word."""
         self.schemas[key] = {"type": "string", "minLength": 1}
         return None
@@ -69,7 +69,7 @@ class Asking(NodeReader):
         self.schemas[key] = {**count, "pattern": pattern, "examples": [3, *words]}
         return words[0]
 
-    def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Mapping | None:
+    def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> MappingNode | None:
         """Note a map."""
         self.schemas[key] = MAPS.get(key, {"type": "object", "minProperties": 1})
         return None
@@ -79,10 +79,10 @@ class Asking(NodeReader):
         self.schemas[key] = ITEM_NAME
         return ""
 
-    def name(self, key: str, what: str) -> Scalar:
+    def name(self, key: str, what: str) -> ScalarNode:
         """Note a name."""
         self.schemas[key] = ITEM_NAME
-        return Scalar("", Mapping().span)
+        return ScalarNode("", MappingNode().span)
 
     def branches(self) -> tuple[str, ...]:
         """Note a list or a map of nodes."""
@@ -95,12 +95,12 @@ class Asking(NodeReader):
         self.schemas[key] = {"type": "object", "minProperties": 1, "additionalProperties": NODE}
         return ()
 
-    def message(self, target: str, body: str) -> Message:
+    def message(self, target: str, body: str) -> MessageTemplate:
         """Note a name and what is sent."""
         self.schemas[target] = {"type": "string", "minLength": 1}
         self.schemas[body] = ANYTHING
         self.optional.add(body)
-        return Message(Scalar("", Mapping().span), None)
+        return MessageTemplate(ScalarNode("", MappingNode().span), None)
 
     def moments(self, keys: Iterable[str]) -> Moments:
         """Note hooks, each of which may be missing."""
@@ -151,7 +151,7 @@ class Asking(NodeReader):
         return ()
 
 
-def kind_schema(kind: Kind) -> tuple[dict[str, Schema], list[str]]:
+def kind_schema(kind: StepType) -> tuple[dict[str, Schema], list[str]]:
     """Return the schemas of the keys of a kind, described, and those that must be there."""
     asking = Asking(kind.name)
     kind.read(asking)

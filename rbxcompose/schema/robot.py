@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rbxcompose.manifest.file_models import file_model
-from rbxcompose.manifest.header import Header
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.registry import sections as all_sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
 from rbxcompose.schema.components import component_schemas
@@ -74,7 +74,7 @@ def _changes(made: Sections, kind: str) -> tuple[Schema, dict[str, Schema]]:
 
 def document(
     kind: str,
-    model: type[Header],
+    model: type[ManifestHeader],
     properties: Schema,
     definitions: Mapping[str, Schema],
     always: Mapping[str, Schema] | None = None,
@@ -104,11 +104,11 @@ def document(
 
 def header(kind: str) -> dict[str, Schema]:
     """Return the keys that every manifest begins with."""
-    (made,) = schemas_of({"header": Header})[1].values()
+    (made,) = schemas_of({"header": ManifestHeader})[1].values()
     return {
         **{name: dict(one) for name, one in made["properties"].items()},
-        "rbx": {"const": 1, "description": Header.model_fields["rbx"].description},
-        "kind": {"const": kind, "description": Header.model_fields["kind"].description},
+        "rbx": {"const": 1, "description": ManifestHeader.model_fields["rbx"].description},
+        "kind": {"const": kind, "description": ManifestHeader.model_fields["kind"].description},
     }
 
 

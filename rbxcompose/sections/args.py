@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rbxcompose.findings import Span
-from rbxcompose.manifest.arguments import Argument, ArgumentModel, read_argument
+from rbxcompose.manifest.arguments import ArgumentModel, DeclaredArgument, read_argument
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Reading, Short
 from rbxcompose.references import ARGUMENT
@@ -18,7 +18,7 @@ from rbxcompose.references import ARGUMENT
     short=Short("default", only_over="the argument's value"),
     is_composed=False,
 )
-def args(reading: Reading[ArgumentModel]) -> dict[str, tuple[Argument | None, Span]]:
+def args(reading: Reading[ArgumentModel]) -> dict[str, tuple[DeclaredArgument | None, Span]]:
     """Arguments by name: what a user of the robot or part may want to set, read by `${args.NAME}`.
 
     Example:

@@ -12,7 +12,7 @@ from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Reading
 
 
-class Bus(Config):
+class BusModel(Config):
     """How the robot's messages travel."""
 
     domain: int = Field(0, ge=0, le=232)
@@ -29,8 +29,8 @@ class Bus(Config):
     """Whose time the robot follows: its own, or that of a simulator outside, which publishes it on `/clock`."""
 
 
-@section("bus", Bus, order=100, files=(ROBOT, OVERLAY))
-def bus(reading: Reading[Bus]) -> Bus:
+@section("bus", BusModel, order=100, files=(ROBOT, OVERLAY))
+def bus(reading: Reading[BusModel]) -> BusModel:
     """How its messages travel.
 
     Example:
@@ -39,4 +39,4 @@ def bus(reading: Reading[Bus]) -> Bus:
           namespace: robot_1
           port: 7447
     """
-    return reading.whole() or Bus()
+    return reading.whole() or BusModel()

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
-from collections.abc import Mapping as AnyMapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any
@@ -13,8 +12,8 @@ from rbxcompose.findings import SIMILAR, Report, Span, kind
 from rbxcompose.manifest.options import OPTIONS, ComponentOptions
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.renamer import Renames
-from rbxcompose.manifest.section import Contents, Reading, Scope
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, at
+from rbxcompose.manifest.section import Contents, Reading, SetScope
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, label_of, validate
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.plugins import BROKEN, LEFT_OUT, BrokenPluginError
@@ -64,46 +63,46 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             yield WantedComponent(name, one.type, one.config, ("components", name), one.options)
 
 
-def _models(node: Node) -> Iterator[type[Config]]:
+def _models(node: TreeNode) -> Iterator[type[Config]]:
     """Yield the options of every component and the configuration of the type, if that is written down and known."""
     yield ComponentOptions
     if (cls := component_class(node)) is not None:
         yield cls.config_type()
 
 
-def _rename(renames: Renames, name: str, node: Node) -> Node:
+def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
     """Return a component with `connect:` for each port whose own topic gets another name."""
     written = at(node, ("connect",))
-    if not isinstance(node, Mapping) or (written is not None and not isinstance(written, Mapping)):
+    if not isinstance(node, MappingNode) or (written is not None and not isinstance(written, MappingNode)):
         return node
     entries = dict(written.entries) if written else {}
     for port, topic in _own_topics(node).items():
         if port not in entries and (changed := renames.topic(topic)) != topic:
             given = renames.written(topic)
-            entries[port] = Entry(Scalar(port, given.key_span), Scalar(changed, given.span))
+            entries[port] = Entry(ScalarNode(port, given.key_span), ScalarNode(changed, given.span))
     if not entries:
         return node
     span = next(iter(entries.values())).key.span
-    key = node.entries["connect"].key if written else Scalar("connect", span)
-    connect = Mapping(entries, written.span if written else span)
+    key = node.entries["connect"].key if written else ScalarNode("connect", span)
+    connect = MappingNode(entries, written.span if written else span)
     return replace(node, entries={**node.entries, "connect": Entry(key, connect)})
 
 
-def _topics(name: str, node: Node) -> Iterable[str]:
+def _topics(name: str, node: TreeNode) -> Iterable[str]:
     connect = at(node, ("connect",))
-    written = connect.entries.items() if isinstance(connect, Mapping) else ()
-    given = {port: entry.value.text for port, entry in written if isinstance(entry.value, Scalar)}
+    written = connect.entries.items() if isinstance(connect, MappingNode) else ()
+    given = {port: entry.value.text for port, entry in written if isinstance(entry.value, ScalarNode)}
     return {**_own_topics(node), **given}.values()
 
 
-def _own_topics(node: Node) -> dict[str, str]:
+def _own_topics(node: TreeNode) -> dict[str, str]:
     """Return the topics of the ports that a component's class declares; others are not known yet."""
     cls = component_class(node)
     ports = ((name, getattr(cls, name)) for name in dir(cls)) if cls else ()
     return {name: port.topic for name, port in ports if isinstance(port, Port) and port.topic}
 
 
-def _details(read: AnyMapping[str, ComponentEntry]) -> dict[str, str]:
+def _details(read: Mapping[str, ComponentEntry]) -> dict[str, str]:
     return {name: one.type for name, one in read.items()}
 
 
@@ -115,7 +114,7 @@ def _details(read: AnyMapping[str, ComponentEntry]) -> dict[str, str]:
     runs=True,
     entry="component",
     needs="type",
-    scope=Scope.BARE,
+    scope=SetScope.BARE,
     models=_models,
     rename=_rename,
     topics=_topics,
@@ -141,10 +140,10 @@ def components(reading: Reading[ComponentOptions]) -> dict[str, ComponentEntry]:
     return {name: one for name, one in found if one is not None}
 
 
-def component_class(node: Node) -> type[Component[Any]] | None:
+def component_class(node: TreeNode) -> type[Component[Any]] | None:
     """Return the class of a component, if its type is written down and known."""
     written = at(node, ("type",))
-    if not isinstance(written, Scalar) or written.text not in registry.component_names():
+    if not isinstance(written, ScalarNode) or written.text not in registry.component_names():
         return None
     try:
         return registry.component_type(written.text)
@@ -158,7 +157,7 @@ def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> C
     node, path = entry.value, ("components", name)
     if is_broken(node):
         return None
-    if not isinstance(node, Mapping):
+    if not isinstance(node, MappingNode):
         message = f"component '{name}' must be a map with a 'type:' and its configuration"
         report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
         return None
@@ -175,11 +174,11 @@ def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> C
     return ComponentEntry(name, type_name, options, config, entry.key.span)
 
 
-def _part(node: Mapping, keys: Collection[str]) -> Mapping:
+def _part(node: MappingNode, keys: Collection[str]) -> MappingNode:
     return replace(node, entries={name: entry for name, entry in node.entries.items() if name in keys})
 
 
-def _type_name(name: str, entry: Entry, node: Mapping, report: Report) -> str | None:
+def _type_name(name: str, entry: Entry, node: MappingNode, report: Report) -> str | None:
     """Return the type of a component, or None after a finding if there is none of that name."""
     written = node.get("type")
     if written is None:
@@ -190,7 +189,7 @@ def _type_name(name: str, entry: Entry, node: Mapping, report: Report) -> str | 
         else:
             report.add(MISSING_KEY.at(entry.key.span, f"component '{name}' needs the key 'type'"))
         return None
-    if not isinstance(written, Scalar):
+    if not isinstance(written, ScalarNode):
         report.add(WRONG_TYPE.at(written.span, "'type' must be the name of a type", label=label_of(written)))
         return None
     if is_broken(written):

@@ -12,14 +12,14 @@ from rbxcompose.config import Config, Name, Time
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.section import Reading
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.validate import validate
 from rbxcompose.references import ANALYZER, RUNNING, Refers
 
 Pattern = Annotated[str, Refers(RUNNING, is_told=True)]
 
 
-class Analyzer(Config):
+class AnalyzerModel(Config):
     """One group of statuses."""
 
     match: tuple[Pattern, ...] = Field(min_length=1)
@@ -30,16 +30,16 @@ class Analyzer(Config):
     """Names that must report, whatever matches."""
 
 
-class Diagnostics(Config):
+class DiagnosticsModel(Config):
     """How the states of components are grouped."""
 
-    analyzers: dict[Name, Analyzer] = {}
+    analyzers: dict[Name, AnalyzerModel] = {}
     """Groups by name."""
 
 
-def _rename(renames: Renames, name: str, node: Node) -> Node:
+def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
     """Return an analyzer with patterns that match what the part's components and muxes are called outside."""
-    if not isinstance(node, Mapping):
+    if not isinstance(node, MappingNode):
         return node
     changed = {
         key: Entry(one.key, _patterns(renames, one.value)) if key in ("match", "expected") else one
@@ -48,14 +48,14 @@ def _rename(renames: Renames, name: str, node: Node) -> Node:
     return replace(node, entries=changed)
 
 
-def _patterns(renames: Renames, node: Node) -> Node:
+def _patterns(renames: Renames, node: TreeNode) -> TreeNode:
     """Return a list of names and patterns; one that also matches muxes of the part names them beside it."""
-    if not isinstance(node, Sequence):
+    if not isinstance(node, SequenceNode):
         return node
-    items: list[Node] = []
+    items: list[TreeNode] = []
     for item in node.items:
-        changed = _pattern(renames, item.text) if isinstance(item, Scalar) and "${" not in item.text else []
-        items += [replace(item, text=text) for text in changed] if isinstance(item, Scalar) and changed else [item]
+        changed = _pattern(renames, item.text) if isinstance(item, ScalarNode) and "${" not in item.text else []
+        items += [replace(item, text=text) for text in changed] if isinstance(item, ScalarNode) and changed else [item]
     return replace(node, items=tuple(items))
 
 
@@ -68,14 +68,14 @@ def _pattern(renames: Renames, pattern: str) -> list[str]:
 
 @section(
     "diagnostics",
-    Diagnostics,
+    DiagnosticsModel,
     order=60,
     names=ANALYZER,
     at=("analyzers",),
     shared=((), ("analyzers",)),
     rename=_rename,
 )
-def diagnostics(reading: Reading[Diagnostics]) -> Diagnostics:
+def diagnostics(reading: Reading[DiagnosticsModel]) -> DiagnosticsModel:
     """How the states of components are grouped: each group is OK, WARN, ERROR or STALE.
 
     Example:
@@ -87,9 +87,9 @@ def diagnostics(reading: Reading[Diagnostics]) -> Diagnostics:
               expected: [charger]
     """
     node = reading.node
-    if not isinstance(node, Mapping):
-        return reading.whole() or Diagnostics()
+    if not isinstance(node, MappingNode):
+        return reading.whole() or DiagnosticsModel()
     others = {name: entry for name, entry in node.entries.items() if name != "analyzers"}
-    validate(Diagnostics, replace(node, entries=others), ("diagnostics",), reading.report)
-    found = ((name, reading.valid(Analyzer, name, entry.value)) for name, entry in reading.named())
-    return Diagnostics(analyzers={name: read for name, read in found if read is not None})
+    validate(DiagnosticsModel, replace(node, entries=others), ("diagnostics",), reading.report)
+    found = ((name, reading.valid(AnalyzerModel, name, entry.value)) for name, entry in reading.named())
+    return DiagnosticsModel(analyzers={name: read for name, read in found if read is not None})

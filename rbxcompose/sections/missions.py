@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping as AnyMapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,14 +17,14 @@ from rbxcompose.manifest.fill import SHOWN_SECRET
 from rbxcompose.manifest.mission_data import is_moderate
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Reading, Short
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, children
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, children
 from rbxcompose.references import ANYTHING, MISSION, Refers
 
 INPUT = "input"
 """An input of the mission that an entry names."""
 
 
-class Mission(Config):
+class MissionModel(Config):
     """A mission that the robot has."""
 
     file: FileName
@@ -41,16 +41,16 @@ class MissionEntry:
 
     name: str
     path: Path
-    with_: Mapping
+    with_: MappingNode
     span: Span
 
 
-def _details(read: AnyMapping[str, MissionEntry]) -> dict[str, str]:
+def _details(read: Mapping[str, MissionEntry]) -> dict[str, str]:
     return dict.fromkeys(read, "mission")
 
 
-@section("missions", Mission, order=90, names=MISSION, entry="mission", short=Short("file"), details=_details)
-def missions(reading: Reading[Mission]) -> dict[str, MissionEntry]:
+@section("missions", MissionModel, order=90, names=MISSION, entry="mission", short=Short("file"), details=_details)
+def missions(reading: Reading[MissionModel]) -> dict[str, MissionEntry]:
     """Missions that the robot has, by name: their files, and the values of their inputs.
 
     Example:
@@ -64,10 +64,10 @@ def missions(reading: Reading[Mission]) -> dict[str, MissionEntry]:
     return {name: one for name, one in found if one is not None}
 
 
-def _mission(reading: Reading[Mission], name: str, entry: Entry) -> MissionEntry | None:
+def _mission(reading: Reading[MissionModel], name: str, entry: Entry) -> MissionEntry | None:
     node = entry.value
-    read = reading.valid(Mission, name, node)
-    if read is None or not isinstance(node, Mapping):
+    read = reading.valid(MissionModel, name, node)
+    if read is None or not isinstance(node, MappingNode):
         return None
     _refuse_secrets(node, reading.report)
     inputs = node.get("with")
@@ -78,12 +78,12 @@ def _mission(reading: Reading[Mission], name: str, entry: Entry) -> MissionEntry
     if isinstance(path, Finding):
         reading.report.add(path)
         return None
-    return MissionEntry(name, path, inputs if isinstance(inputs, Mapping) else Mapping(), entry.key.span)
+    return MissionEntry(name, path, inputs if isinstance(inputs, MappingNode) else MappingNode(), entry.key.span)
 
 
-def _refuse_secrets(node: Node, report: Report) -> None:
+def _refuse_secrets(node: TreeNode, report: Report) -> None:
     """Add a finding for each secret that would go into a mission, where it would be shown."""
-    if isinstance(node, Scalar) and isinstance(node.filled, Secret):
+    if isinstance(node, ScalarNode) and isinstance(node.filled, Secret):
         report.add(SHOWN_SECRET.at(node.span, "a mission cannot hold a secret: what it does is logged"))
     for _, inner in children(node):
         _refuse_secrets(inner, report)

@@ -10,9 +10,8 @@ from rbxcompose.config import Config, Frequency, Name, Time
 from rbxcompose.manifest.fields import PortName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.renamer import Renames
-from rbxcompose.manifest.section import ANY, Contents, Reading, Scope
-from rbxcompose.manifest.tree import Entry, Node, at
-from rbxcompose.manifest.tree import Mapping as MappingNode
+from rbxcompose.manifest.section import ANY, Contents, Reading, SetScope
+from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode, at
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type
@@ -45,7 +44,7 @@ class MuxLock(Config):
     """Silence that locks."""
 
 
-class Mux(Config):
+class MuxModel(Config):
     """Lets one of several sources command an output."""
 
     inputs: dict[Name, MuxInput] = Field(min_length=1)
@@ -54,7 +53,7 @@ class Mux(Config):
     """Locks by name."""
 
 
-def _rename(renames: Renames, name: str, node: Node) -> Node:
+def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
     """Return a mux whose inputs and locks follow its topics."""
     if not isinstance(node, MappingNode):
         return node
@@ -65,7 +64,7 @@ def _rename(renames: Renames, name: str, node: Node) -> Node:
     return MappingNode(changed, node.span, node.tag)
 
 
-def _topics(name: str, node: Node) -> Iterator[str]:
+def _topics(name: str, node: TreeNode) -> Iterator[str]:
     yield name
     for key in _BELOW_TOPIC:
         named = at(node, (key,))
@@ -123,12 +122,12 @@ def _details(read: Iterable[str]) -> Mapping[str, str]:
 
 @section(
     "muxes",
-    Mux,
+    MuxModel,
     order=50,
     names=MUX,
     runs=True,
     entry="mux",
-    scope=Scope.KEYS,
+    scope=SetScope.KEYS,
     has_topics=True,
     shared=((), (ANY,), *((ANY, key) for key in _BELOW_TOPIC)),
     clash=_clash,
@@ -138,7 +137,7 @@ def _details(read: Iterable[str]) -> Mapping[str, str]:
     connects=_connects,
     details=_details,
 )
-def muxes(reading: Reading[Mux]) -> dict[str, Mux]:
+def muxes(reading: Reading[MuxModel]) -> dict[str, MuxModel]:
     """Who may command, by the topic that is commanded: the live input of the largest priority is let through.
 
     Example:

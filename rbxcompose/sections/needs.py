@@ -5,7 +5,7 @@ from __future__ import annotations
 from rbxcompose.config import Config
 from rbxcompose.manifest.fields import InterfaceName, TopicName
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import PART, Reading, Scope
+from rbxcompose.manifest.section import PART, Reading, SetScope
 
 
 class Needs(Config):
@@ -15,7 +15,7 @@ class Needs(Config):
     """Topics with their types, such as `cmd_vel: geometry_msgs/Twist`."""
 
 
-@section("needs", Needs, order=130, files=(PART,), scope=Scope.NOTHING, is_composed=False)
+@section("needs", Needs, order=130, files=(PART,), scope=SetScope.NOTHING, is_composed=False)
 def needs(reading: Reading[Needs]) -> Needs:
     """What must be there outside of the part; `check` sees to it."""
     return reading.whole() or Needs()

@@ -6,14 +6,16 @@ from typing import Any
 
 from rbxcompose.config import Name
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import ROBOT, Reading, Scope
-from rbxcompose.manifest.tree import Entry, Mapping
+from rbxcompose.manifest.section import ROBOT, Reading, SetScope
+from rbxcompose.manifest.tree import Entry, MappingNode
 from rbxcompose.manifest.validate import validate
 
 PROFILE = "profile"
 
 
-@section("profiles", dict[str, Any], order=120, files=(ROBOT,), names=PROFILE, scope=Scope.NOTHING, is_composed=False)
+@section(
+    "profiles", dict[str, Any], order=120, files=(ROBOT,), names=PROFILE, scope=SetScope.NOTHING, is_composed=False
+)
 def profiles(reading: Reading[dict[str, Any]]) -> dict[str, Entry] | None:
     """Changes to the robot by name, made when asked for by `--profile NAME`.
 
@@ -29,4 +31,4 @@ def profiles(reading: Reading[dict[str, Any]]) -> dict[str, Entry] | None:
     if there is None:
         return {}
     is_read = validate(dict[Name, dict[str, Any]], there, ("profiles",), reading.report) is not None
-    return there.entries if is_read and isinstance(there, Mapping) else None
+    return there.entries if is_read and isinstance(there, MappingNode) else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rbxcompose.config import Config, Name
 from rbxcompose.manifest.fields import InterfaceName, TopicName
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import PART, Reading, Scope
+from rbxcompose.manifest.section import PART, Reading, SetScope
 
 
 class Provides(Config):
@@ -19,7 +19,7 @@ class Provides(Config):
     """Values that missions read."""
 
 
-@section("provides", Provides, order=140, files=(PART,), scope=Scope.NOTHING, is_composed=False)
+@section("provides", Provides, order=140, files=(PART,), scope=SetScope.NOTHING, is_composed=False)
 def provides(reading: Reading[Provides]) -> Provides:
     """What the part gives to the rest of the robot, by the part's own names; `check` sees to it."""
     return reading.whole() or Provides()

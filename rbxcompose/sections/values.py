@@ -9,7 +9,7 @@ from rbxcompose.manifest.section import Reading, Short
 from rbxcompose.references import VALUE
 
 
-class Value(Config):
+class ValueModel(Config):
     """A short name for data that missions read: `port` of a component, or `topic` and `field` from outside."""
 
     port: PortName | None = None
@@ -24,8 +24,8 @@ class Value(Config):
     """Unit of the message, where it is another than that of the type."""
 
 
-@section("values", Value, order=80, names=VALUE, entry="value", short=Short("port", is_merged=False))
-def values(reading: Reading[Value]) -> dict[str, Value]:
+@section("values", ValueModel, order=80, names=VALUE, entry="value", short=Short("port", is_merged=False))
+def values(reading: Reading[ValueModel]) -> dict[str, ValueModel]:
     """Short names for data that missions read by `$NAME`.
 
     Example:

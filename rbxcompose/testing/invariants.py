@@ -1,7 +1,7 @@
 """What *safe* means: laws that each run of a robot keeps, whatever fails. They are applied to what the run has told.
 
-A `Story` is read from recorded messages: of a stepped run, or of a recording of real processes. All times are robot
-time [s], velocities [m/s] and [rad/s].
+An `ObservedStory` is read from recorded messages: of a stepped run, or of a recording of real processes. All times are
+robot time [s], velocities [m/s] and [rad/s].
 
 - Unwarranted motion: the base moves only by a live command. After the last one it may follow it for its timeout and two
   cycles, and then brakes: `v(t) <= v_max - a (t - deadline)`. A stop ends every command that was sent before a release.
@@ -24,7 +24,7 @@ from rbxcompose.bus.goals import GoalState
 ROBOT = "robot itself"  # whom a stop or a release is told first; each process hears of it a little later
 ROUNDING = 1e-6  # a velocity this small is rest [m/s, rad/s]
 
-Velocity = tuple[float, float]  # forwards [m/s], turning [rad/s]
+PlanarVelocity = tuple[float, float]  # forwards [m/s], turning [rad/s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +36,11 @@ class Base:
     process: str
     timeout: float
     cycle: float
-    deceleration: Velocity  # [m/s^2], [rad/s^2]
+    deceleration: PlanarVelocity  # [m/s^2], [rad/s^2]
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class SwitchInput:
     """An input of a mux: the larger priority wins, until it was silent for the timeout."""
 
     priority: int
@@ -53,11 +53,11 @@ class Switch:
 
     output: str
     process: str
-    inputs: Mapping[str, Source]
+    inputs: Mapping[str, SwitchInput]
 
 
 @dataclass(frozen=True, slots=True)
-class Claim:
+class ActionClaim:
     """The part of the robot that the goals of an action need for themselves, and the process of its server."""
 
     part: str
@@ -74,19 +74,19 @@ class Laws:
 
     bases: Sequence[Base] = ()
     switches: Sequence[Switch] = ()
-    claims: Mapping[str, Claim] = field(default_factory=dict)  # by the name of the action
+    claims: Mapping[str, ActionClaim] = field(default_factory=dict)  # by the name of the action
     longest_goal: float = 60.0
     slack: float = 0.0
     is_lossless: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Sent:
+class SentVelocity:
     """A velocity on a topic: a command, or the motion that odometry tells."""
 
     time: float
     topic: str
-    velocity: Velocity
+    velocity: PlanarVelocity
 
     @property
     def is_finite(self) -> bool:
@@ -109,7 +109,7 @@ class Ordered:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class ToldGoals:
     """The goals of an action, by their ids, as its server told them; empty when the server has gone."""
 
     time: float
@@ -117,8 +117,8 @@ class Told:
     goals: Mapping[bytes, GoalState]
 
 
-Event = Sent | Ordered | Told
-Story = Sequence[Event]  # by time
+ObservedEvent = SentVelocity | Ordered | ToldGoals
+ObservedStory = Sequence[ObservedEvent]  # by time
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +133,7 @@ class Violation:
         return f"{self.time:.3f} s: {self.law}: {self.text}"
 
 
-def violations(laws: Laws, story: Story) -> list[Violation]:
+def violations(laws: Laws, story: ObservedStory) -> list[Violation]:
     """Return what was not safe, by time; the first violation of each law says more than those that follow from it."""
     found: list[Violation] = []
     for base in laws.bases:
@@ -147,12 +147,12 @@ def violations(laws: Laws, story: Story) -> list[Violation]:
     return sorted(found, key=lambda one: one.time)
 
 
-def unwarranted_motion(base: Base, story: Story, slack: float) -> Iterator[Violation]:
+def unwarranted_motion(base: Base, story: ObservedStory, slack: float) -> Iterator[Violation]:
     """Yield where a base moved faster than it can, at the latest, have braked to."""
     force = base.timeout + 2 * base.cycle + slack  # for how long it may follow what was sent
     deadline = commanded = -math.inf  # until when it may follow a command; when the last one was sent
     is_stopped, told = False, math.inf  # when it told its motion last
-    fastest: Velocity = (0.0, 0.0)
+    fastest: PlanarVelocity = (0.0, 0.0)
     for event in story:
         match event:
             case Ordered(time, process, "stop" | "brake") if process == base.process:
@@ -161,10 +161,10 @@ def unwarranted_motion(base: Base, story: Story, slack: float) -> Iterator[Viola
                 is_stopped = False
                 if commanded >= time - slack:  # it may still be on its way
                     deadline = commanded + force
-            case Sent(time, topic, _) if topic == base.command and event.is_finite and not event.is_rest:
+            case SentVelocity(time, topic, _) if topic == base.command and event.is_finite and not event.is_rest:
                 commanded = time
                 deadline = deadline if is_stopped else time + force
-            case Sent(time, topic, velocity) if topic == base.motion:
+            case SentVelocity(time, topic, velocity) if topic == base.motion:
                 if is_stopped:  # a simulated base whose process hung while it braked stood still in time
                     deadline += min(slack, max(0.0, time - told - 2 * base.cycle))
                 told = time
@@ -176,7 +176,7 @@ def unwarranted_motion(base: Base, story: Story, slack: float) -> Iterator[Viola
                     yield Violation(time, "unwarranted motion", words)
 
 
-def unheeded_stop(switch: Switch, story: Story) -> Iterator[Violation]:
+def unheeded_stop(switch: Switch, story: ObservedStory) -> Iterator[Violation]:
     """Yield what a mux let through while it was stopped, or after it had braked for good."""
     is_stopped = is_closed = is_wanted = False
     for event in story:
@@ -186,12 +186,12 @@ def unheeded_stop(switch: Switch, story: Story) -> Iterator[Violation]:
             case Ordered(_, process, verb) if process == switch.process:
                 is_stopped = is_wanted if verb == "begin" else verb == "stop" or (is_stopped and verb != "release")
                 is_closed = verb == "brake" or (is_closed and verb != "begin")
-            case Sent(time, topic, velocity) if topic == switch.output and not event.is_rest:
+            case SentVelocity(time, topic, velocity) if topic == switch.output and not event.is_rest:
                 if is_stopped or is_closed:
                     yield Violation(time, "unheeded stop", f"{velocity} went through to {topic}")
 
 
-def second_winner(switch: Switch, story: Story, slack: float, *, is_lossless: bool) -> Iterator[Violation]:
+def second_winner(switch: Switch, story: ObservedStory, slack: float, *, is_lossless: bool) -> Iterator[Violation]:
     """Yield what a mux invented, and what it let through beside an input of higher priority.
 
     That is one which it has let through within its timeout; if no message can be lost, also one that has just spoken
@@ -203,9 +203,9 @@ def second_winner(switch: Switch, story: Story, slack: float, *, is_lossless: bo
             case Ordered(_, process, _) if process == switch.process:
                 for one in inputs.values():
                     one.forget()
-            case Sent(_, topic, _) if topic in inputs:
+            case SentVelocity(_, topic, _) if topic in inputs:
                 inputs[topic].hear(event, slack)
-            case Sent(time, topic, velocity) if topic == switch.output and not event.is_rest:
+            case SentVelocity(time, topic, velocity) if topic == switch.output and not event.is_rest:
                 senders = [name for name, one in inputs.items() if one.has_sent(velocity, time - slack)]
                 if not senders:
                     yield Violation(time, "second winner", f"no input has sent {velocity}, which is on {topic}")
@@ -221,10 +221,10 @@ def second_winner(switch: Switch, story: Story, slack: float, *, is_lossless: bo
 class _Input:
     """What is known of an input of a mux since its last stop, release or restart."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: SwitchInput) -> None:
         self.source = source
         self.won = -math.inf  # when it was let through last
-        self._recent: deque[Sent] = deque(maxlen=200)
+        self._recent: deque[SentVelocity] = deque(maxlen=200)
         self._counting: deque[float] = deque(maxlen=200)  # when it spoke, and had not to come to rest first
         self._is_held = False
 
@@ -232,7 +232,7 @@ class _Input:
         self.won, self._is_held = -math.inf, bool(self._recent)
         self._counting.clear()
 
-    def hear(self, sent: Sent, slack: float) -> None:
+    def hear(self, sent: SentVelocity, slack: float) -> None:
         if not sent.is_finite:
             return
         last = self._recent[-1].time if self._recent else -math.inf
@@ -241,20 +241,20 @@ class _Input:
         if not self._is_held:
             self._counting.append(sent.time)
 
-    def has_sent(self, velocity: Velocity, since: float) -> bool:
+    def has_sent(self, velocity: PlanarVelocity, since: float) -> bool:
         return any(one.velocity == velocity and one.time >= since - ROUNDING for one in self._recent)
 
     def spoke_before(self, time: float) -> float:
         return max((one for one in self._counting if one <= time), default=-math.inf)
 
 
-def shared_claim(claims: Mapping[str, Claim], story: Story) -> Iterator[Violation]:
+def shared_claim(claims: Mapping[str, ActionClaim], story: ObservedStory) -> Iterator[Violation]:
     """Yield where two goals that claim the same are carried out; one that is being cancelled does not count."""
     executing: dict[str, dict[bytes, GoalState]] = {}  # action -> goals
     for event in story:
         if isinstance(event, Ordered) and event.verb == "begin":
             executing = {name: one for name, one in executing.items() if claims[name].process != event.process}
-        if not isinstance(event, Told) or event.action not in claims:
+        if not isinstance(event, ToldGoals) or event.action not in claims:
             continue
         executing[event.action] = {id_: state for id_, state in event.goals.items() if state is GoalState.EXECUTING}
         part = claims[event.action].part
@@ -263,7 +263,7 @@ def shared_claim(claims: Mapping[str, Claim], story: Story) -> Iterator[Violatio
             yield Violation(event.time, "shared claim", f"{' and '.join(rivals)} both have '{part}'")
 
 
-def endless_goal(claims: Mapping[str, Claim], story: Story, longest: float) -> Iterator[Violation]:
+def endless_goal(claims: Mapping[str, ActionClaim], story: ObservedStory, longest: float) -> Iterator[Violation]:
     """Yield each goal that did not end in time, or that was left open by a process which was shut down."""
     began: dict[str, dict[bytes, float]] = {name: {} for name in claims}
     closed: set[str] = set()  # processes
@@ -274,7 +274,7 @@ def endless_goal(claims: Mapping[str, Claim], story: Story, longest: float) -> I
                 began.update((name, {}) for name, one in claims.items() if one.process == process)
             case Ordered(_, process, "shutdown"):
                 closed.add(process)
-            case Told(time, action, goals) if action in claims:
+            case ToldGoals(time, action, goals) if action in claims:
                 is_open = {id_ for id_, state in goals.items() if not state.is_end}
                 began[action] = {id_: began[action].get(id_, time) for id_ in is_open}
         for name, since in began.items():

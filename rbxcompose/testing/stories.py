@@ -18,7 +18,17 @@ from rbxcompose.recording.message import Recorded
 from rbxcompose.sdk.capabilities import Drives
 from rbxcompose.sdk.ports import ServesAction
 from rbxcompose.sdk.registry import component_type, declared
-from rbxcompose.testing.invariants import Base, Claim, Event, Laws, Ordered, Sent, Source, Switch, Told
+from rbxcompose.testing.invariants import (
+    ActionClaim,
+    Base,
+    Laws,
+    ObservedEvent,
+    Ordered,
+    SentVelocity,
+    Switch,
+    SwitchInput,
+    ToldGoals,
+)
 
 
 def laws_of(plan: Plan, *, slack: float = 0.0, is_lossless: bool = False, longest_goal: float = 60.0) -> Laws:
@@ -34,7 +44,7 @@ def laws_of(plan: Plan, *, slack: float = 0.0, is_lossless: bool = False, longes
     )
 
 
-def events_of(laws: Laws, told: Iterable[Recorded | Ordered], start: int = 0) -> Iterator[Event]:
+def events_of(laws: Laws, told: Iterable[Recorded | Ordered], start: int = 0) -> Iterator[ObservedEvent]:
     """Yield what messages tell, in their order, among orders; `start` is robot time 0 on the messages' clock [ns]."""
     commands = {one.command for one in laws.bases} | {one.output for one in laws.switches}
     commands |= {topic for one in laws.switches for topic in one.inputs}
@@ -46,12 +56,12 @@ def events_of(laws: Laws, told: Iterable[Recorded | Ordered], start: int = 0) ->
             continue
         time, topic = (message.log_time - start) / NANOSECONDS, message.topic.name
         if topic in motions:
-            yield Sent(time, topic, _velocity(decode(Odometry, message.payload).twist.twist))
+            yield SentVelocity(time, topic, _velocity(decode(Odometry, message.payload).twist.twist))
         elif topic in commands and message.topic.type == Twist.TYPE:
-            yield Sent(time, topic, _velocity(decode(Twist, message.payload)))
+            yield SentVelocity(time, topic, _velocity(decode(Twist, message.payload)))
         elif topic in goals:
             statuses = decode(GoalStatusArray, message.payload).status_list
-            yield Told(time, goals[topic], {one.goal_info.goal_id.uuid: GoalState(one.status) for one in statuses})
+            yield ToldGoals(time, goals[topic], {one.goal_info.goal_id.uuid: GoalState(one.status) for one in statuses})
 
 
 def _velocity(twist: Twist) -> tuple[float, float]:
@@ -76,13 +86,13 @@ def _is_twist(config: MuxConfig) -> bool:
 def _switch(instance: Instance) -> Switch:
     config = instance.config
     assert isinstance(config, MuxConfig)  # noqa: S101
-    inputs = {instance.topic(name): Source(one.priority, one.timeout) for name, one in config.inputs.items()}
+    inputs = {instance.topic(name): SwitchInput(one.priority, one.timeout) for name, one in config.inputs.items()}
     return Switch(instance.topic("output"), instance.process, inputs)
 
 
-def _claims(plan: Plan) -> Iterator[tuple[str, Claim]]:
+def _claims(plan: Plan) -> Iterator[tuple[str, ActionClaim]]:
     """Yield each action whose goals claim a part of the robot, by its full name."""
     for one in plan.instances:
         for name, port in component_type(one.type).ports(one.config).items():
             if isinstance(port, ServesAction) and port.claims:
-                yield one.topic(name), Claim(port.claims, one.process)
+                yield one.topic(name), ActionClaim(port.claims, one.process)

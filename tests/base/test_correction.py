@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.findings import Kind, Span, correction
+from rbxcompose.findings import FindingKind, Span, correction
 
 PLACE = Span("f", 1, 4, 1, 8)
 
@@ -66,9 +66,9 @@ def test_a_part_of_a_text_is_corrected_within_it() -> None:
 
 
 def test_a_misspelt_name_brings_help_and_fix() -> None:
-    finding = Kind("RBX0009", "Title").misspelt(PLACE, "unknown", "dok", ["dock"])
+    finding = FindingKind("RBX0009", "Title").misspelt(PLACE, "unknown", "dok", ["dock"])
     assert finding.help == "did you mean 'dock'?"
     assert finding.fix
     assert finding.fix.is_safe
-    far = Kind("RBX0009", "Title").misspelt(PLACE, "unknown", "x", ["dock", "corner"], "places")
+    far = FindingKind("RBX0009", "Title").misspelt(PLACE, "unknown", "x", ["dock", "corner"], "places")
     assert (far.help, far.fix) == ("places: corner, dock", None)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from rbxcompose.bus.attachment import Attachment
 from rbxcompose.bus.gate import Gate
-from rbxcompose.bus.local import Node
+from rbxcompose.bus.local import Participant
 from rbxcompose.bus.transport import Question
 from tests.bus.conftest import Alone
 
@@ -29,7 +29,7 @@ def by(client: int) -> Asked:
 
 
 def gate(alone: Alone, taken: list[Question], rate: float = 10.0) -> Gate:
-    return Gate(Node(alone.bus._process, "base"), "/set_level", rate, taken.append)
+    return Gate(Participant(alone.bus._process, "base"), "/set_level", rate, taken.append)
 
 
 def test_so_many_are_taken_in_a_second_and_the_rest_is_told_to_who_asks_and_to_us(alone: Alone) -> None:

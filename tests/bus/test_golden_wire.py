@@ -15,7 +15,7 @@ import pytest
 from rbxcompose.bus.attachment import Attachment, decode_attachment
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.tokens import gid
-from rbxcompose.bus.transport import EXPIRED, LONGEST_WAIT, Answer, Arrival
+from rbxcompose.bus.transport import EXPIRED, LONGEST_WAIT, Arrival, TransportReply
 from rbxcompose.clock import SteppedClock
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo
@@ -75,7 +75,7 @@ class Wire:
     session: str = "aac3178e146ba6f1fc6e6a4085e77f21"
     lines: list[str] = field(default_factory=list)
     servers: dict[str, Callable[[Question], None]] = field(default_factory=dict)
-    asked: dict[str, Callable[[Answer], None]] = field(default_factory=dict)
+    asked: dict[str, Callable[[TransportReply], None]] = field(default_factory=dict)
     watchers: list[tuple[str, Callable[[str, bool], None]]] = field(default_factory=list)
     scheduler: Scheduler = field(default_factory=Scheduler)
     clock: SteppedClock = field(default_factory=lambda: SteppedClock(1.5))
@@ -100,7 +100,7 @@ class Wire:
     def answer(self, name: str, response: Message) -> None:
         """Answer the last request of ours to a service."""
         (key,) = (key for key in self.asked if f"/{name}/" in key)
-        self.asked[key](Answer(encode(response)))
+        self.asked[key](TransportReply(encode(response)))
         self.settle()
 
     def text(self) -> str:
@@ -128,7 +128,7 @@ class Wire:
         key: str,
         payload: bytes,
         attachment: bytes,
-        answered: Callable[[Answer], None],
+        answered: Callable[[TransportReply], None],
         *,
         of_all: bool = True,
         within: float = LONGEST_WAIT,
@@ -221,7 +221,7 @@ def test_the_result_of_a_goal_that_takes_longer_than_any_question_is_asked_for_a
     wire.answer("send_goal", Recharge.SendGoal.Response(accepted=True))
     (key,) = (key for key in wire.asked if "/get_result/" in key)
     for _ in range(3):
-        wire.asked.pop(key)(Answer(error=EXPIRED))
+        wire.asked.pop(key)(TransportReply(error=EXPIRED))
         wire.settle()
     assert ends == []
     wire.answer("get_result", Recharge.GetResult.Response(status=4, result=Recharge.Result(level=100.0)))

@@ -15,7 +15,7 @@ import zenoh
 
 from rbxcompose.bus.allowance import BURST
 from rbxcompose.bus.attachment import Attachment, decode_attachment
-from rbxcompose.bus.refusals import Refusal
+from rbxcompose.bus.refusals import RefusalReason
 from rbxcompose.bus.tokens import EndpointToken, NodeToken, parse_token
 from rbxcompose.bus.zenoh_session import open_peer, open_router
 from rbxcompose.msgs.cdr import encode
@@ -152,10 +152,10 @@ def test_bad_input_is_refused_counted_by_reason_and_logged_once(
     network.until(lambda: got)
     assert got == [Twist(linear=Vector3(x=0.1))]
     assert heard.refusals.news() == {
-        Refusal.LENGTH: 2,
-        Refusal.ATTACHMENT: 2,
-        Refusal.CONTENT: 1,
-        Refusal.NOT_FINITE: 2,
+        RefusalReason.LENGTH: 2,
+        RefusalReason.ATTACHMENT: 2,
+        RefusalReason.CONTENT: 1,
+        RefusalReason.NOT_FINITE: 2,
     }
     assert [text.partition(":")[0] for _, text in other.log] == ["dropped a message on /cmd_vel"]
 
@@ -179,7 +179,7 @@ def test_a_flood_of_commands_is_capped_before_anything_is_decoded_and_other_topi
     lasted = other.clock.now() - started
     assert heard.refusals.total > heard._inbox._arrived  # most of what a congested link has not dropped by itself
     assert heard._inbox._arrived <= 50.0 * (lasted + BURST)
-    assert set(heard.refusals.news()) == {Refusal.TOO_MANY}
+    assert set(heard.refusals.news()) == {RefusalReason.TOO_MANY}
 
 
 def test_another_type_on_the_same_topic_is_never_delivered(network: Network, one: Connected, other: Connected) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from rbxcompose.bus.renewal import RENEWED, RenewableTransport
-from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Arrival, Closable, Question
+from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, Closable, Question, TransportReply
 from rbxcompose.qos import Qos
 
 
@@ -37,7 +37,7 @@ class Link:
         key: str,
         payload: bytes,
         attachment: bytes,
-        answered: Callable[[Answer], None],
+        answered: Callable[[TransportReply], None],
         *,
         of_all: bool = True,
         within: float = LONGEST_WAIT,
@@ -117,12 +117,12 @@ def test_a_latched_message_is_there_again_and_others_are_dropped_in_between(link
 
 def test_a_request_is_never_sent_twice_and_ends_with_an_error(links: Links) -> None:
     first, second, transport = links
-    answers: list[Answer] = []
+    answers: list[TransportReply] = []
     transport.ask("before", b"", b"", answers.append)
     transport.detach()
     transport.ask("between", b"", b"", answers.append)
     transport.attach(second)
-    assert answers == [Answer(error=RENEWED)] * 2
+    assert answers == [TransportReply(error=RENEWED)] * 2
     assert (first.done, second.done) == (["ask before"], [])
 
 

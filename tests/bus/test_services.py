@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import math
 
-from rbxcompose.bus.services import LOST, Request, Server
+from rbxcompose.bus.services import LOST, ServedRequest, Server
 from rbxcompose.msgs.example_interfaces import AddTwoInts
 from rbxcompose.requests import Refused
 from rbxcompose.sdk.bound import Reply
@@ -19,7 +19,7 @@ class Later:
     """A server that keeps its requests."""
 
     def __init__(self, alone: Alone, owner: str = "later") -> None:
-        self.requests: list[Request[AddTwoInts.Request, AddTwoInts.Response]] = []
+        self.requests: list[ServedRequest[AddTwoInts.Request, AddTwoInts.Response]] = []
         self.left: list[bytes] = []
         bus = alone.bus
         node = bus._node(owner)

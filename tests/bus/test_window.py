@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.bus.names import admin_key
-from rbxcompose.bus.transport import Answer
+from rbxcompose.bus.transport import TransportReply
 from rbxcompose.bus.window import GRACE, Window
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Refused
@@ -17,14 +17,14 @@ from tests.bus.conftest import Alone, Connected, Network
 KEY = admin_key("bot", "missions/patrol")
 
 
-def asked(network: Network, by: Connected) -> Answer:
+def asked(network: Network, by: Connected) -> TransportReply:
     """Return the first that comes back."""
-    found: list[Answer] = []
+    found: list[TransportReply] = []
     network.until(lambda: _ask(by, found))
     return found[0]
 
 
-def _ask(by: Connected, found: list[Answer]) -> bool:
+def _ask(by: Connected, found: list[TransportReply]) -> bool:
     """Ask anew until there is an answer of the server: it may not be known yet."""
     if not found or found[0].error == "the server went away":
         found.clear()

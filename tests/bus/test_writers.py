@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 from rbxcompose.bus.names import dds_type
 from rbxcompose.bus.tokens import EntityKind, NodeToken
-from rbxcompose.bus.writers import SILENCE, Reader, Writers
+from rbxcompose.bus.writers import SILENCE, TopicReader, Writers
 from rbxcompose.msgs.std_msgs import Float32, String
 
 HERE, THERE = "a1", "b2"
-READER = Reader("charger", ("/level", Float32.TYPE), Float32.HASH, -math.inf, expects_speech=True)
+READER = TopicReader("charger", ("/level", Float32.TYPE), Float32.HASH, -math.inf, expects_speech=True)
 
 
 def token(
@@ -25,7 +25,7 @@ def token(
     return NodeToken(0, session, 1, name).endpoint_key(kind, 2, "/level", dds_type(type_), type_hash, "::,10:,:,:,,")
 
 
-def told(key: str, reader: Reader = READER, now: float = 2 * SILENCE, started: float = 0.0) -> str:
+def told(key: str, reader: TopicReader = READER, now: float = 2 * SILENCE, started: float = 0.0) -> str:
     writers = Writers(HERE)
     writers.heard(key, 1.0, is_there=True)
     return writers.trouble(reader, now, started)
@@ -48,13 +48,13 @@ def test_another_type_is_told_at_once() -> None:
 @pytest.mark.parametrize(
     "reader",
     [
-        Reader("charger", READER.route, Float32.HASH, 1.0, expects_speech=True),
-        Reader("charger", READER.route, Float32.HASH, -math.inf, expects_speech=False),
-        Reader("charger", ("/other", Float32.TYPE), Float32.HASH, -math.inf, expects_speech=True),
+        TopicReader("charger", READER.route, Float32.HASH, 1.0, expects_speech=True),
+        TopicReader("charger", READER.route, Float32.HASH, -math.inf, expects_speech=False),
+        TopicReader("charger", ("/other", Float32.TYPE), Float32.HASH, -math.inf, expects_speech=True),
     ],
     ids=["heard", "nothing is expected", "another topic"],
 )
-def test_who_has_no_reason_to_complain_says_nothing(reader: Reader) -> None:
+def test_who_has_no_reason_to_complain_says_nothing(reader: TopicReader) -> None:
     assert told(token(), reader) == ""
 
 
@@ -70,7 +70,7 @@ def test_silence_counts_from_when_both_are_there_and_the_robot_has_started() -> 
 
 
 def test_a_publisher_that_comes_back_must_be_heard_again() -> None:
-    writers, spoken = Writers(HERE), Reader("charger", READER.route, Float32.HASH, 2.0, expects_speech=True)
+    writers, spoken = Writers(HERE), TopicReader("charger", READER.route, Float32.HASH, 2.0, expects_speech=True)
     writers.heard(token(), 1.0, is_there=True)
     assert writers.trouble(spoken, 50.0, 0.0) == ""
     writers.heard(token(), 50.0, is_there=False)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.bus.graph import Graph, Name
+from rbxcompose.bus.graph import Graph, GraphName
 from rbxcompose.cli import main as command
 from rbxcompose.cli import verbs
 from rbxcompose.cli.bus.place import BusPlace
@@ -96,7 +96,7 @@ def test_robots_components_and_topics_are_known() -> None:
 
     def graph(place: BusPlace) -> Graph:
         asked.append(place)
-        return Graph((), [Name("/odom", (), ()), Name("/a/_b", (), ())], (), ())
+        return Graph((), [GraphName("/odom", (), ()), GraphName("/a/_b", (), ())], (), ())
 
     known = KnownValues(graph)
     assert candidates(["down", "--robot", ""], known) == ["cart"]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.bus.graph import Kind
+from rbxcompose.bus.graph import WireType
 from rbxcompose.cli.bus.messages import message_from, message_type, shown, to_json, to_text, type_of
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.msgs import registry
@@ -73,6 +73,6 @@ def test_a_misspelt_type_is_told_what_was_probably_meant() -> None:
 
 
 def test_another_definition_of_a_type_is_not_read() -> None:
-    assert type_of(Kind("std_msgs/msg/String", "TypeHashNotSupported"), "msg", registry.message) is String
+    assert type_of(WireType("std_msgs/msg/String", "TypeHashNotSupported"), "msg", registry.message) is String
     with pytest.raises(NotDoneError, match="another definition"):
-        type_of(Kind("std_msgs/msg/String", "RIHS01_00"), "msg", registry.message)
+        type_of(WireType("std_msgs/msg/String", "RIHS01_00"), "msg", registry.message)

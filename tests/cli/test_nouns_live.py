@@ -20,7 +20,7 @@ from typing import Any, Self
 import pytest
 
 from rbxcompose.bus.graph import find
-from rbxcompose.cli.bus.guest import Guest, Heard
+from rbxcompose.cli.bus.guest import Guest, HeardMessage
 from rbxcompose.cli.bus.place import BusPlace, find_place
 from rbxcompose.msgs.cdr import decode
 from rbxcompose.msgs.geometry_msgs import Twist
@@ -115,7 +115,7 @@ def test_what_is_published_arrives(robot: Robot) -> None:
     with Guest(robot.place()) as guest:
         topic = find(guest.graph().topics, "/cmd_vel/teleop")
         assert topic is not None
-        heard: list[Heard] = []
+        heard: list[HeardMessage] = []
         guest.listen(topic, heard.append)
         words = ("/cmd_vel/teleop", "geometry_msgs/Twist", "{angular: {z: 0.25}}", "--rate", "50Hz", "-n", "3")
         assert robot.told("topic", "pub", *words)["sent"] == 3

@@ -21,7 +21,7 @@ from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.cli import main as command
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import RecordingReader
-from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.topics import RecordedTopic
 from rbxcompose.runtime.processes import titled
 from tests.recording.samples import some, written
 
@@ -95,7 +95,7 @@ def robot(shell: Shell) -> Iterator[Shell]:
         assert [one for one in titled(f"rbxcompose {NAME}: ") if one.is_running] == []
 
 
-def payloads(messages: list[Recorded], topic: Topic) -> list[bytes]:
+def payloads(messages: list[Recorded], topic: RecordedTopic) -> list[bytes]:
     return [one.payload for one in messages if one.topic == topic]
 
 

@@ -22,7 +22,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.cli.robots.picture import Load, Part, Picture, Tree, lines_of
+from rbxcompose.cli.robots.picture import ComponentPicture, Load, RobotPicture, Tree, lines_of
 from rbxcompose.levels import Level
 from rbxcompose.printable import FORBIDDEN, columns
 from rbxcompose.runtime.records import Record
@@ -32,19 +32,19 @@ from tests.third_party.places import put
 ROOT = Path(__file__).parents[2]
 STRANGERS = Path(__file__).parents[1] / "checks" / "strangers.py"
 PATIENCE = 20.0  # [s]
-PARTS = (
-    Part("battery", "battery_sim", "active", "world", 0, 1.0, Level.WARN, "Medium battery"),
-    Part("base", "diff_drive_sim", "active", "world", 0, 99.8, Level.OK, "active"),
-    Part("go_to", "go_to", "dead", "robot", 3),
-    Part("mission", "mission", "active", "mission", 0, 0.0, Level.OK, "running patrol"),
+COMPONENTS = (
+    ComponentPicture("battery", "battery_sim", "active", "world", 0, 1.0, Level.WARN, "Medium battery"),
+    ComponentPicture("base", "diff_drive_sim", "active", "world", 0, 99.8, Level.OK, "active"),
+    ComponentPicture("go_to", "go_to", "dead", "robot", 3),
+    ComponentPicture("mission", "mission", "active", "mission", 0, 0.0, Level.OK, "running patrol"),
 )
-PICTURE = Picture(
+PICTURE = RobotPicture(
     robot="turtlebot",
     is_supervised=True,
     router="tcp/127.0.0.1:7447",
     mission="running patrol",
     batteries=(("battery", "48.2 %"),),
-    parts=PARTS,
+    components=COMPONENTS,
     loads=(Load("supervisor", 100, 0.001, 33_000_000), Load("world", 104, None, 58_000_000)),
     health=(("power", Level.WARN, "battery: Medium battery"), ("motion", Level.OK, "OK"), ("Other", Level.OK, "OK")),
     trees=(Tree("patrol", "running", ("▶ repeat", "  ▶ for corner in $route", "    ▶ go_to $corner  (retry 2)")),),
@@ -52,7 +52,7 @@ PICTURE = Picture(
 )
 
 
-def text_of(picture: Picture, width: int, height: int) -> str:
+def text_of(picture: RobotPicture, width: int, height: int) -> str:
     return "".join(f"{line}\n" for line in lines_of(picture, width, height))
 
 
@@ -60,29 +60,34 @@ def text_of(picture: Picture, width: int, height: int) -> str:
     ("name", "picture"),
     [
         ("top.txt", PICTURE),
-        ("top_missions.txt", replace(PICTURE, parts=PARTS[:1], loads=PICTURE.loads[:1], warnings=())),
-        ("top_many.txt", replace(PICTURE, parts=[replace(PARTS[1], name=f"wheel_{one}") for one in range(40)])),
+        ("top_missions.txt", replace(PICTURE, components=COMPONENTS[:1], loads=PICTURE.loads[:1], warnings=())),
+        (
+            "top_many.txt",
+            replace(PICTURE, components=[replace(COMPONENTS[1], name=f"wheel_{one}") for one in range(40)]),
+        ),
         ("top_dead.txt", replace(PICTURE, is_supervised=False, router=None, mission="", batteries=(), health=())),
     ],
 )
-def test_a_picture_is_its_golden_text(name: str, picture: Picture, golden: Golden) -> None:
+def test_a_picture_is_its_golden_text(name: str, picture: RobotPicture, golden: Golden) -> None:
     golden.check(name, text_of(picture, 80, 24))
 
 
 words = st.text(max_size=30)
-parts = st.builds(Part, words, words, words, words, st.integers(0, 9), st.none() | st.floats(0, 1e6), st.none(), words)
+components = st.builds(
+    ComponentPicture, words, words, words, words, st.integers(0, 9), st.none() | st.floats(0, 1e6), st.none(), words
+)
 
 
 @given(
-    st.lists(parts, max_size=8),
+    st.lists(components, max_size=8),
     st.lists(st.tuples(words, st.sampled_from(Level), words), max_size=4),
     st.integers(4, 200),
     st.integers(1, 60),
 )
 def test_a_picture_fits_whatever_it_shows(
-    shown: list[Part], health: list[tuple[str, Level, str]], width: int, height: int
+    shown: list[ComponentPicture], health: list[tuple[str, Level, str]], width: int, height: int
 ) -> None:
-    lines = lines_of(replace(PICTURE, parts=shown, health=health), width, height)
+    lines = lines_of(replace(PICTURE, components=shown, health=health), width, height)
     assert len(lines) <= height
     assert all(columns(line) <= width for line in lines)
     assert not any(FORBIDDEN.search(line) for line in lines)
@@ -144,8 +149,8 @@ def test_without_a_terminal_one_picture_is_shown(robot: Robot) -> None:
     deadline = time.monotonic() + PATIENCE
     while len(shown["batteries"]) < 2 and time.monotonic() < deadline:  # right after the start they tell nothing yet
         shown = robot.seen()
-    parts = {one["name"]: one for one in shown["components"]}
-    assert 20.0 < parts["base"]["rate"] < 200.0  # twice 50 Hz: odom and tf
+    components = {one["name"]: one for one in shown["components"]}
+    assert 20.0 < components["base"]["rate"] < 200.0  # twice 50 Hz: odom and tf
     assert {one["process"] for one in shown["processes"]} >= {"supervisor", "parent", "router", "world", "robot"}
     assert all(one["memory"] > 1e6 and one["cpu"] is not None for one in shown["processes"])
     assert shown["batteries"].keys() == {"battery", "cell"}

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.bus.services import Request
+from rbxcompose.bus.services import ServedRequest
 from rbxcompose.config import Place
 from rbxcompose.geometry import Pose2, quaternion_from_yaw
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
@@ -151,7 +151,7 @@ class Battery:
         robot.bus.serve_later("battery", "set_battery_level", SetBatteryLevel, self.set)
         robot.scheduler.at(robot.scheduler.now + phase, "battery", self.step)
 
-    def set(self, request: Request[SetBatteryLevel.Request, SetBatteryLevel.Response]) -> None:
+    def set(self, request: ServedRequest[SetBatteryLevel.Request, SetBatteryLevel.Response]) -> None:
         self.level = request.message.value
         if self.tells_at_once:
             self.tell()

@@ -12,7 +12,7 @@ import pytest
 
 import rbxcompose
 from rbxcompose.edits import safe_fixes
-from rbxcompose.findings import KINDS, Kind
+from rbxcompose.findings import KINDS, FindingKind
 from rbxcompose.testing.manifests import Checked
 from tests.docs.examples import HEADER, ROBOT, check_mission, check_robot, profiles_of, with_sections
 
@@ -59,15 +59,15 @@ STANDS_BELOW = {
 _EXAMPLE = re.compile(r"^(Bad|Good):[^\n]*\n\n?```yaml\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
-def examples(kind: Kind) -> dict[str, str]:
+def examples(kind: FindingKind) -> dict[str, str]:
     return dict(_EXAMPLE.findall(kind.doc))
 
 
-def codes_of(kind: Kind, text: str, folder: Path) -> set[str]:
+def codes_of(kind: FindingKind, text: str, folder: Path) -> set[str]:
     return set(compiled(kind, text, folder).codes)
 
 
-def compiled(kind: Kind, text: str, folder: Path) -> Checked:
+def compiled(kind: FindingKind, text: str, folder: Path) -> Checked:
     above, depth = STANDS_BELOW.get(kind.code, ("", 0))
     fragment = above + textwrap.indent(text, " " * depth)
     if kind.code.startswith("RBX41") and not fragment.startswith("missions:"):
@@ -80,17 +80,17 @@ SHOWN = [kind for code, kind in sorted(KINDS.items()) if code not in {*NOT_SHOWN
 
 
 @pytest.mark.parametrize("kind", SHOWN, ids=lambda kind: kind.code)
-def test_the_bad_example_has_the_mistake(kind: Kind, tmp_path: Path) -> None:
+def test_the_bad_example_has_the_mistake(kind: FindingKind, tmp_path: Path) -> None:
     assert kind.code in codes_of(kind, examples(kind)["Bad"], tmp_path)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in SHOWN if "Good" in examples(kind)], ids=lambda kind: kind.code)
-def test_the_good_example_has_it_no_more(kind: Kind, tmp_path: Path) -> None:
+def test_the_good_example_has_it_no_more(kind: FindingKind, tmp_path: Path) -> None:
     assert kind.code not in codes_of(kind, examples(kind)["Good"], tmp_path)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in SHOWN if "Bad" in examples(kind)], ids=lambda kind: kind.code)
-def test_its_page_tells_whether_it_can_be_fixed(kind: Kind, tmp_path: Path) -> None:
+def test_its_page_tells_whether_it_can_be_fixed(kind: FindingKind, tmp_path: Path) -> None:
     found = compiled(kind, examples(kind)["Bad"], tmp_path).compilation
     fixes = safe_fixes([one for one in found.report if one.code == kind.code], found.sources)
     assert bool(fixes) == (kind.is_fixable and kind.code not in SOMETIMES_FIXED)

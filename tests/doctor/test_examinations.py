@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.bus.graph import End, Graph, Kind, Name
+from rbxcompose.bus.graph import Graph, GraphEnd, GraphName, WireType
 from rbxcompose.bus.wire import RosQos
 from rbxcompose.compiler import compile_robot
 from rbxcompose.doctor import machine
-from rbxcompose.doctor.facts import Bus, Clocks, Facts, Limits, Listener, Running, Version
-from rbxcompose.doctor.registry import EXAMINATIONS, PLUGINS, Answer, examination, examine_all, has_errors
+from rbxcompose.doctor.facts import BusFacts, Clocks, HostFacts, Listener, ResourceLimits, RunningRobot, Version
+from rbxcompose.doctor.registry import EXAMINATIONS, PLUGINS, ExaminationResult, examination, examine_all, has_errors
 from rbxcompose.findings import Finding
 from rbxcompose.model.robot import Robot
 from rbxcompose.runtime.folder import RobotFolder, RobotState
@@ -31,13 +31,13 @@ def titles(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Process, "is_titled", lambda self, prefix: True)
 
 
-FINE = Facts(
+FINE = HostFacts(
     running=(),
     file=None,
     python="3.11.7",
     versions=(Version("pydantic", "2.13", "2.13"), Version("numpy", "2.1", None)),
     clocks=Clocks(wall=2e9, step=0.001, is_synchronised=True, oldest=1.9e9),
-    limits=Limits(open_files=4096, real_time_priority=0, locked_memory=None, shared_memory=64_000_000),
+    limits=ResourceLimits(open_files=4096, real_time_priority=0, locked_memory=None, shared_memory=64_000_000),
     listeners={},
     processes={},
     base=Path("/nowhere"),
@@ -45,7 +45,7 @@ FINE = Facts(
 MANIFEST = "rbx: 1\nkind: Robot\nname: cart\n"
 
 
-def told(name: str, facts: Facts) -> list[tuple[str, str]]:
+def told(name: str, facts: HostFacts) -> list[tuple[str, str]]:
     """Return what an examination tells: `ok` or the code, and the words."""
     PLUGINS.load(name)
     return [("ok", one) if isinstance(one, str) else (one.code, one.message) for one in EXAMINATIONS[name](facts)]
@@ -58,24 +58,24 @@ def robot_of(folder: Path, text: str) -> Robot:
     return robot
 
 
-def running(state: RobotState | None = None, **fields: object) -> Running:
-    return replace(Running(RobotFolder(Path("/nowhere/cart")), state), **fields)  # type: ignore[arg-type]
+def running(state: RobotState | None = None, **fields: object) -> RunningRobot:
+    return replace(RunningRobot(RobotFolder(Path("/nowhere/cart")), state), **fields)  # type: ignore[arg-type]
 
 
 def state(supervisor: Process = HERE, processes: Mapping[str, Process] | None = None) -> RobotState:
     return RobotState("cart", "robot.yaml", supervisor, processes or {}, (), "tcp/127.0.0.1:7447", boot_id())
 
 
-def name_of(topic: str, giver: str = "", taker: str = "", types: tuple[str, str] = ("a/msg/A", "a/msg/A")) -> Name:
+def name_of(topic: str, giver: str = "", taker: str = "", types: tuple[str, str] = ("a/msg/A", "a/msg/A")) -> GraphName:
     ends = [
-        (End(node, Kind(type_, "RIHS01_1"), node.encode(), RosQos(depth=1)),) if node else ()
+        (GraphEnd(node, WireType(type_, "RIHS01_1"), node.encode(), RosQos(depth=1)),) if node else ()
         for node, type_ in zip((giver, taker), types, strict=True)
     ]
-    return Name(topic, *ends)
+    return GraphName(topic, *ends)
 
 
-def on_bus(*topics: Name, ages: Mapping[str, float] | None = None) -> Facts:
-    return replace(FINE, running=(running(state(), bus=Bus(Graph((), topics, (), ()), ages or {})),))
+def on_bus(*topics: GraphName, ages: Mapping[str, float] | None = None) -> HostFacts:
+    return replace(FINE, running=(running(state(), bus=BusFacts(Graph((), topics, (), ()), ages or {})),))
 
 
 def test_on_a_machine_that_is_well_nothing_is_wrong() -> None:
@@ -150,7 +150,7 @@ def test_a_node_whose_stamps_are_of_another_time_is_told() -> None:
 
 
 def test_low_limits_are_told() -> None:
-    low = Limits(open_files=64, real_time_priority=0, locked_memory=8_000_000, shared_memory=1_000_000)
+    low = ResourceLimits(open_files=64, real_time_priority=0, locked_memory=8_000_000, shared_memory=1_000_000)
     assert [code for code, _ in told("limits", replace(FINE, limits=low))] == ["RBX9406", "RBX9406", "ok"]
     none = replace(FINE.limits, shared_memory=None)
     assert told("limits", replace(FINE, limits=none))[0] == ("RBX9406", "shared memory: there is none")
@@ -221,11 +221,11 @@ def test_folders_and_secrets_that_others_may_open_are_an_error(tmp_path: Path) -
 
 def test_a_device_must_be_there_and_open(tmp_path: Path) -> None:
     robot = robot_of(tmp_path, "components: {base: {type: diff_drive_sim}}\n")
-    part = robot.parts["base"]
+    component = robot.components["base"]
 
-    def naming(device: str) -> Facts:
-        config = part.config.model_copy(update={"max_speed": {"ports": [device]}})
-        return replace(FINE, file=replace(robot, parts={"base": replace(part, config=config)}))
+    def naming(device: str) -> HostFacts:
+        config = component.config.model_copy(update={"max_speed": {"ports": [device]}})
+        return replace(FINE, file=replace(robot, components={"base": replace(component, config=config)}))
 
     assert told("devices", naming("/dev/null")) == [("ok", "/dev/null of 'base' can be opened")]
     assert told("devices", naming("/dev/no_such_tty")) == [
@@ -235,7 +235,7 @@ def test_a_device_must_be_there_and_open(tmp_path: Path) -> None:
 
 
 def test_an_answer_is_plain_data() -> None:
-    fine, wrong = (Answer("ports", one) for one in ("fine", next(iter(_taken()))))
+    fine, wrong = (ExaminationResult("ports", one) for one in ("fine", next(iter(_taken()))))
     assert fine.to_data() == {"examination": "ports", "level": "ok", "message": "fine"}
     assert {key: wrong.to_data()[key] for key in ("level", "code")} == {"level": "warning", "code": "RBX9402"}
 
@@ -248,7 +248,7 @@ def _taken() -> list[str | Finding]:
 def test_a_name_belongs_to_one_examination() -> None:
     PLUGINS.load("ports")
 
-    def ports(facts: Facts) -> list[str]:
+    def ports(facts: HostFacts) -> list[str]:
         return []
 
     with pytest.raises(ValueError, match="two examinations have the name 'ports'"):

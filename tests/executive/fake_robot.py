@@ -14,12 +14,12 @@ from rbxcompose.findings import Report
 from rbxcompose.geometry import Pose2
 from rbxcompose.levels import Level
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.goals import skill_of
 from rbxcompose.missions.program.program import Program, Skill
-from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource, Way
+from rbxcompose.missions.program.sources import SkillSource, SkillWay, TopicSource, ValueSource
 from rbxcompose.model.skills import python_skills
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
@@ -77,7 +77,7 @@ PLACES = {"dock": Place("dock", 0.5, 0.5, 0.0), "corner": Place("corner", 1.0, 0
 
 def program_of(text: str) -> Program:
     root, findings = read_text(textwrap.dedent(text), "mission.yaml")
-    assert isinstance(root, Tree)
+    assert isinstance(root, MappingNode)
     assert not findings
     report = Report()
     program = read_program(root, report)
@@ -183,7 +183,7 @@ class Robot:
                     Skill("switch", {"data": FLAG}, "data", results={"message": TEXT}),
                     "std_srvs/srv/SetBool",
                     "switch",
-                    Way.SERVICE,
+                    SkillWay.SERVICE,
                 ),
                 **{one.skill.name: one for one in python_skills(["say", "toy_count", "toy_raise", "toy_slow"])},
             },

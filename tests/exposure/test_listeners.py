@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.bus.probe import probe_key
-from rbxcompose.bus.transport import Answer
+from rbxcompose.bus.transport import TransportReply
 from rbxcompose.bus.zenoh_session import open_client
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.runtime import control
@@ -148,7 +148,7 @@ def assert_goes_on(robot: Robot, before: list[int]) -> None:
 
 def answers(endpoint: str, name: str) -> bool:
     """Tell whether a newcomer reaches the processes of a robot through its router."""
-    heard: list[Answer] = []
+    heard: list[TransportReply] = []
     try:
         transport = ZenohTransport(open_client(endpoint), lambda owner, callback: None)
     except OSError:

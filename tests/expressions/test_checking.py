@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose import units
-from rbxcompose.expressions.check import Problem, check, check_condition, check_value
+from rbxcompose.expressions.check import ExpressionProblem, check, check_condition, check_value
 from rbxcompose.expressions.parser import parse
 from rbxcompose.expressions.tree import ExpressionError
 from rbxcompose.expressions.types import (
@@ -70,7 +70,7 @@ class Names:
         return self.named
 
 
-def problems(text: str) -> list[Problem]:
+def problems(text: str) -> list[ExpressionProblem]:
     return check(parse(text), Names())[1]
 
 

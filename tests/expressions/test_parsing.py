@@ -13,12 +13,12 @@ from rbxcompose.expressions.tree import (
     Arithmetic,
     Comparison,
     ExpressionError,
-    Field,
+    ExpressionNode,
+    FieldAccess,
     Index,
     Junction,
     Membership,
     Minus,
-    Node,
     Not,
     Number,
     Variable,
@@ -28,7 +28,7 @@ from rbxcompose.expressions.tree import (
 )
 
 
-def shape(node: Node) -> str:
+def shape(node: ExpressionNode) -> str:
     """Write a tree with all its brackets."""
     below = [shape(child) for child in children(node)]
     match node:
@@ -46,7 +46,7 @@ def shape(node: Node) -> str:
             return f"({f' {operator} '.join(below)})"
         case Membership():
             return f"({below[0]} in {below[1]})"
-        case Field(name=name):
+        case FieldAccess(name=name):
             return f"{below[0]}.{name}"
         case Index():
             return f"{below[0]}[{below[1]}]"

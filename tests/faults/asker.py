@@ -12,7 +12,7 @@ from typing import Any
 
 from rbxcompose.bus.attachment import Attachment
 from rbxcompose.bus.names import ActionNames, data_key
-from rbxcompose.bus.transport import Answer
+from rbxcompose.bus.transport import TransportReply
 from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.msgs.cdr import encode
@@ -51,7 +51,7 @@ def main(router: str, what: str, seconds: float) -> None:
     sys.stdout.flush()
     began, asked = time.monotonic(), 0
 
-    def ended(number: int, answer: Answer) -> None:
+    def ended(number: int, answer: TransportReply) -> None:
         waiting.discard(number)
 
     while time.monotonic() - began < seconds:

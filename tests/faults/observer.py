@@ -15,7 +15,7 @@ from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.types import Message
 from rbxcompose.qos import Qos
-from rbxcompose.testing.invariants import Sent, Velocity
+from rbxcompose.testing.invariants import PlanarVelocity, SentVelocity
 
 COMMAND, MOTION = "cmd_vel", "odom"
 PATIENCE = 20.0  # [s]
@@ -33,7 +33,7 @@ class Observer:
 
     router: str
     hears_commands: bool = True
-    story: list[Sent] = field(default_factory=list)
+    story: list[SentVelocity] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._transport = ZenohTransport(open_peer(self.router), lambda owner, callback: None)
@@ -46,10 +46,12 @@ class Observer:
         key = data_key(0, topic, message.TYPE, message.HASH)
         self._transport.subscribe(key, qos, lambda arrival: take(decode(message, arrival.payload)))
 
-    def _follow(self, topic: str, message: type[M], qos: Qos, velocity: Callable[[M], Velocity]) -> None:
-        self.listen(topic, message, qos, lambda one: self.story.append(Sent(time.monotonic(), topic, velocity(one))))
+    def _follow(self, topic: str, message: type[M], qos: Qos, velocity: Callable[[M], PlanarVelocity]) -> None:
+        self.listen(
+            topic, message, qos, lambda one: self.story.append(SentVelocity(time.monotonic(), topic, velocity(one)))
+        )
 
-    def last(self, topic: str) -> Sent | None:
+    def last(self, topic: str) -> SentVelocity | None:
         """Return what came last on a topic."""
         return next((one for one in reversed(self.story) if one.topic == topic), None)
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.findings import KINDS, Edit, Finding, Fix, Kind, Related, Report, Severity, Span, replacement
+from rbxcompose.findings import KINDS, Edit, Finding, FindingKind, Fix, Related, Report, Severity, Span, replacement
 from rbxcompose.formats import PLUGINS, format_names, renderer
 
-KIND = Kind("RBX0001", "A title of {braces}.\n\nThe first part.\n\nBad: this\n", Severity.WARNING)
+KIND = FindingKind("RBX0001", "A title of {braces}.\n\nThe first part.\n\nBad: this\n", Severity.WARNING)
 SOURCES = {"robots/a b/robot.yaml": 'name: "on"\n', "--set": "a.b=1"}
 FILE = "robots/a b/robot.yaml"
 

@@ -17,7 +17,7 @@ from rbxcompose.composition.robot_file import load_robot
 from rbxcompose.composition.set_options import read_sets
 from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.rendering.json_ import render_json
 from rbxcompose.rendering.text import render_text
@@ -225,7 +225,7 @@ def test_composing_with_nothing_changes_nothing_even_for_mutants(edits: list[tup
     for position, length, piece in edits:
         text = text[:position] + piece + text[position + length :]
     root, _ = read_text(text, "robot.yaml")
-    if isinstance(root, Mapping):
+    if isinstance(root, MappingNode):
         report = Report()
         once = compose(root, [], report)
         again = compose(once, read_sets([], once, report, {}), report)

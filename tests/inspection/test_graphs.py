@@ -11,7 +11,7 @@ import pygraphviz
 import pytest
 
 from rbxcompose.compiler import compile_robot
-from rbxcompose.inspection.diagram import Diagram, Line, Shape, diagram_of
+from rbxcompose.inspection.diagram import BoxShape, Diagram, WireContent, diagram_of
 from rbxcompose.inspection.graph_dot import dot
 from rbxcompose.inspection.graph_html import html
 from rbxcompose.inspection.graph_mermaid import mermaid
@@ -46,9 +46,9 @@ def test_graphviz_draws_it(name: str) -> None:
 
 def test_a_mission_leads_to_its_skills_and_those_to_who_serves_them() -> None:
     wires = {(wire.kind, wire.name): wire for wire in diagram("turtlebot").wires}
-    go_to = wires[Line.ACTION, "/go_to"]
+    go_to = wires[WireContent.ACTION, "/go_to"]
     assert ([tip.box for tip in go_to.sources], [tip.box for tip in go_to.targets]) == (["mission:patrol"], ["go_to"])
-    assert "mission:patrol" in [tip.box for tip in wires[Line.TOPIC, "/battery_level"].targets]
+    assert "mission:patrol" in [tip.box for tip in wires[WireContent.TOPIC, "/battery_level"].targets]
     assert diagram("turtlebot").runs == (("mission", "mission:patrol"),)
     assert diagram("turtlebot").start == "mission:patrol"
 
@@ -101,7 +101,7 @@ def test_a_mission_leads_to_services_and_topics_and_to_nobody_for_skills_in_pyth
 def test_a_mux_shows_the_priorities_of_its_inputs() -> None:
     wires = {wire.name: wire for wire in diagram("turtlebot").wires}
     assert (wires["/cmd_vel/navigation"].note, wires["/cmd_vel/teleop"].note) == ("priority 10", "priority 100")
-    assert [box.name for box in diagram("turtlebot").boxes if box.shape is Shape.MUX] == ["cmd_vel"]
+    assert [box.name for box in diagram("turtlebot").boxes if box.shape is BoxShape.MUX] == ["cmd_vel"]
 
 
 def picture(text: str) -> ElementTree.Element:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.inspection import layout as module
-from rbxcompose.inspection.layout import Edge, Item, Layout, NotDrawnError, Rect, lay_out
+from rbxcompose.inspection.layout import Edge, Layout, LayoutItem, NotDrawnError, Rect, lay_out
 
 GRAPHS = st.integers(1, 14).flatmap(
     lambda count: st.tuples(
@@ -21,7 +21,9 @@ NEAR = 1.5  # [px] Graphviz counts in whole points here and there
 
 
 def laid_out(groups: list[str], links: list[tuple[int, int]]) -> tuple[Layout, list[Edge]]:
-    items = [Item(f"{index}:i", 40.0 + 7 * index, 20.0 + 5 * (index % 4), group) for index, group in enumerate(groups)]
+    items = [
+        LayoutItem(f"{index}:i", 40.0 + 7 * index, 20.0 + 5 * (index % 4), group) for index, group in enumerate(groups)
+    ]
     edges = list(dict.fromkeys((f"{one}:i", f"{other}:i") for one, other in links if one != other))
     return lay_out(items, edges), edges
 

@@ -12,7 +12,7 @@ from rbxcompose.inspection.mission_html import mission_html
 from rbxcompose.inspection.mission_text import mission_lines, mission_text
 from rbxcompose.missions.program.program import RobotNames
 from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
-from rbxcompose.missions.view.picture import Picture, picture_from_data, picture_of, picture_to_data
+from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of, picture_to_data
 from rbxcompose.testing.golden import Golden
 from tests.executive.fake_robot import program_of
 from tests.inspection.pictures import undrawn
@@ -68,7 +68,7 @@ STATUSES = [RUNNING, SUCCESS, SUCCESS, RUNNING, FAILURE, SKIPPED, IDLE]
 FORMATS = {"txt": mission_text, "mermaid": mission_mermaid, "dot": mission_dot, "html": mission_html}
 
 
-def tour() -> Picture:
+def tour() -> MissionPicture:
     return picture_of(program_of(TOUR), RobotNames(missions={"corners": program_of(CORNERS)}))
 
 

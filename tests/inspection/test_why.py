@@ -9,7 +9,7 @@ import pytest
 
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import Finding
-from rbxcompose.inspection.answer import Answer
+from rbxcompose.inspection.answer import PathAnswer
 from rbxcompose.inspection.expand import leaves
 from rbxcompose.inspection.paths import short
 from rbxcompose.inspection.why import why
@@ -60,9 +60,9 @@ def robot(name: str) -> Robot:
     return found
 
 
-def ask(path: str, name: str = "turtlebot") -> Answer:
+def ask(path: str, name: str = "turtlebot") -> PathAnswer:
     answer = why(robot(name), path)
-    assert isinstance(answer, Answer), answer
+    assert isinstance(answer, PathAnswer), answer
     return answer
 
 
@@ -132,7 +132,7 @@ def test_a_namespace_is_named_as_the_reason_of_a_topic(tmp_path: Path) -> None:
     found = check_text(text, tmp_path).compilation.robot
     assert found
     answer = why(found, "base.odom")
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, PathAnswer)
     assert "at /left/odom, as state" in answer.value
     assert "in the namespace 'left'" in answer.text()
 
@@ -142,7 +142,7 @@ def test_what_a_section_runs_stands_where_the_section_does(tmp_path: Path) -> No
     made = check_text(text, tmp_path, others={"one.urdf": "<robot/>"}).compilation.robot
     assert made is not None
     told = why(made, "robot_description")
-    assert isinstance(told, Answer)
+    assert isinstance(told, PathAnswer)
     assert told.hints == (("where", f"{tmp_path}/robot.yaml:5:3"),)
 
 
@@ -151,7 +151,7 @@ def test_a_robot_with_mistakes_can_be_asked_too(tmp_path: Path) -> None:
     found = check_text(text, tmp_path).compilation.robot
     assert found
     answer = why(found, "base.max_speed")
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, PathAnswer)
     assert (answer.value, answer.si) == ("fast", None)
 
 
@@ -175,7 +175,7 @@ def test_an_argument_is_its_value_in_effect_with_the_layers_below(tmp_path: Path
     found = checked.compilation.robot
     assert found
     answer = why(found, "args.speed")
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, PathAnswer)
     assert (answer.path, answer.value, answer.about, answer.si) == ("args.speed", "0.4 m/s", "Between places.", 0.4)
     assert [layer.value for layer in answer.layers] == ["0.3 m/s", "0.1 m/s", "0.2 m/s", "0.4 m/s"]
     assert [layer.name for layer in answer.layers][0::3] == ["the robot", "--set"]
@@ -186,7 +186,7 @@ def test_an_argument_without_a_value_says_how_to_give_one(tmp_path: Path) -> Non
     found = check_text(ARGUMENTS, tmp_path).compilation.robot
     assert found
     answer = why(found, "args.room")
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, PathAnswer)
     assert answer.value == "nothing"
     assert dict(answer.hints) == {"type": "choice, one of [kitchen, hall]", "to set it": "--set args.room=VALUE"}
 
@@ -198,7 +198,7 @@ def test_an_argument_that_a_value_is_filled_in_from_shows_what_it_took_the_place
     found = check_text(text, tmp_path, profiles=["slow"], overlays=over, sets=["args.speed=0.4 m/s"]).compilation.robot
     assert found
     answer = why(found, "go_to.speed")
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, PathAnswer)
     [source] = answer.sources
     assert (source.value, [layer.value for layer in source.below]) == ("0.4 m/s", ["0.3 m/s", "0.1 m/s", "0.2 m/s"])
     shown = [line.strip() for line in answer.text().replace(str(tmp_path), "").splitlines()[-4:]]

@@ -24,7 +24,7 @@ from rbxcompose.qos import Qos
 from rbxcompose.recording.files import recover_all
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import RecordingReader
-from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.topics import RecordedTopic
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.follow import read_log
 from rbxcompose.runtime.log import NAME, PREVIOUS, LogFile, start_new
@@ -36,7 +36,7 @@ from rbxcompose.scaffold.new_files import write_new
 
 OLD, NEW = b"old: 1\n" * 3000, b"new: 2\n" * 4000
 MESSAGES = 40
-TOPIC = Topic("/level", "std_msgs/msg/Float32", "RIHS01_0", Qos.STATE, "float32 data\n")
+TOPIC = RecordedTopic("/level", "std_msgs/msg/Float32", "RIHS01_0", Qos.STATE, "float32 data\n")
 
 
 @dataclass

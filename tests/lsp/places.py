@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rbxcompose.lsp.completion import Item, complete
+from rbxcompose.lsp.completion import CompletionItem, complete
 from rbxcompose.lsp.definition import define
 from rbxcompose.lsp.document import Document
 from rbxcompose.lsp.hover import describe
@@ -25,7 +25,7 @@ class Editor:
         for path in (ROBOT, TWINS):
             self.project.change(path, path.read_text(encoding="utf-8"))
 
-    def complete(self, path: Path, old: str, new: str) -> list[Item]:
+    def complete(self, path: Path, old: str, new: str) -> list[CompletionItem]:
         """Return what is proposed behind `new`, which was typed in the place of `old`."""
         document, line, column = self._behind(path, old, new)
         return complete(document, line, column)

@@ -13,7 +13,7 @@ import pytest
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import Finding
 from rbxcompose.lsp.newest import Newest
-from rbxcompose.lsp.project import Found, OutdatedError, Project
+from rbxcompose.lsp.project import FoundByFile, OutdatedError, Project
 
 TEXT = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  battery:\n    type: battery_sim\n    runtime: 45 s\n"
 WRONG = TEXT + "    wran: 50 %\n"
@@ -40,7 +40,7 @@ class Editor:
 
         monkeypatch.setattr("rbxcompose.lsp.project.compile_robot", waits)
 
-    def tell(self, found: Found) -> None:
+    def tell(self, found: FoundByFile) -> None:
         self.told.append(found[self.path])
         self.news.set()
 

@@ -7,7 +7,7 @@ import pytest
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.arguments import read_argument
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import BROKEN, Mapping
+from rbxcompose.manifest.tree import BROKEN, MappingNode
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.units import SPEED, Quantity
 
@@ -20,7 +20,7 @@ def read(declaration: str) -> tuple[object, list[Finding]]:
     report = Report()
     argument = read_argument("it", node, ("args", "it"), report)
     value = argument.read(argument.default, report) if argument and argument.default else BROKEN
-    return to_plain(value) if isinstance(value, Mapping) else value, list(report)
+    return to_plain(value) if isinstance(value, MappingNode) else value, list(report)
 
 
 VALUES = [

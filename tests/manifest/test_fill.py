@@ -9,14 +9,14 @@ from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.fill_names import Names, Typed, names_of, with_arguments
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import BROKEN, Mapping, Scalar
+from rbxcompose.manifest.tree import BROKEN, MappingNode, ScalarNode
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.units import LENGTH, SPEED, Quantity
 
 
-def read(text: str) -> Mapping:
+def read(text: str) -> MappingNode:
     node, findings = read_text(text + "\n", "robot.yaml")
-    assert isinstance(node, Mapping)
+    assert isinstance(node, MappingNode)
     assert findings == []
     return node
 
@@ -146,5 +146,5 @@ def test_what_holds_nothing_to_fill_in_stays_the_same_object() -> None:
 def test_a_filled_scalar_keeps_its_place_and_its_text() -> None:
     tree = fill(read("x: ${args.speed}"), names(), Report())
     value = tree.get("x")
-    assert isinstance(value, Scalar)
+    assert isinstance(value, ScalarNode)
     assert (value.text, str(value.span)) == ("${args.speed}", "robot.yaml:1:4")

@@ -8,20 +8,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.composition.history import History, Step
+from rbxcompose.composition.history import History, HistoryStep
 from rbxcompose.composition.overlay import compose, settled
 from rbxcompose.composition.set_options import read_sets
 from rbxcompose.findings import Report, Span
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import BROKEN, Entry, Mapping, Node, Path, Scalar, at, children, value_span
+from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at, children, value_span
 from rbxcompose.manifest.validate import to_plain
 
 HERE = Span("f", 1, 1, 1, 2)
 
 
-def read(text: str, file: str = "robot.yaml") -> Mapping:
+def read(text: str, file: str = "robot.yaml") -> MappingNode:
     node, findings = read_text(text, file)
-    assert isinstance(node, Mapping), findings
+    assert isinstance(node, MappingNode), findings
     return node
 
 
@@ -33,16 +33,16 @@ def composed(base: str, *overlays: str) -> tuple[object, Report]:
     return to_plain(tree), report
 
 
-def a_map(data: object) -> Mapping:
+def a_map(data: object) -> MappingNode:
     node = a_node(data)
-    assert isinstance(node, Mapping)
+    assert isinstance(node, MappingNode)
     return node
 
 
-def a_node(data: object) -> Node:
+def a_node(data: object) -> TreeNode:
     if isinstance(data, dict):
-        return Mapping({name: Entry(Scalar(name, HERE), a_node(value)) for name, value in data.items()}, HERE)
-    return Scalar(str(data), HERE)
+        return MappingNode({name: Entry(ScalarNode(name, HERE), a_node(value)) for name, value in data.items()}, HERE)
+    return ScalarNode(str(data), HERE)
 
 
 LEAVES = st.sampled_from("pqr")  # a name is either always a map or always a leaf, as in a schema
@@ -55,7 +55,7 @@ MAPS = st.recursive(
 )
 
 
-def merged(*layers: object) -> Mapping:
+def merged(*layers: object) -> MappingNode:
     report = Report()
     base, *overlays = map(a_map, layers)
     tree = compose(base, [(overlay, "overlay") for overlay in overlays], report)
@@ -100,18 +100,18 @@ def test_overlays_that_have_no_name_in_common_may_come_in_any_order(base: object
 def test_the_history_of_a_value_ends_with_the_one_that_holds(base: object, layers: list[object]) -> None:
     history = History()
     tree = a_map(base)
-    history.write((), Step("base", tree, tree.span))
+    history.write((), HistoryStep("base", tree, tree.span))
     for number, layer in enumerate(layers):
         tree = compose(tree, [(a_map(layer), f"layer {number}")], Report(), history)
     for path, node in below(tree):
-        if isinstance(node, Scalar):
+        if isinstance(node, ScalarNode):
             steps = history.of(path)
             wrote = ["base"] if at(a_map(base), path) is not None else []
             wrote += [f"layer {n}" for n, layer in enumerate(layers) if at(a_map(layer), path) is not None]
             assert ([step.layer for step in steps], steps[-1].node) == (wrote, node)
 
 
-def below(node: Node, path: Path = ()) -> Iterator[tuple[Path, Node]]:
+def below(node: TreeNode, path: KeyPath = ()) -> Iterator[tuple[KeyPath, TreeNode]]:
     for key, child in children(node):
         yield (*path, key), child
         yield from below(child, (*path, key))
@@ -169,7 +169,7 @@ def test_short_forms_of_missions_and_arguments_can_be_changed_in_part() -> None:
 ROBOT = "components:\n  battery: {type: b, runtime: 45 s}\nargs:\n  speed: {type: speed}\nmissions: {patrol: p.yaml}\n"
 
 
-def with_sets(*sets: str) -> tuple[Mapping, Report, dict[str, str]]:
+def with_sets(*sets: str) -> tuple[MappingNode, Report, dict[str, str]]:
     report, sources = Report(), dict[str, str]()
     root = settled(read(ROBOT), report)
     return compose(root, read_sets(sets, root, report, sources), report), report, sources

@@ -8,13 +8,13 @@ import pytest
 
 from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.reader import read_file, read_text
-from rbxcompose.manifest.tree import Mapping, Node, Scalar, at, key_span, value_span
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, at, key_span, value_span
 
 
-def read(text: str) -> Mapping:
+def read(text: str) -> MappingNode:
     node, findings = read_text(text, "robot.yaml")
     assert findings == []
-    assert isinstance(node, Mapping)
+    assert isinstance(node, MappingNode)
     return node
 
 
@@ -52,12 +52,12 @@ def test_an_alias_repeats_what_its_anchor_marks_at_the_anchors_place() -> None:
 def test_merge_keys_are_flattened_and_own_keys_win() -> None:
     tree = read("a: &a {k: 1, m: 1}\nb: &b {k: 2, n: 2}\nc:\n  <<: [*a, *b]\n  m: 3\n")
     merged = at(tree, ("c",))
-    assert isinstance(merged, Mapping)
+    assert isinstance(merged, MappingNode)
     assert {name: text(entry.value) for name, entry in merged.entries.items()} == {"k": "1", "n": "2", "m": "3"}
 
 
-def text(node: Node | None) -> str:
-    assert isinstance(node, Scalar)
+def text(node: TreeNode | None) -> str:
+    assert isinstance(node, ScalarNode)
     return node.text
 
 

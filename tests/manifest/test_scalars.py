@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.findings import Span
 from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 
 HERE = Span("f", 1, 1, 1, 2)
 CORE = [
@@ -41,20 +41,20 @@ CORE = [
 
 @pytest.mark.parametrize(("text", "value"), CORE)
 def test_a_plain_scalar_has_its_core_type(text: str, value: object) -> None:
-    read = plain_value(Scalar(text, HERE))
+    read = plain_value(ScalarNode(text, HERE))
     assert (read, type(read)) == (value, type(value))
 
 
 @given(st.text(max_size=60))
 def test_a_quoted_scalar_is_text(text: str) -> None:
-    assert plain_value(Scalar(text, HERE, plain=False)) == text
+    assert plain_value(ScalarNode(text, HERE, plain=False)) == text
 
 
 @given(st.integers() | st.floats(allow_nan=False, allow_infinity=False))
 def test_a_number_is_read_as_it_is_written(number: float) -> None:
-    assert len(repr(number)) > 40 or plain_value(Scalar(repr(number), HERE)) == number
+    assert len(repr(number)) > 40 or plain_value(ScalarNode(repr(number), HERE)) == number
 
 
 @given(st.text(alphabet="0123456789+-.eExXoOabcdefinINF_: ", max_size=60))
 def test_whatever_looks_like_a_number_is_read_without_a_failure(text: str) -> None:
-    plain_value(Scalar(text, HERE))
+    plain_value(ScalarNode(text, HERE))

@@ -12,7 +12,7 @@ from rbxcompose.config import Config, Length
 from rbxcompose.edits import apply, safe_fixes
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import validate
 from rbxcompose.testing.manifests import check_text
 
@@ -30,7 +30,7 @@ class Lists(Config):
 def told(text: str) -> Finding:
     node, findings = read_text(text, FILE)
     report = Report(findings)
-    if isinstance(node, Mapping):
+    if isinstance(node, MappingNode):
         validate(Lists, node, ("test",), report)
     (finding,) = report
     return finding

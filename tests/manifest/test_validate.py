@@ -10,7 +10,7 @@ from pydantic import Field
 from rbxcompose.config import Angle, Config, Length, Name, Place, PlaceName, Ratio, Speed
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import BROKEN, Mapping
+from rbxcompose.manifest.tree import BROKEN, MappingNode
 from rbxcompose.manifest.validate import validate
 from rbxcompose.references import PLACE
 
@@ -47,7 +47,7 @@ PLACES = {PLACE: {"dock": Place("dock", 0.0, 0.0, 0.0)}}
 
 def check(text: str, model: type[Config] = Thing) -> tuple[Config | None, list[Finding]]:
     node, findings = read_text(text + "\n", "robot.yaml")
-    assert isinstance(node, Mapping)
+    assert isinstance(node, MappingNode)
     assert findings == []
     report = Report()
     return validate(model, node, ("components", "it"), report, PLACES), list(report)
@@ -137,7 +137,7 @@ def test_a_missing_key_is_said_where_the_map_begins() -> None:
 
 def test_a_value_that_could_not_be_filled_in_is_not_spoken_of_again() -> None:
     node, _ = read_text("max_speed: ${x}\ncount: y\n", "robot.yaml")
-    assert isinstance(node, Mapping)
+    assert isinstance(node, MappingNode)
     entry = node.entries["max_speed"]
     object.__setattr__(entry.value, "filled", BROKEN)
     report = Report()

@@ -7,7 +7,7 @@ import pytest
 from rbxcompose.expressions.values import Value
 from rbxcompose.manifest.tree import NOWHERE
 from rbxcompose.mission_tests.judge import is_it
-from rbxcompose.mission_tests.model import Step
+from rbxcompose.mission_tests.model import ExpectedStep
 from rbxcompose.mission_tests.record import Done
 from rbxcompose.mission_tests.scope import agrees
 from tests.mission_tests.trying import Trying
@@ -88,7 +88,7 @@ def test_a_node_with_a_name_is_a_step_also_if_it_was_skipped(trying: Trying, doo
 @pytest.mark.parametrize(("word", "is_it_so"), [("empty", True), ("failure", True), ("success", False)])
 def test_a_step_with_an_outcome_of_its_own_has_also_ended_as_that_counts(word: str, is_it_so: bool) -> None:
     done = Done("look", "look", {}, 0.0, 0, ended="empty")
-    assert is_it(Step("look", NOWHERE, ended=word, counts_as={"empty": "failure"}), done) is is_it_so
+    assert is_it(ExpectedStep("look", NOWHERE, ended=word, counts_as={"empty": "failure"}), done) is is_it_so
 
 
 @pytest.mark.parametrize(("step", "is_fine"), [("go_to", False), ("go_to: corner_1", False), ("go_to: dock", True)])

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 
-from rbxcompose.mission_tests.explorer import Explored, Limits, explore, text_of
+from rbxcompose.mission_tests.explorer import ExplorationLimits, Explored, explore, text_of
 from rbxcompose.testing.golden import Golden
 from tests.missions.simulated import ROBOT, program_of
 
-ALL = Limits()
+ALL = ExplorationLimits()
 HEAD = "rbx: 1\nkind: Mission\nname: m\n"
 INDEXED = """
 data:
@@ -50,7 +50,7 @@ do:
 """
 
 
-def explored(text: str, limits: Limits = ALL) -> Explored:
+def explored(text: str, limits: ExplorationLimits = ALL) -> Explored:
     program = program_of(HEAD + text)
     return explore(
         program, ROBOT, {name: one.default.value for name, one in program.inputs.items() if one.default}, limits
@@ -109,7 +109,8 @@ def test_states_that_were_met_are_not_met_again() -> None:
 
 def test_limits_are_told() -> None:
     out = explored(
-        "data:\n  n: 0\ndo:\n  repeat: forever\n  do:\n    - a\n    - set:\n        n: $n + 1\n", Limits(50, 30)
+        "data:\n  n: 0\ndo:\n  repeat: forever\n  do:\n    - a\n    - set:\n        n: $n + 1\n",
+        ExplorationLimits(50, 30),
     )
     assert out.is_cut
     assert out.states <= 50
@@ -121,6 +122,6 @@ def test_it_is_told_in_words(golden: Golden) -> None:
 
 def test_a_thousand_states_take_seconds_at_most() -> None:
     began = time.perf_counter()
-    out = explored(BRANCHES, Limits(300))
+    out = explored(BRANCHES, ExplorationLimits(300))
     assert out.states <= 300
     assert time.perf_counter() - began < 5

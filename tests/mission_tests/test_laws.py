@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from rbxcompose.manifest.tree import NOWHERE
 from rbxcompose.mission_tests.judge import judge
-from rbxcompose.mission_tests.model import Expect, Step, Trial
-from rbxcompose.mission_tests.record import Done, Record
+from rbxcompose.mission_tests.model import Expectations, ExpectedStep, Trial
+from rbxcompose.mission_tests.record import Done, TrialRecord
 from rbxcompose.mission_tests.runner import run_trial
 from tests.mission_tests.trying import Trying
 
@@ -47,15 +47,17 @@ TEXTS = st.builds(
 )
 
 
-def told(record: Record) -> list[tuple[float, str]]:
+def told(record: TrialRecord) -> list[tuple[float, str]]:
     return [(line.time, line.text) for line in record.lines]
 
 
-def expecting(trial: Trial, record: Record) -> Trial:
+def expecting(trial: Trial, record: TrialRecord) -> Trial:
     """Return a test that expects just what happened."""
     span = trial.span
-    steps = tuple(Step(one.name, span, dict(one.arguments), one.ended, one.began, one.text) for one in record.steps)
-    return replace(trial, expect=Expect(record.outcome, span, trial.expect.until, steps))
+    steps = tuple(
+        ExpectedStep(one.name, span, dict(one.arguments), one.ended, one.began, one.text) for one in record.steps
+    )
+    return replace(trial, expect=Expectations(record.outcome, span, trial.expect.until, steps))
 
 
 @MANY
@@ -80,29 +82,31 @@ ENDS = st.sampled_from(["success", "failure", "halted"])
 DONE = st.lists(st.tuples(NAMES, ENDS), max_size=12)
 
 
-def recorded(done: list[tuple[str, str]]) -> Record:
+def recorded(done: list[tuple[str, str]]) -> TrialRecord:
     steps = [Done(name, name, {}, float(time), -1, ended) for time, (name, ended) in enumerate(done)]
-    return Record("m", {}, steps=steps)
+    return TrialRecord("m", {}, steps=steps)
 
 
 @given(done=DONE, data=st.data())
 def test_any_part_of_what_happened_in_its_order_is_found(done: list[tuple[str, str]], data: st.DataObject) -> None:
     kept = data.draw(st.lists(st.booleans(), min_size=len(done), max_size=len(done)))
-    steps = tuple(Step(name, NOWHERE, ended=ended) for (name, ended), keep in zip(done, kept, strict=True) if keep)
-    assert judge(Expect(steps=steps, until=1.0), recorded(done), {}) == []
+    steps = tuple(
+        ExpectedStep(name, NOWHERE, ended=ended) for (name, ended), keep in zip(done, kept, strict=True) if keep
+    )
+    assert judge(Expectations(steps=steps, until=1.0), recorded(done), {}) == []
 
 
 @given(done=DONE, wanted=DONE)
 def test_steps_are_found_just_when_they_are_a_subsequence(
     done: list[tuple[str, str]], wanted: list[tuple[str, str]]
 ) -> None:
-    steps = tuple(Step(name, NOWHERE, ended=ended) for name, ended in wanted)
+    steps = tuple(ExpectedStep(name, NOWHERE, ended=ended) for name, ended in wanted)
     rest = iter(done)
     is_there = all(one in rest for one in wanted)
-    assert (judge(Expect(steps=steps), recorded(done), {}) == []) == is_there
+    assert (judge(Expectations(steps=steps), recorded(done), {}) == []) == is_there
 
 
 @given(done=DONE, step=st.tuples(NAMES, ENDS))
 def test_never_is_what_is_nowhere(done: list[tuple[str, str]], step: tuple[str, str]) -> None:
-    never = (Step(step[0], NOWHERE, ended=step[1]),)
-    assert (judge(Expect(never=never), recorded(done), {}) == []) == (step not in done)
+    never = (ExpectedStep(step[0], NOWHERE, ended=step[1]),)
+    assert (judge(Expectations(never=never), recorded(done), {}) == []) == (step not in done)

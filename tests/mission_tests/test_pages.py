@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.config import Config
-from rbxcompose.manifest.test_file import Event, Expect, Mock, TrialFile
-from rbxcompose.mission_tests.reader import Reading
+from rbxcompose.manifest.test_file import EventModel, ExpectModel, MockModel, TrialFile
+from rbxcompose.mission_tests.reader import TrialReader
 from rbxcompose.mission_tests.runner import run_trial
 from rbxcompose.rendering.text import render_text
 from rbxcompose.schema.documents import files
@@ -25,14 +25,14 @@ def test_a_test_on_a_page_passes(block: Block, tmp_path: Path) -> None:
     (tmp_path / "tests" / "pages").mkdir(parents=True)
     path = tmp_path / "tests" / "pages" / "shown.test.yaml"
     path.write_text(block.text, encoding="utf-8")
-    reading = Reading({})
+    reading = TrialReader({})
     trial, report = reading.read(path)
     assert trial is not None, render_text(report, reading.sources)
     assert trial.is_complete
     assert [problem.message for problem in run_trial(trial).problems] == []
 
 
-@pytest.mark.parametrize("model", [TrialFile, Mock, Event, Expect])
+@pytest.mark.parametrize("model", [TrialFile, MockModel, EventModel, ExpectModel])
 def test_the_page_has_every_key(model: type[Config]) -> None:
     keys = {field.alias or name for name, field in model.model_fields.items()} - {"rbx", "kind", "name", "about"}
     assert [key for key in keys if f"`{key}`" not in PAGE and f"`{key}: true`" not in PAGE] == []

@@ -9,7 +9,7 @@ import pytest
 
 from rbxcompose.mission_tests.coverage import Coverage
 from rbxcompose.mission_tests.junit import junit
-from rbxcompose.mission_tests.report import MOST_LINES, Outcome, Teller, as_json, coverage_text
+from rbxcompose.mission_tests.report import MOST_LINES, FileOutcome, Teller, as_json, coverage_text
 from rbxcompose.mission_tests.runner import Verdict
 from rbxcompose.testing.golden import Golden
 from tests.mission_tests.trying import Trying
@@ -49,8 +49,8 @@ WRONG = """
 RIGHT = WRONG[: WRONG.index("    expect:")] + "    expect:\n      outcome: success\n"
 
 
-def outcome(verdict: Verdict, trying: Trying) -> Outcome:
-    return Outcome("tried.test.yaml", verdict.trial.name, (), verdict, 0.001)
+def outcome(verdict: Verdict, trying: Trying) -> FileOutcome:
+    return FileOutcome("tried.test.yaml", verdict.trial.name, (), verdict, 0.001)
 
 
 def covered(*verdicts: Verdict) -> Coverage:
@@ -96,7 +96,7 @@ def test_a_second_test_adds_to_what_is_covered(trying: Trying) -> None:
 
 
 def test_junit_tells_passed_failed_and_broken_apart(trying: Trying) -> None:
-    broken = Outcome("broken.test.yaml", "", (), None, 0.002)
+    broken = FileOutcome("broken.test.yaml", "", (), None, 0.002)
     outcomes = [outcome(trying.verdict(RIGHT), trying), outcome(trying.verdict(WRONG), trying), broken]
     root = ElementTree.fromstring(junit(outcomes))
     assert root.tag == "testsuites"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rbxcompose.mission_tests.model import Trial
-from rbxcompose.mission_tests.reader import Reading
+from rbxcompose.mission_tests.reader import TrialReader
 from rbxcompose.mission_tests.runner import Verdict, run_trial
 from rbxcompose.rendering.text import render_text
 from tests.conftest import ROOT
@@ -114,7 +114,7 @@ class Trying:
     """A project in a folder; `verdict` runs the test of a text."""
 
     folder: Path
-    reading: Reading = field(default_factory=lambda: Reading({}))
+    reading: TrialReader = field(default_factory=lambda: TrialReader({}))
 
     def __post_init__(self) -> None:
         """Write the robot and its missions."""

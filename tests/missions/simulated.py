@@ -11,11 +11,11 @@ from rbxcompose.expressions.types import FLAG, POSE, TEXT, TYPES, quantity_of
 from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
 from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
-from rbxcompose.missions.engine.story import Story
+from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, Settings
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
@@ -40,11 +40,11 @@ SERVICES = {"reset": "std_srvs/srv/Trigger", "light": "std_srvs/srv/SetBool"}
 ROBOT = RobotNames(VALUES, PLACES, SKILLS, topics=TOPICS, services=SERVICES)
 
 
-def tree(text: str, file: str = "mission.yaml") -> Tree:
+def tree(text: str, file: str = "mission.yaml") -> MappingNode:
     """Return the located tree of a mission's text."""
     root, findings = read_text(textwrap.dedent(text), file)
     assert not findings
-    assert isinstance(root, Tree)
+    assert isinstance(root, MappingNode)
     return root
 
 
@@ -88,7 +88,7 @@ class Simulated:
         self.calls: dict[str, int] = {}
         self.events: list[tuple[float, MissionEvent]] = []
         self.told: list[str] = []
-        self.story = Story("test", SKILLS)
+        self.story = MissionStory("test", SKILLS)
         self.changes: list[tuple[float, Callable[[], None]]] = []
         defaults = {name: one.default.value for name, one in self.program.inputs.items() if one.default}
         self.engine = Engine(self.program, self.robot, {**defaults, **self.inputs}, self, self.settings)

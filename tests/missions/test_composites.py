@@ -8,7 +8,7 @@ import pytest
 
 from rbxcompose.expressions.types import choice_of
 from rbxcompose.missions.engine.events import SkillStarted
-from rbxcompose.missions.engine.story import Story
+from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.program.program import Skill
 from tests.missions.simulated import ROBOT, SKILLS, Simulated, program_of, simulate
 
@@ -281,7 +281,7 @@ def test_a_bare_word_is_a_choice_where_one_is_expected_also_if_a_place_has_that_
     paint = Skill("paint", {"where": choice_of("dock", "wall")}, "where")
     robot = replace(ROBOT, skills={**SKILLS, "paint": paint})
     simulated = Simulated(program_of("do: [{paint: dock}, {paint: wall}]", robot), robot=robot)
-    simulated.story = Story("test", robot.skills)
+    simulated.story = MissionStory("test", robot.skills)
     assert simulated.advance(5) == "success"
     given = [event.arguments["where"] for _, event in simulated.events if isinstance(event, SkillStarted)]
     assert given == ["dock", "wall"]

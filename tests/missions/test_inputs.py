@@ -6,7 +6,7 @@ import pytest
 
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Finding
-from rbxcompose.manifest.tree import Mapping
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.engine.inputs import bind_inputs
 from tests.missions.simulated import PLACES, program_of, tree
 
@@ -25,7 +25,7 @@ def bound(text: str) -> tuple[dict[str, Value], list[Finding]]:
     """Return what `with:` of this text gives to the mission."""
     root = tree("with:" + text, "robot.yaml")
     given = root.get("with")
-    entries = given.entries if isinstance(given, Mapping) else {}
+    entries = given.entries if isinstance(given, MappingNode) else {}
     return bind_inputs(program_of(MISSION), entries, PLACES, root.span)
 
 

@@ -6,9 +6,9 @@ import re
 
 import pytest
 
-from rbxcompose.findings import KINDS, Finding, Kind, Report
+from rbxcompose.findings import KINDS, Finding, FindingKind, Report
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.language.reader import read_program
@@ -235,7 +235,9 @@ def test_nodes_may_not_be_nested_too_deeply() -> None:
     assert codes.TOO_DEEP.code in codes_found
 
 
-MISSION_KINDS = sorted(kind.code for kind in vars(codes).values() if isinstance(kind, Kind))  # checks have their own
+MISSION_KINDS = sorted(
+    kind.code for kind in vars(codes).values() if isinstance(kind, FindingKind)
+)  # checks have their own
 
 
 @pytest.mark.parametrize("code", MISSION_KINDS)
@@ -246,7 +248,7 @@ def test_each_docs_page_shows_what_is_found_and_how_it_is_right(code: str) -> No
     for text, is_found in ((bad, True), (good, False)):
         root, findings = read_text(text, "page.yaml")
         assert not findings or is_found
-        if isinstance(root, Mapping):
+        if isinstance(root, MappingNode):
             report = Report()
             program = read_program(root, report, ROBOT.skills)
             if program:

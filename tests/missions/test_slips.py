@@ -7,7 +7,7 @@ import pytest
 from rbxcompose.edits import apply, safe_fixes
 from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.tree import Mapping
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.registry import kinds
@@ -56,7 +56,7 @@ do:
 def report_of(text: str) -> Report:
     root, findings = read_text(text, FILE)
     report = Report(list(findings))
-    program = read_program(root, report, ROBOT.skills) if isinstance(root, Mapping) else None
+    program = read_program(root, report, ROBOT.skills) if isinstance(root, MappingNode) else None
     if program:
         report.extend(check_program(program, ROBOT))
     return report

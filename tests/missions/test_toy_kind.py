@@ -13,8 +13,8 @@ from rbxcompose.expressions.types import COUNT
 from rbxcompose.findings import Report
 from rbxcompose.inspection.mission_html import mission_html
 from rbxcompose.inspection.mission_text import mission_text
-from rbxcompose.mission_tests.coverage import Coverage, Seen
-from rbxcompose.mission_tests.explorer import Limits, explore
+from rbxcompose.mission_tests.coverage import Coverage, SeenWays
+from rbxcompose.mission_tests.explorer import ExplorationLimits, explore
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.engine.snapshot import restore, save
 from rbxcompose.missions.engine.task import Site, Task
@@ -22,13 +22,13 @@ from rbxcompose.missions.engine.world import Settings
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program import registry
-from rbxcompose.missions.program.answers import Advice, Counted, Flow
+from rbxcompose.missions.program.answers import Advice, Counted, NodeFlow
 from rbxcompose.missions.program.families import Deed, Loop
 from rbxcompose.missions.program.linker import link
-from rbxcompose.missions.program.look import Look
+from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.outcomes import ANY, SUCCEEDS, Outcomes
 from rbxcompose.missions.program.possible import Possibility, started
-from rbxcompose.missions.program.program import Endings, Node, RobotNames
+from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
 from rbxcompose.missions.program.registry import kind, kinds
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
 from rbxcompose.missions.view.picture import picture_of
@@ -76,8 +76,8 @@ class Persist(Loop):
     gap: Expression
 
     waits = True
-    flow = Flow.ONE_OF
-    look = Look("∞")
+    flow = NodeFlow.ONE_OF
+    look = NodeLook("∞")
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
@@ -85,13 +85,15 @@ class Persist(Loop):
         reader.child("do")
         return cls(most, reader.duration("gap"))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         return endings.of(node.children[0]) if node.children else ANY
 
     def endless(self, ends: Outcomes) -> Advice | None:
         return None
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         yield Possibility(node.span, f"{node.path}: body", started(node.children[0]))
 
     @property
@@ -151,7 +153,7 @@ def test_it_runs_is_saved_and_is_restored() -> None:
 
 
 def test_coverage_counts_its_ways() -> None:
-    seen, coverage = Seen(), Coverage()
+    seen, coverage = SeenWays(), Coverage()
     simulated = Simulated(program_of(TEXT), settings=Settings(observer=seen))
     simulated.advance(10)
     for _, event in simulated.events:
@@ -168,7 +170,7 @@ def test_it_is_drawn() -> None:
 
 
 def test_it_is_explored() -> None:
-    explored = explore(program_of(TEXT), ROBOT, {}, Limits())
+    explored = explore(program_of(TEXT), ROBOT, {}, ExplorationLimits())
     assert set(explored.ends) == {"success", "failure"}
     assert explored.found == []
     assert not explored.is_cut

@@ -12,7 +12,7 @@ from rbxcompose.inspection.port import why_port
 from rbxcompose.lsp.definition import define
 from rbxcompose.lsp.document import Document
 from rbxcompose.missions.program.goals import topic_skill
-from rbxcompose.missions.program.sources import Orders, OrderTopic, Way
+from rbxcompose.missions.program.sources import Orders, OrderTopic, SkillWay
 from rbxcompose.model.robot import Robot
 from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist
 from rbxcompose.msgs.std_msgs import Bool, Empty, Float64, String
@@ -114,7 +114,7 @@ def test_a_pose_that_is_the_main_argument_has_to_be_given(message: type, main: s
 
 def test_a_skill_knows_the_topics_as_they_are_wired(tmp_path: Path) -> None:
     found = robot(tmp_path).skills
-    assert (found["grip"].way, found["grip"].topic, found["grip"].action) == (Way.TOPIC, "/grip", Float64.TYPE)
+    assert (found["grip"].way, found["grip"].topic, found["grip"].action) == (SkillWay.TOPIC, "/grip", Float64.TYPE)
     ends, halts = OrderTopic("/hand/ended", GripEnd.TYPE, "event"), OrderTopic("/grip/halt", Empty.TYPE, "event")
     assert found["grip"].orders == Orders("event", ("gripper",), ends, halts)
     assert found["beep"].orders == Orders("event", ("gripper",))

@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from rbxcompose.msgs.arrays import holds_numbers
-from rbxcompose.msgs.definitions import OCTETS, FieldType, Shape, attribute, parse, parse_type, parts
+from rbxcompose.msgs.definitions import OCTETS, FieldShape, FieldType, attribute, parse, parse_type, parts
 from rbxcompose.msgs.generate import all_structures, modules
 from rbxcompose.msgs.types import Message, declared
 
@@ -92,10 +92,10 @@ def any_message() -> st.SearchStrategy[Any]:
 
 def _values(type_: FieldType) -> st.SearchStrategy[Any]:
     one = _one(type_)
-    if type_.shape is Shape.SINGLE:
+    if type_.shape is FieldShape.SINGLE:
         return one
-    least = type_.length if type_.shape is Shape.ARRAY else 0
-    most = 4 if type_.shape is Shape.UNBOUNDED else type_.length
+    least = type_.length if type_.shape is FieldShape.ARRAY else 0
+    most = 4 if type_.shape is FieldShape.UNBOUNDED else type_.length
     if holds_numbers(type_):
         return st.lists(one, min_size=least, max_size=most).map(lambda values: np.array(values, type_.base))
     if type_.base in OCTETS:
@@ -118,9 +118,9 @@ def _one(type_: FieldType) -> st.SearchStrategy[Any]:
 
 def description(type_: FieldType) -> Any:
     one = (Nodetype.NAME, type_.base) if type_.is_message else (Nodetype.BASE, (type_.base, type_.text_limit))
-    if type_.shape is Shape.SINGLE:
+    if type_.shape is FieldShape.SINGLE:
         return one
-    return (Nodetype.ARRAY if type_.shape is Shape.ARRAY else Nodetype.SEQUENCE, (one, type_.length))
+    return (Nodetype.ARRAY if type_.shape is FieldShape.ARRAY else Nodetype.SEQUENCE, (one, type_.length))
 
 
 def _oracle() -> Typestore:
@@ -147,7 +147,7 @@ def _foreign(message: Message) -> Any:
 
 
 def _foreign_value(value: Any, type_: FieldType) -> Any:
-    if type_.shape is Shape.SINGLE:
+    if type_.shape is FieldShape.SINGLE:
         return _foreign(value) if type_.is_message else value
     if type_.base in OCTETS:
         return np.frombuffer(value, np.uint8)

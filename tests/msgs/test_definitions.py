@@ -6,8 +6,8 @@ from rbxcompose.msgs.definitions import (
     INTERFACES,
     PRIMITIVES,
     DefinitionError,
+    FieldShape,
     FieldType,
-    Shape,
     interface_names,
     parse,
     parse_type,
@@ -36,11 +36,11 @@ def test_most_of_our_messages_can_be_compared_with_jazzy() -> None:
 types = st.builds(
     FieldType,
     st.sampled_from([base for base in PRIMITIVES if base != "string"] + ["std_msgs/msg/Header"]),
-    st.just(Shape.SINGLE) | st.just(Shape.UNBOUNDED),
+    st.just(FieldShape.SINGLE) | st.just(FieldShape.UNBOUNDED),
 ) | st.builds(
     FieldType,
     st.just("string"),
-    st.just(Shape.ARRAY) | st.just(Shape.BOUNDED),
+    st.just(FieldShape.ARRAY) | st.just(FieldShape.BOUNDED),
     st.integers(1, 99),
     st.integers(0, 99),
 )
@@ -52,7 +52,7 @@ def test_a_type_is_read_as_it_is_written(type_: FieldType) -> None:
 
 
 def test_a_bare_name_is_a_message_of_the_same_package() -> None:
-    assert parse_type("Point[2]", "geometry_msgs") == FieldType("geometry_msgs/msg/Point", Shape.ARRAY, 2)
+    assert parse_type("Point[2]", "geometry_msgs") == FieldType("geometry_msgs/msg/Point", FieldShape.ARRAY, 2)
 
 
 def test_comments_and_quotes_do_not_disturb_each_other() -> None:

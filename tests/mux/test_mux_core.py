@@ -9,17 +9,17 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from rbxcompose.mux.core import MuxCore, Source
+from rbxcompose.mux.core import MuxCore, MuxSource
 
-INPUTS = {"safety": Source(200, 0.2), "teleop": Source(100, 0.5), "navigation": Source(10, 0.5)}
-LOCKS = {"door": Source(150, 0.3)}
+INPUTS = {"safety": MuxSource(200, 0.2), "teleop": MuxSource(100, 0.5), "navigation": MuxSource(10, 0.5)}
+LOCKS = {"door": MuxSource(150, 0.3)}
 
 
 def still(message: float) -> bool:
     return message == 0.0
 
 
-def mux(*, locks: dict[str, Source] | None = None, stopped: bool = False) -> MuxCore[float]:
+def mux(*, locks: dict[str, MuxSource] | None = None, stopped: bool = False) -> MuxCore[float]:
     return MuxCore(INPUTS, zero=0.0, is_zero=still, locks=locks, stopped=stopped)
 
 
@@ -172,7 +172,7 @@ def test_a_silent_lock_holds_back_what_has_a_smaller_priority_and_nothing_else()
 
 
 def test_a_lock_of_the_same_priority_holds_nothing_back() -> None:
-    core = mux(locks={"door": Source(100, 0.3)})
+    core = mux(locks={"door": MuxSource(100, 0.3)})
     assert core.receive("teleop", 2.0, 0.0) == 2.0
 
 

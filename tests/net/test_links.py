@@ -10,7 +10,7 @@ from random import Random
 
 import pytest
 
-from rbxcompose.bus.probe import MISSES, Heard, probe_key
+from rbxcompose.bus.probe import MISSES, ProbeResult, probe_key
 from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.msgs.std_msgs import Float32
@@ -154,4 +154,4 @@ def test_a_link_that_is_half_open_is_given_up_and_replaced(stage: Stage, soak: S
         assert len(stage.robot.sessions) == sessions + 1
         for _ in range(2):  # the new session has proved itself: else the next one would wait for longer
             stage.robot.probe()
-            stage.until(lambda: stage.robot.lifeline.heard is Heard.ANSWER)
+            stage.until(lambda: stage.robot.lifeline.heard is ProbeResult.ANSWER)

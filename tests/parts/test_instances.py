@@ -147,7 +147,7 @@ def test_connect_gives_topics_muxes_and_inputs_other_names(project: Project) -> 
     assert project.checked
     robot_ = project.checked.compilation.robot
     assert robot_
-    assert {end.topic for end in robot_.parts["rear_go_to"].ends} >= {"/rear_vel/nav", "/go_back"}
+    assert {end.topic for end in robot_.components["rear_go_to"].ends} >= {"/rear_vel/nav", "/go_back"}
     assert project.findings == [], project.text
 
 

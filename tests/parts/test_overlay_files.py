@@ -13,7 +13,7 @@ from rbxcompose.composition.dump import dump_robot, exact
 from rbxcompose.findings import Report
 from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.fill_names import Names
-from rbxcompose.manifest.tree import NOWHERE, Entry, Mapping, Scalar
+from rbxcompose.manifest.tree import NOWHERE, Entry, MappingNode, ScalarNode
 from rbxcompose.units import ANGLE, LENGTH, RATIO, SPEED, TIME, Dimension, to_si
 from tests.parts.project import BATTERY, Project
 
@@ -163,10 +163,10 @@ def test_what_is_put_together_is_the_same_robot_when_it_is_read_again(project: P
 @given(st.floats(-1e6, 1e6), st.sampled_from([LENGTH, TIME, SPEED, ANGLE, RATIO]))
 def test_a_quantity_in_a_dump_is_the_value_to_the_last_bit(value: float, dimension: Dimension) -> None:
     text = exact(value, dimension)
-    root = Mapping({"x": Entry(Scalar("x", NOWHERE), Scalar(text, NOWHERE))})
+    root = MappingNode({"x": Entry(ScalarNode("x", NOWHERE), ScalarNode(text, NOWHERE))})
     report = Report()
     filled = fill(root, Names(), report).get("x")
-    assert isinstance(filled, Scalar)
+    assert isinstance(filled, ScalarNode)
     read = filled.filled if filled.filled is not None else filled.text
     assert to_si(read, dimension) == value
     assert not report.findings

@@ -21,15 +21,15 @@ from rbxcompose.msgs.types import Message
 from rbxcompose.qos import Qos
 from rbxcompose.recording.definitions import definition_of
 from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.topics import RecordedTopic
 from rbxcompose.recording.writer import RecordingWriter
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
 
 
-def topic(name: str, type: type[Message], qos: Qos = Qos.STATE) -> Topic:
-    return Topic(name, type.TYPE, type.HASH, qos, definition_of(type.TYPE))
+def topic(name: str, type: type[Message], qos: Qos = Qos.STATE) -> RecordedTopic:
+    return RecordedTopic(name, type.TYPE, type.HASH, qos, definition_of(type.TYPE))
 
 
 ODOM = topic("/odom", Odometry)
@@ -37,7 +37,7 @@ TWIST = topic("/cmd_vel", Twist, Qos.COMMAND)
 MAP = topic("/map", String, Qos.LATCHED)
 
 
-def recorded(topic: Topic, message: Message, at: float, sequence: int = 1) -> Recorded:
+def recorded(topic: RecordedTopic, message: Message, at: float, sequence: int = 1) -> Recorded:
     time = START + round(at * SECOND)
     return Recorded(topic, time, time - 1000, sequence, cdr.encode(message))
 

@@ -22,7 +22,7 @@ from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import NotARecordingError, RecordingReader
 from rbxcompose.recording.recorder import Recorder, Split
 from rbxcompose.recording.recovery import recover
-from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.topics import RecordedTopic
 from tests.recording.samples import MAP, ODOM, TWIST, odometry, recorded, some, topic, twist, unfinished, written
 
 MESSAGES = some()
@@ -196,7 +196,7 @@ def test_a_recording_is_split_by_size_or_time_and_nothing_is_lost(tmp_path: Path
 
 
 def test_a_type_without_a_definition_is_kept_as_it_is() -> None:
-    foreign = Topic("/odd", "odd_msgs/msg/Odd", "RIHS01_00")
+    foreign = RecordedTopic("/odd", "odd_msgs/msg/Odd", "RIHS01_00")
     message = Recorded(foreign, 5, 4, 3, b"\x00\x01\x00\x00abc")
     assert read(written([message])) == ([message], "")
 

@@ -18,8 +18,8 @@ from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.schedule import playlist
 from rbxcompose.recording.summary import summary_of
 from rbxcompose.recording.topics import (
+    RecordedTopic,
     Selection,
-    Topic,
     is_replayable,
     qos_of_metadata,
     qos_of_token,
@@ -37,7 +37,7 @@ def token(name: str = "/odom", dds: str = "nav_msgs::msg::dds_::Odometry_", type
 @pytest.mark.parametrize("qos", Qos)
 def test_the_class_of_our_publishers_is_read_from_their_tokens_and_from_recordings(qos: Qos) -> None:
     assert qos_of_token(WIRE_PROFILES["jazzy"].qos_text(ros_qos(qos))) is qos
-    assert qos_of_metadata(Topic("/a", "a/msg/A", "", qos).metadata()) is qos
+    assert qos_of_metadata(RecordedTopic("/a", "a/msg/A", "", qos).metadata()) is qos
 
 
 @pytest.mark.parametrize("written", ["- durability: 1\n", "- history: 1\n  durability: transient_local\n"])
@@ -47,7 +47,7 @@ def test_recordings_of_others_tell_whether_a_topic_is_latched(written: str) -> N
 
 
 def test_a_publisher_is_a_topic() -> None:
-    assert topic_of(token()) == Topic("/odom", "nav_msgs/msg/Odometry", HASH, Qos.STATE)
+    assert topic_of(token()) == RecordedTopic("/odom", "nav_msgs/msg/Odometry", HASH, Qos.STATE)
 
 
 @given(st.text(max_size=20), st.text(max_size=40), st.text(max_size=20))
@@ -73,7 +73,7 @@ def test_wildcards_and_other_names_are_no_topics(bad: EndpointToken) -> None:
     ],
 )
 def test_topics_are_chosen_by_name_and_by_class(
-    patterns: tuple[str, ...], classes: tuple[Qos, ...], taken: set[Topic]
+    patterns: tuple[str, ...], classes: tuple[Qos, ...], taken: set[RecordedTopic]
 ) -> None:
     selection = Selection(patterns, classes)
     assert {one for one in (MAP, ODOM, TWIST) if selection.takes(one)} == taken

@@ -24,7 +24,7 @@ from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import RecordingReader
 from rbxcompose.recording.recovery import recover
 from rbxcompose.recording.tape import ORDERS, PLAN
-from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.topics import RecordedTopic
 from rbxcompose.recording.writer import RecordingWriter
 from rbxcompose.replay.run import Rerun, missing_topics, rerun
 from rbxcompose.requests import as_data
@@ -40,7 +40,7 @@ class Recording:
     path: Path
     plan: Plan
     records: list[Recorded]
-    topics: list[Topic]
+    topics: list[RecordedTopic]
 
     def instance(self, name: str) -> Instance:
         return next(one for one in self.plan.instances if one.name == name)

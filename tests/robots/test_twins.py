@@ -50,7 +50,7 @@ def test_what_is_given_to_one_instance_does_not_change_the_other() -> None:
 def test_the_robot_has_the_last_word_on_what_a_part_brought() -> None:
     robot = compiled().robot
     assert robot
-    warnings = {name: robot.parts[f"{name}_battery"].config.model_dump()["warn"] for name in ("drive", "lift")}
+    warnings = {name: robot.components[f"{name}_battery"].config.model_dump()["warn"] for name in ("drive", "lift")}
     assert warnings == {"drive": 0.5, "lift": 0.45}
 
 

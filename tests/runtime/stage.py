@@ -44,7 +44,7 @@ class Stage:
         self.plan = plan or robot()
         self.alive: set[str] = set()
         self.forks: list[tuple[str, bool, bool]] = []
-        self.sent: list[tuple[str, say.Order]] = []
+        self.sent: list[tuple[str, say.ChannelOrder]] = []
         self.killed: list[str] = []
         self.suspended: set[str] = set()
         self.ended: list[str] = []
@@ -63,7 +63,7 @@ class Stage:
         self.alive.add(process)
         self.beats.add(process)
 
-    def send(self, process: str, message: say.Order) -> None:
+    def send(self, process: str, message: say.ChannelOrder) -> None:
         self.sent.append((process, message))
 
     def end(self, process: str) -> None:
@@ -92,7 +92,7 @@ class Stage:
 
     # Processes
 
-    def speak(self, process: str, message: say.Word) -> None:
+    def speak(self, process: str, message: say.ChannelWord) -> None:
         self.conductor.heard(process, message)
 
     def exit(self, process: str, how: str = "was killed by SIGKILL") -> None:
@@ -117,10 +117,10 @@ class Stage:
         self.activate()
         return self
 
-    def orders(self, kind: type[say.Order]) -> list[tuple[str, say.Order]]:
+    def orders(self, kind: type[say.ChannelOrder]) -> list[tuple[str, say.ChannelOrder]]:
         return [(process, message) for process, message in self.sent if isinstance(message, kind)]
 
-    def told(self, kind: type[say.Order]) -> list[str]:
+    def told(self, kind: type[say.ChannelOrder]) -> list[str]:
         return [process for process, _ in self.orders(kind)]
 
     def pass_time(self, seconds: float) -> None:

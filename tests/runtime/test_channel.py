@@ -10,7 +10,7 @@ from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import MESSAGES, Channel
 
 NAMES = st.lists(st.text(), max_size=4)
-SOME: st.SearchStrategy[say.Message] = st.one_of(
+SOME: st.SearchStrategy[say.ChannelMessage] = st.one_of(
     st.builds(say.Configure, st.none() | st.text()),
     st.builds(say.Activate, NAMES),
     st.just(say.Start()),
@@ -29,7 +29,7 @@ def pair() -> tuple[Channel, Channel]:
 
 
 @given(SOME)
-def test_a_message_is_one_line_and_comes_back_as_it_was(message: say.Message) -> None:
+def test_a_message_is_one_line_and_comes_back_as_it_was(message: say.ChannelMessage) -> None:
     line = MESSAGES.to_line(message)
     assert line.count(b"\n") == 1
     assert MESSAGES.from_line(line) == message
@@ -49,7 +49,7 @@ def test_a_peer_that_does_not_read_blocks_nobody_and_hears_all_later() -> None:
     words = ["x" * 10_000] * 60
     for _ in range(1 + len(words)):
         ours.send(say.Activate(words[:1]))
-    heard: list[say.Message] = []
+    heard: list[say.ChannelMessage] = []
     while len(heard) < 1 + len(words):
         heard += theirs.receive()
         ours.flush()

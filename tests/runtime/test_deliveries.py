@@ -10,7 +10,7 @@ from rbxcompose.bus.attachment import Attachment
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import dds_type
 from rbxcompose.bus.tokens import EntityKind, NodeToken
-from rbxcompose.bus.transport import Arrival, Nowhere
+from rbxcompose.bus.transport import Arrival, NoTransport
 from rbxcompose.bus.writers import SILENCE
 from rbxcompose.clock import SteppedClock
 from rbxcompose.levels import Level
@@ -32,7 +32,7 @@ class Bytes:
         self.payload, self.attachment = payload, Attachment(1, 0, bytes(16)).encode()
 
 
-class Wire(Nowhere):
+class Wire(NoTransport):
     """A transport whose other end is the test."""
 
     def __init__(self, scheduler: Scheduler) -> None:
@@ -43,11 +43,11 @@ class Wire(Nowhere):
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
         self._scheduler.post(owner, callback)
 
-    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Nowhere:
+    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> NoTransport:
         self.arrived = arrived
         return self
 
-    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Nowhere:
+    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> NoTransport:
         self.changed = changed
         return self
 

@@ -10,7 +10,7 @@ from rbxcompose.clock import MonotonicClock, SteppedClock
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import Channel
 from rbxcompose.runtime.process_group.driver import RealTimeDriver, SteppedDriver
-from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.scheduler import Scheduler
 
 
@@ -19,12 +19,12 @@ class Driven:
 
     def __init__(self, until: Callable[[], bool]) -> None:
         self.until = until
-        self.heard: list[say.Message] = []
+        self.heard: list[say.ChannelMessage] = []
         self.is_orphaned = False
         self.beats = 0
-        self.on_message: Callable[[say.Message], None] = self.heard.append
+        self.on_message: Callable[[say.ChannelMessage], None] = self.heard.append
 
-    def handle(self, message: say.Message) -> None:
+    def handle(self, message: say.ChannelMessage) -> None:
         self.on_message(message)
 
     def orphaned(self) -> None:
@@ -45,7 +45,7 @@ class Rig:
     """A stepped driver with everything around it."""
 
     def __init__(self, supervisor: Channel, channel: Channel, rate: float | None) -> None:
-        self.clock, self.scheduler, self.inbox = SteppedClock(), Scheduler(), Inbox()
+        self.clock, self.scheduler, self.inbox = SteppedClock(), Scheduler(), CallbackInbox()
         self.supervisor = supervisor
         self.driven = Driven(lambda: self.scheduler.next_due() is None)
         self.driver = SteppedDriver(self.scheduler, self.clock, self.inbox, channel, self.driven, rate=rate)
@@ -110,7 +110,7 @@ def test_after_halt_time_stands_still_for_good() -> None:
 def test_each_message_is_carried_out_to_its_end_before_the_next() -> None:
     with rig() as r:
 
-        def post(message: say.Message) -> None:
+        def post(message: say.ChannelMessage) -> None:
             r.scheduler.post("x", r.note(type(message).__name__))
 
         r.driven.on_message = post
@@ -159,7 +159,7 @@ def test_the_end_of_the_supervisor_is_heard() -> None:
 
 def test_in_real_time_events_run_at_or_after_their_time() -> None:
     ours, theirs = socket.socketpair()
-    clock, scheduler, inbox = MonotonicClock(), Scheduler(), Inbox()
+    clock, scheduler, inbox = MonotonicClock(), Scheduler(), CallbackInbox()
     ran: list[float] = []
     for due in (0.02, 0.01, 0.03):
         scheduler.at(due, "x", lambda due=due: ran.append(clock.now() - due))  # type: ignore[misc]

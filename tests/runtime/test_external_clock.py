@@ -28,7 +28,7 @@ from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import Channel
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.process_group.driver import ExternalDriver
-from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.testing import Bench, instance
 from tests.bus.conftest import Network, network
@@ -49,7 +49,7 @@ class Fed:
         self.scheduler, self.clock, self.real = Scheduler(), ExternalClock(), SteppedClock()
         self.turns: list[tuple[float, Turn]] = []
         self._told = told
-        self._inbox = Inbox()
+        self._inbox = CallbackInbox()
         ends = socket.socketpair()
         self._channels = [Channel(end) for end in ends]
         driven = Driven(self._is_over)

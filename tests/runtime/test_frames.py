@@ -9,7 +9,7 @@ import pytest
 
 from rbxcompose.bus.attachment import Attachment
 from rbxcompose.bus.bus import Bus
-from rbxcompose.bus.transport import Arrival, Nowhere
+from rbxcompose.bus.transport import Arrival, NoTransport
 from rbxcompose.clock import SteppedClock
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
@@ -29,7 +29,7 @@ class Came:
 
 
 @dataclass
-class World(Nowhere):
+class World(NoTransport):
     """A process that hears of `/tf` from another one."""
 
     is_patient: bool
@@ -46,7 +46,7 @@ class World(Nowhere):
         self.woken += 1
         self.scheduler.post(owner, callback)
 
-    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Nowhere:
+    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> NoTransport:
         if "/tf/" in key:
             self.arrived.append(arrived)
         return self

@@ -13,9 +13,9 @@ from contextlib import closing, suppress
 import pytest
 
 from rbxcompose.bus.bus import Bus
-from rbxcompose.bus.probe import MISSES, Heard, Probe, probe_key
+from rbxcompose.bus.probe import MISSES, Probe, ProbeResult, probe_key
 from rbxcompose.bus.renewal import RenewableTransport
-from rbxcompose.bus.transport import Answer
+from rbxcompose.bus.transport import TransportReply
 from rbxcompose.bus.zenoh_session import open_client, open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import MonotonicClock
@@ -35,42 +35,42 @@ PATIENCE = 10.0  # [s]
 
 def test_a_session_is_stuck_after_three_misses_in_a_row_and_not_before() -> None:
     probe = Probe(expects_router=True)
-    assert [probe.judge(Heard.NOTHING, is_router_up=False) for _ in range(MISSES)] == [False, False, True]
+    assert [probe.judge(ProbeResult.NOTHING, is_router_up=False) for _ in range(MISSES)] == [False, False, True]
 
 
 def test_one_answer_of_anybody_clears_the_misses() -> None:
     probe = Probe(expects_router=True)
-    heard = [Heard.NOTHING, Heard.NOTHING, Heard.ANSWER] * 20
+    heard = [ProbeResult.NOTHING, ProbeResult.NOTHING, ProbeResult.ANSWER] * 20
     assert not any(probe.judge(one, is_router_up=False) for one in heard)
 
 
 def test_a_dead_router_is_no_stuck_session() -> None:
     probe = Probe(expects_router=True)
-    assert not any(probe.judge(Heard.NOBODY, is_router_up=False) for _ in range(100))
+    assert not any(probe.judge(ProbeResult.NOBODY, is_router_up=False) for _ in range(100))
 
 
 def test_a_process_that_is_alone_with_a_router_from_elsewhere_is_not_stuck() -> None:
     probe = Probe(expects_router=False)
-    assert not any(probe.judge(Heard.NOBODY, is_router_up=True) for _ in range(100))
+    assert not any(probe.judge(ProbeResult.NOBODY, is_router_up=True) for _ in range(100))
 
 
 def test_a_router_of_ours_that_runs_and_cannot_be_reached_is_a_miss() -> None:
     probe = Probe(expects_router=True)
-    assert [probe.judge(Heard.NOBODY, is_router_up=True) for _ in range(MISSES)] == [False, False, True]
+    assert [probe.judge(ProbeResult.NOBODY, is_router_up=True) for _ in range(MISSES)] == [False, False, True]
 
 
 def test_renewals_that_do_not_help_become_rarer_until_one_does() -> None:
     probe = Probe(expects_router=True)
-    stuck = [number for number in range(1, 40) if probe.judge(Heard.NOTHING, is_router_up=True)]
+    stuck = [number for number in range(1, 40) if probe.judge(ProbeResult.NOTHING, is_router_up=True)]
     assert stuck == [3, 9, 21]
-    probe.judge(Heard.ANSWER, is_router_up=True)
-    assert [probe.judge(Heard.NOTHING, is_router_up=True) for _ in range(MISSES)] == [False, False, True]
+    probe.judge(ProbeResult.ANSWER, is_router_up=True)
+    assert [probe.judge(ProbeResult.NOTHING, is_router_up=True) for _ in range(MISSES)] == [False, False, True]
 
 
 def test_after_a_miss_all_are_asked_until_one_has_answered() -> None:
     probe = Probe(expects_router=True)
     doubts = [probe.is_in_doubt]
-    for heard in (Heard.NOTHING, Heard.NOTHING, Heard.ANSWER):
+    for heard in (ProbeResult.NOTHING, ProbeResult.NOTHING, ProbeResult.ANSWER):
         probe.judge(heard, is_router_up=True)
         doubts.append(probe.is_in_doubt)
     assert doubts == [False, True, True, False]
@@ -203,12 +203,12 @@ def until(holds: Callable[[], object], *processes: Probed | Visitor) -> None:
 
 def test_a_session_that_is_sound_is_left_alone(port: int) -> None:
     robot = Probed(port)
-    answers: list[Answer] = []
+    answers: list[TransportReply] = []
     take = lambda one: None if one.error else answers.append(one)  # noqa: E731
     until(lambda: robot.transport.ask(probe_key(ROBOT), b"", b"", take) and answers, robot)  # there is a link now
     for _ in range(2 * MISSES):
         robot.probe()
-        until(lambda: robot.lifeline.heard is Heard.ANSWER, robot)
+        until(lambda: robot.lifeline.heard is ProbeResult.ANSWER, robot)
     assert (robot.log, len(robot.sessions)) == ([], 1)
     robot.bus.close()
 

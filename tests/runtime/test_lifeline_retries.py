@@ -7,14 +7,14 @@ from collections.abc import Callable
 
 from rbxcompose.bus.probe import MISSES
 from rbxcompose.bus.renewal import RenewableTransport
-from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Nowhere, Transport
+from rbxcompose.bus.transport import LONGEST_WAIT, NoTransport, Transport, TransportReply
 from rbxcompose.runtime.process_group.driver import BEAT
 from rbxcompose.runtime.process_group.lifeline import BEATS, FIRST_PAUSE, LONGEST_PAUSE, Lifeline
 
 OPENED_ANEW = "the session on the bus carries nothing any more; it is opened anew"
 
 
-class Deaf(Nowhere):
+class Deaf(NoTransport):
     """A session on which no question is ever answered."""
 
     def ask(
@@ -22,7 +22,7 @@ class Deaf(Nowhere):
         key: str,
         payload: bytes,
         attachment: bytes,
-        answered: Callable[[Answer], None],
+        answered: Callable[[TransportReply], None],
         *,
         of_all: bool = True,
         within: float = LONGEST_WAIT,

@@ -52,7 +52,7 @@ class Desk:
     """A supervisor without processes: everything that it would do is noted."""
 
     def __init__(self, plan: Plan = PLAN, *, is_stepped: bool = False) -> None:
-        self.sent: list[tuple[str, say.Order]] = []
+        self.sent: list[tuple[str, say.ChannelOrder]] = []
         self.texts: list[str] = []
         self.replies: list[tuple[int, object, bool]] = []
         self.conductor = Conductor(plan, RunOptions(is_stepped=is_stepped), Scheduler(), self, router=None)
@@ -63,7 +63,7 @@ class Desk:
     def state(self) -> RobotState:
         return RobotState("toys", "/toys.yaml", Process.of(os.getpid()), {}, ())
 
-    def send(self, process: str, message: say.Order) -> None:
+    def send(self, process: str, message: say.ChannelOrder) -> None:
         self.sent.append((process, message))
 
     def log(self, level: Level, text: str, detail: str = "") -> None:

@@ -6,16 +6,16 @@ import threading
 
 import pytest
 
-from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.scheduler import Scheduler
 
 
-def is_readable(inbox: Inbox) -> bool:
+def is_readable(inbox: CallbackInbox) -> bool:
     return bool(select.select([inbox], [], [], 0.0)[0])
 
 
 def test_it_wakes_who_waits_and_runs_in_the_order_of_arrival() -> None:
-    inbox, scheduler, ran = Inbox(), Scheduler(), list[int]()
+    inbox, scheduler, ran = CallbackInbox(), Scheduler(), list[int]()
     assert not is_readable(inbox)
     for number in range(3):
         inbox.put("x", lambda number=number: ran.append(number))  # type: ignore[misc]
@@ -30,7 +30,7 @@ def test_it_wakes_who_waits_and_runs_in_the_order_of_arrival() -> None:
 
 @pytest.mark.parametrize("threads", [1, 4])
 def test_nothing_is_lost_between_threads(threads: int) -> None:
-    inbox, scheduler, each = Inbox(), Scheduler(), 2000
+    inbox, scheduler, each = CallbackInbox(), Scheduler(), 2000
     ran: list[int] = []
 
     def fill() -> None:
@@ -50,7 +50,7 @@ def test_nothing_is_lost_between_threads(threads: int) -> None:
 
 
 def test_a_signal_written_after_the_other_was_heard_is_read_as_well() -> None:
-    inbox, scheduler, ran = Inbox(), Scheduler(), list[int]()
+    inbox, scheduler, ran = CallbackInbox(), Scheduler(), list[int]()
     inbox.put("x", lambda: ran.append(1))
     inbox.drain(scheduler)
     os.eventfd_write(inbox.fileno(), 1)  # of a thread that had looked at the flag before the first signal

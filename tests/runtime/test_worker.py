@@ -20,7 +20,7 @@ from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Command, answers
 from rbxcompose.runtime.process_group.host import Host
-from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.worker import LONGEST
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
@@ -123,7 +123,7 @@ class Process:
 
     def __init__(self) -> None:
         self.records: list[Record] = []
-        self.clock, self.scheduler, self.inbox = Late(), Scheduler(), Inbox()
+        self.clock, self.scheduler, self.inbox = Late(), Scheduler(), CallbackInbox()
         self.bus = Bus(self.scheduler, self.clock, log=lambda owner, text: None)
         both = (instance("planner", "toy_planner"), instance("wheels", "toy_castors"))
         self.senders: set[str] = set()

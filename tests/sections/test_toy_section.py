@@ -82,11 +82,13 @@ def test_each_entry_runs_as_a_component_under_its_name(project: Project) -> None
     assert project.checked
     robot = project.checked.compilation.robot
     assert robot
-    assert {name: part.type_name for name, part in robot.parts.items() if part.path[:1] == ("lamps",)} == {
+    assert {
+        name: component.type_name for name, component in robot.components.items() if component.path[:1] == ("lamps",)
+    } == {
         "front": "toy_lantern",
         "rear": "toy_lantern",
     }
-    assert robot.part_span("rear").line == 8
+    assert robot.component_span("rear").line == 8
 
 
 def test_a_component_and_a_lamp_of_one_name_are_a_finding(project: Project) -> None:

@@ -9,7 +9,7 @@ from functools import cache
 from typing import Protocol, TypeVar
 
 from rbxcompose.bus.inbox import Post
-from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Arrival, Question
+from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, Question, TransportReply
 from rbxcompose.bus.zenoh_transport import GONE
 from rbxcompose.qos import Qos
 from rbxcompose.scheduler import Scheduler
@@ -223,10 +223,10 @@ class _Asked:
     """A request that waits for those that serve it."""
 
     transport: SimulatedTransport
-    answered: Callable[[Answer], None]
+    answered: Callable[[TransportReply], None]
     servers: list[str] = field(default_factory=list)  # sessions that have not answered
 
-    def take(self, session: str, answer: Answer) -> None:
+    def take(self, session: str, answer: TransportReply) -> None:
         if session in self.servers and self in self.transport.asked:
             self.servers.remove(session)
             self.answered(answer)
@@ -242,7 +242,7 @@ class _Asked:
     def _look(self) -> None:
         if not self.servers and self in self.transport.asked:  # as Zenoh does: the end of all answers is told, too
             self.close()
-            self.answered(Answer(error=GONE))
+            self.answered(TransportReply(error=GONE))
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,12 +255,12 @@ class _Question:
     attachment: bytes
 
     def reply(self, payload: bytes, attachment: bytes) -> None:
-        self._send(Answer(payload))
+        self._send(TransportReply(payload))
 
     def fail(self, error: str) -> None:
-        self._send(Answer(error=error))
+        self._send(TransportReply(error=error))
 
-    def _send(self, answer: Answer) -> None:
+    def _send(self, answer: TransportReply) -> None:
         session = self.server.session
         self.server.send(self.asked.transport, lambda: self.asked.take(session, answer))
 
@@ -336,7 +336,7 @@ class SimulatedTransport:
         key: str,
         payload: bytes,
         attachment: bytes,
-        answered: Callable[[Answer], None],
+        answered: Callable[[TransportReply], None],
         *,
         of_all: bool = True,
         within: float = LONGEST_WAIT,

@@ -15,7 +15,7 @@ from rbxcompose.recording.writer import RecordingWriter
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.sim.diff_drive import DiffDriveCore
 from rbxcompose.testing import check_file
-from rbxcompose.testing.invariants import Sent, violations
+from rbxcompose.testing.invariants import SentVelocity, violations
 from rbxcompose.testing.stories import events_of, laws_of
 from tests.simulated_faults.network import Calm
 from tests.simulated_faults.storms import Storm
@@ -105,7 +105,7 @@ def test_without_faults_the_robot_drives_its_patrol_over_the_network(plan: Plan)
     robot = WholeRobot(plan, Calm())
     robot.advance(12.0)
     assert sum("success" in text for text in robot.texts) == 2
-    assert any(isinstance(one, Sent) and one.topic == "/odom" and not one.is_rest for one in robot.story)
+    assert any(isinstance(one, SentVelocity) and one.topic == "/odom" and not one.is_rest for one in robot.story)
 
 
 def test_a_base_that_outlives_its_deadline_is_found(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,7 +22,7 @@ from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.scheduler import Scheduler
-from rbxcompose.testing.invariants import ROBOT, Event, Ordered
+from rbxcompose.testing.invariants import ROBOT, ObservedEvent, Ordered
 from rbxcompose.testing.stories import events_of, laws_of
 from rbxcompose.typed_json import to_data
 from tests.simulated_faults.network import Network, Weather
@@ -97,7 +97,7 @@ class SimulatedProcess(Turned):
             self._is_at_rest = True
             self._say(say.AtRest())
 
-    def handle(self, order: say.Order) -> None:
+    def handle(self, order: say.ChannelOrder) -> None:
         """Carry out what the conductor wants."""
         host = self.host
         match order:
@@ -164,7 +164,7 @@ class SimulatedProcess(Turned):
         if record.text == "restarted":  # a component began anew, which has forgotten what it knew
             self._told("restart")
 
-    def _say(self, word: say.Word) -> None:
+    def _say(self, word: say.ChannelWord) -> None:
         self.robot.hear(self.name, self.session, word)
 
 
@@ -202,7 +202,7 @@ class WholeRobot:
         return [*self.processes.values(), *self.guests]
 
     @property
-    def story(self) -> list[Event]:
+    def story(self) -> list[ObservedEvent]:
         """Return what the run has told."""
         return list(events_of(laws_of(self.plan), self.told))
 
@@ -243,7 +243,7 @@ class WholeRobot:
         """Have something run by the supervisor, at this instant."""
         self.scheduler.at(self.clock.now(), "supervisor", callback)
 
-    def hear(self, name: str, session: str, word: say.Word) -> None:
+    def hear(self, name: str, session: str, word: say.ChannelWord) -> None:
         """Bring a word of a process to the conductor."""
 
         def heard() -> None:
@@ -261,7 +261,7 @@ class WholeRobot:
     def fork(self, process: str, *, is_restart: bool, is_stopped: bool) -> None:
         self.processes[process] = SimulatedProcess(self, process, is_restart=is_restart, is_stopped=is_stopped)
 
-    def send(self, process: str, message: say.Order) -> None:
+    def send(self, process: str, message: say.ChannelOrder) -> None:
         if (found := self.processes.get(process)) is not None:
             found.post("", lambda: found.handle(message))
 

@@ -12,40 +12,44 @@ from rbxcompose.bus.goals import GoalState
 from rbxcompose.testing import check_file
 from rbxcompose.testing.invariants import (
     ROBOT,
+    ActionClaim,
     Base,
-    Claim,
-    Event,
     Laws,
+    ObservedEvent,
     Ordered,
-    Sent,
-    Source,
+    SentVelocity,
     Switch,
-    Told,
+    SwitchInput,
+    ToldGoals,
     violations,
 )
 from rbxcompose.testing.stories import laws_of
 
 PATROL = Path(__file__).parents[2] / "robots/turtlebot/robot.yaml"
 BASE = Base("/cmd", "/odom", "world", timeout=0.5, cycle=0.02, deceleration=(1.0, 3.0))
-MUX = Switch("/cmd", "robot", {"/high": Source(9, 0.5), "/low": Source(1, 0.5)})
-CLAIMS = {"/go": Claim("base", "robot"), "/charge": Claim("base", "robot"), "/say": Claim("voice", "robot")}
+MUX = Switch("/cmd", "robot", {"/high": SwitchInput(9, 0.5), "/low": SwitchInput(1, 0.5)})
+CLAIMS = {
+    "/go": ActionClaim("base", "robot"),
+    "/charge": ActionClaim("base", "robot"),
+    "/say": ActionClaim("voice", "robot"),
+}
 FAST = (0.3, 0.0)
 REST = (0.0, 0.0)
 
 
-def laws_broken(laws: Laws, story: Sequence[Event]) -> list[tuple[float, str]]:
+def laws_broken(laws: Laws, story: Sequence[ObservedEvent]) -> list[tuple[float, str]]:
     return [(one.time, one.law) for one in violations(laws, story)]
 
 
-def moving(*events: Event) -> list[tuple[float, str]]:
+def moving(*events: ObservedEvent) -> list[tuple[float, str]]:
     return laws_broken(Laws(bases=[BASE]), events)
 
 
-def switching(*events: Event, is_lossless: bool = False) -> list[tuple[float, str]]:
+def switching(*events: ObservedEvent, is_lossless: bool = False) -> list[tuple[float, str]]:
     return laws_broken(Laws(switches=[MUX], is_lossless=is_lossless), events)
 
 
-def carrying(*events: Event) -> list[tuple[float, str]]:
+def carrying(*events: ObservedEvent) -> list[tuple[float, str]]:
     return laws_broken(Laws(claims=CLAIMS, longest_goal=60.0), events)
 
 
@@ -53,7 +57,7 @@ def carrying(*events: Event) -> list[tuple[float, str]]:
 
 
 def test_a_base_that_moves_without_any_command_is_not_safe() -> None:
-    assert moving(Sent(1.0, "/odom", FAST)) == [(1.0, "unwarranted motion")]
+    assert moving(SentVelocity(1.0, "/odom", FAST)) == [(1.0, "unwarranted motion")]
 
 
 @pytest.mark.parametrize(("time", "speed", "is_safe"), [
@@ -61,28 +65,34 @@ def test_a_base_that_moves_without_any_command_is_not_safe() -> None:
     (0.74, 0.1, True), (0.85, 0.01, False), (0.85, 0.0, True),
 ])  # fmt: skip
 def test_after_its_deadline_a_base_brakes_as_hard_as_it_can(time: float, speed: float, is_safe: bool) -> None:
-    found = moving(Sent(0.0, "/cmd", FAST), Sent(0.1, "/odom", FAST), Sent(time, "/odom", (speed, 0.0)))
+    found = moving(
+        SentVelocity(0.0, "/cmd", FAST), SentVelocity(0.1, "/odom", FAST), SentVelocity(time, "/odom", (speed, 0.0))
+    )
     assert found == ([] if is_safe else [(time, "unwarranted motion")])
 
 
 def test_a_command_that_is_no_number_warrants_nothing() -> None:
-    assert moving(Sent(0.0, "/cmd", (math.nan, 0.0)), Sent(0.1, "/odom", FAST))
+    assert moving(SentVelocity(0.0, "/cmd", (math.nan, 0.0)), SentVelocity(0.1, "/odom", FAST))
 
 
 def test_a_stop_ends_every_command_until_a_release_and_a_new_one() -> None:
-    stopped: list[Event] = [Sent(0.0, "/cmd", FAST), Sent(0.05, "/odom", FAST), Ordered(0.1, "world", "stop")]
-    late: list[Event] = [Sent(0.5, "/cmd", FAST), Sent(0.6, "/odom", FAST)]
+    stopped: list[ObservedEvent] = [
+        SentVelocity(0.0, "/cmd", FAST),
+        SentVelocity(0.05, "/odom", FAST),
+        Ordered(0.1, "world", "stop"),
+    ]
+    late: list[ObservedEvent] = [SentVelocity(0.5, "/cmd", FAST), SentVelocity(0.6, "/odom", FAST)]
     assert moving(*stopped, *late) == [(0.6, "unwarranted motion")]
-    released: list[Event] = [*stopped, Sent(0.6, "/odom", REST), Ordered(1.0, "world", "release")]
-    assert moving(*released, Sent(1.1, "/odom", FAST)) == [(1.1, "unwarranted motion")]
-    assert moving(*released, Sent(1.1, "/cmd", FAST), Sent(1.2, "/odom", FAST)) == []
+    released: list[ObservedEvent] = [*stopped, SentVelocity(0.6, "/odom", REST), Ordered(1.0, "world", "release")]
+    assert moving(*released, SentVelocity(1.1, "/odom", FAST)) == [(1.1, "unwarranted motion")]
+    assert moving(*released, SentVelocity(1.1, "/cmd", FAST), SentVelocity(1.2, "/odom", FAST)) == []
 
 
 # Muxes
 
 
 def test_a_mux_that_lets_something_through_while_it_is_stopped_is_not_safe() -> None:
-    spoken = [Sent(0.9, "/low", FAST), Sent(0.9, "/cmd", FAST)]
+    spoken = [SentVelocity(0.9, "/low", FAST), SentVelocity(0.9, "/cmd", FAST)]
     assert switching(Ordered(0.1, "robot", "stop"), *spoken) == [(0.9, "unheeded stop")]
     wanted = [Ordered(0.1, ROBOT, "stop"), Ordered(0.1, "robot", "stop"), Ordered(0.2, "robot", "begin")]
     assert switching(*wanted, *spoken) == [(0.9, "unheeded stop")]
@@ -91,25 +101,31 @@ def test_a_mux_that_lets_something_through_while_it_is_stopped_is_not_safe() -> 
 
 
 def test_a_mux_that_invents_is_not_safe() -> None:
-    assert switching(Sent(0.1, "/low", FAST), Sent(0.1, "/cmd", (0.31, 0.0))) == [(0.1, "second winner")]
+    assert switching(SentVelocity(0.1, "/low", FAST), SentVelocity(0.1, "/cmd", (0.31, 0.0))) == [
+        (0.1, "second winner")
+    ]
 
 
 def test_of_two_inputs_the_higher_wins_until_it_was_silent_for_its_timeout() -> None:
-    won = [Sent(0.0, "/high", FAST), Sent(0.0, "/cmd", FAST)]
+    won = [SentVelocity(0.0, "/high", FAST), SentVelocity(0.0, "/cmd", FAST)]
     low = (0.1, 0.0)
-    assert switching(*won, Sent(0.4, "/low", low), Sent(0.4, "/cmd", low)) == [(0.4, "second winner")]
-    assert switching(*won, Sent(0.6, "/low", low), Sent(0.6, "/cmd", low)) == []
+    assert switching(*won, SentVelocity(0.4, "/low", low), SentVelocity(0.4, "/cmd", low)) == [(0.4, "second winner")]
+    assert switching(*won, SentVelocity(0.6, "/low", low), SentVelocity(0.6, "/cmd", low)) == []
 
 
 def test_where_nothing_is_lost_the_higher_input_counts_once_it_has_spoken() -> None:
-    events = [Sent(0.0, "/high", FAST), Sent(0.1, "/low", (0.1, 0.0)), Sent(0.1, "/cmd", (0.1, 0.0))]
+    events = [
+        SentVelocity(0.0, "/high", FAST),
+        SentVelocity(0.1, "/low", (0.1, 0.0)),
+        SentVelocity(0.1, "/cmd", (0.1, 0.0)),
+    ]
     assert switching(*events) == []
     assert switching(*events, is_lossless=True) == [(0.1, "second winner")]
 
 
 def test_an_input_that_talks_on_after_a_stop_need_not_count() -> None:
-    talks = [Sent(time, "/high", FAST) for time in (0.0, 0.2, 0.4)]
-    low = [Sent(0.5, "/low", (0.1, 0.0)), Sent(0.5, "/cmd", (0.1, 0.0))]
+    talks = [SentVelocity(time, "/high", FAST) for time in (0.0, 0.2, 0.4)]
+    low = [SentVelocity(0.5, "/low", (0.1, 0.0)), SentVelocity(0.5, "/cmd", (0.1, 0.0))]
     stopped = [Ordered(0.1, "robot", "stop"), Ordered(0.15, "robot", "release")]
     assert switching(talks[0], *stopped, *talks[1:], *low, is_lossless=True) == []
 
@@ -117,8 +133,8 @@ def test_an_input_that_talks_on_after_a_stop_need_not_count() -> None:
 # Goals
 
 
-def goal(time: float, action: str, state: GoalState, id_: bytes = b"1") -> Told:
-    return Told(time, action, {id_: state})
+def goal(time: float, action: str, state: GoalState, id_: bytes = b"1") -> ToldGoals:
+    return ToldGoals(time, action, {id_: state})
 
 
 def test_two_goals_may_not_have_the_same_part() -> None:

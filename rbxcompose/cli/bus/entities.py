@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from rbxcompose.bus.graph import End, Name, find
+from rbxcompose.bus.graph import GraphEnd, GraphName, find
 from rbxcompose.cli.bus.guest import Guest
 from rbxcompose.cli.bus.place import add_bus_options, find_place
 from rbxcompose.cli.output.console import refuse, tell
@@ -61,7 +61,7 @@ def visit(arguments: argparse.Namespace, do: Callable[[Guest], int]) -> int:
         return refuse(error.finding)
 
 
-def wanted(names: Sequence[Name], name: str, what: str) -> Name:
+def wanted(names: Sequence[GraphName], name: str, what: str) -> GraphName:
     """Return the topic, service or action of that name.
 
     Raises:
@@ -83,7 +83,7 @@ def table(rows: Sequence[Sequence[str]]) -> str:
     )
 
 
-def tell_list(names: Sequence[Name], ends: tuple[str, str], arguments: argparse.Namespace) -> int:
+def tell_list(names: Sequence[GraphName], ends: tuple[str, str], arguments: argparse.Namespace) -> int:
     """List names with their types and how many there are of both `ends`; hidden ones only if all are wanted."""
     listed = [one for one in names if arguments.all or not one.is_hidden]
     if arguments.json:
@@ -97,7 +97,7 @@ def tell_list(names: Sequence[Name], ends: tuple[str, str], arguments: argparse.
     return 0
 
 
-def described(one: Name, ends: tuple[str, str]) -> dict[str, Any]:
+def described(one: GraphName, ends: tuple[str, str]) -> dict[str, Any]:
     """Return all that is known of a name, for JSON."""
     return {
         "name": one.name,
@@ -186,11 +186,11 @@ def _positive(text: str, dimension: Dimension) -> float:
     return value
 
 
-def _short(one: Name, ends: tuple[str, str]) -> dict[str, Any]:
+def _short(one: GraphName, ends: tuple[str, str]) -> dict[str, Any]:
     counts = {ends[0]: len(one.givers), ends[1]: len(one.takers)}
     return {"name": one.name, "types": one.types, "clash": one.clash, **counts}
 
 
-def _end(end: End) -> dict[str, Any]:
+def _end(end: GraphEnd) -> dict[str, Any]:
     qos = None if end.qos is None else asdict(end.qos)
     return {"node": end.node, "type": end.kind.type, "hash": end.kind.hash, "gid": end.gid.hex(), "qos": qos}

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Self
 import zenoh
 
 from rbxcompose.bus.attachment import Attachment, decode_attachment
-from rbxcompose.bus.graph import Graph, Kind, Name
-from rbxcompose.bus.inbox import Inbox as Queue
+from rbxcompose.bus.graph import Graph, GraphName, WireType
+from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.names import data_key
 from rbxcompose.bus.tokens import SPACE
 from rbxcompose.bus.transport import Arrival
@@ -28,7 +28,7 @@ from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.findings import kind
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.scheduler import Scheduler
 
 if TYPE_CHECKING:
@@ -55,11 +55,11 @@ Good: `rbxcompose topic ls --router tcp/127.0.0.1:7447`
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class HeardMessage:
     """A message as it came: when [s of the guest's clock], of which type, and its bytes."""
 
     time: float
-    kind: Kind
+    kind: WireType
     arrival: Arrival
 
     @property
@@ -95,10 +95,10 @@ class Guest:
         self._session = self._lasting(place.router) if stays else _short(place.router)
         self.domain, self.scheduler = place.domain, Scheduler()
         self.is_interrupted = False
-        self._inbox = Inbox()
+        self._inbox = CallbackInbox()
         self.transport = ZenohTransport(self._session, self._inbox.put)
         self._bus: Bus | None = None
-        self._queues: list[Queue[Heard]] = []
+        self._queues: list[Inbox[HeardMessage]] = []
         self._selector = selectors.SelectSelector()  # unlike others it can wait for less than a millisecond
         self._selector.register(self._inbox, selectors.EVENT_READ, lambda: None)
 
@@ -126,7 +126,7 @@ class Guest:
         )
         return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
 
-    def bus(self, kind: Kind | None = None) -> Bus:
+    def bus(self, kind: WireType | None = None) -> Bus:
         """Return a bus to speak on, in the way of those who have this kind of data; the same one each time."""
         from rbxcompose.bus.bus import Bus  # takes as long as all that a list needs
 
@@ -137,10 +137,10 @@ class Guest:
             )
         return self._bus
 
-    def listen(self, topic: Name, heard: Callable[[Heard], None]) -> None:
+    def listen(self, topic: GraphName, heard: Callable[[HeardMessage], None]) -> None:
         """Have each message of a topic handed over undecoded; of latched ones also what was sent before."""
         is_latched = any(end.qos is not None and end.qos.is_transient_local for end in topic.givers)
-        queue: Queue[Heard] = Queue(NAME, LONGEST_QUEUE, heard, self.scheduler.post)
+        queue: Inbox[HeardMessage] = Inbox(NAME, LONGEST_QUEUE, heard, self.scheduler.post)
         self._queues.append(queue)
         for one in topic.kinds:
             if one.type.count("/") == 2:
@@ -206,9 +206,9 @@ class Guest:
             time.sleep(_PAUSE)
         return session
 
-    def _arrived(self, queue: Queue[Heard], kind: Kind) -> Callable[[Arrival], None]:
+    def _arrived(self, queue: Inbox[HeardMessage], kind: WireType) -> Callable[[Arrival], None]:
         # In a thread of the transport: a message has the time at which it came, not that at which it is shown.
-        return lambda arrival: queue.put(Heard(self.clock.now(), kind, arrival), self.transport.wake)
+        return lambda arrival: queue.put(HeardMessage(self.clock.now(), kind, arrival), self.transport.wake)
 
 
 def _short(router: str) -> zenoh.Session:

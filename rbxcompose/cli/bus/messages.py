@@ -10,15 +10,15 @@ from typing import Any, TypeVar
 
 import yaml
 
-from rbxcompose.bus.graph import Kind
+from rbxcompose.bus.graph import WireType
 from rbxcompose.cli.output.console import tell_report
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.findings import Report, Span, kind
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import Mapping, Node, Scalar, key_span, value_span
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, key_span, value_span
 from rbxcompose.msgs import registry
-from rbxcompose.msgs.plain import Path, from_plain
+from rbxcompose.msgs.plain import KeyPath, from_plain
 from rbxcompose.msgs.types import Interface, Message
 from rbxcompose.printable import FORBIDDEN
 
@@ -45,13 +45,13 @@ T = TypeVar("T", bound=Interface)
 class _Places:
     """Places within a tree."""
 
-    root: Node
+    root: TreeNode
 
-    def key(self, path: Path) -> Span:
+    def key(self, path: KeyPath) -> Span:
         """Return the place of a key."""
         return key_span(self.root, path)
 
-    def value(self, path: Path) -> Span:
+    def value(self, path: KeyPath) -> Span:
         """Return the place of a value."""
         return value_span(self.root, path)
 
@@ -72,11 +72,11 @@ def message_from(message: type[M], text: str) -> M | None:
     return made
 
 
-def _data(node: Node) -> object:
+def _data(node: TreeNode) -> object:
     match node:
-        case Scalar():
+        case ScalarNode():
             return plain_value(node)
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             return {name: _data(entry.value) for name, entry in entries.items()}
     return [_data(item) for item in node.items]
 
@@ -107,7 +107,7 @@ def message_type(name: str) -> type[Message]:
 
 
 def type_of(
-    one: Kind,
+    one: WireType,
     category: str,
     look: Callable[[str], type[T]],
     hash_of: Callable[[type[T]], str] = lambda found: found.HASH,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 
-from rbxcompose.bus.graph import Kind, Name
+from rbxcompose.bus.graph import GraphName, WireType
 from rbxcompose.cli.bus.entities import wanted
-from rbxcompose.cli.bus.guest import Guest, Heard
+from rbxcompose.cli.bus.guest import Guest, HeardMessage
 from rbxcompose.cli.bus.messages import shown, type_of
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
@@ -19,12 +19,12 @@ from rbxcompose.msgs.types import Message
 _PERIOD = 1.0  # [s] between two words on what was left out
 
 
-class Reader:
+class EchoReader:
     """Decodes what is heard on a topic; what it cannot read it counts, and says so once for each type."""
 
-    def __init__(self, topic: Name) -> None:
+    def __init__(self, topic: GraphName) -> None:
         self.malformed = 0
-        self._types: dict[Kind, type[Message]] = {}
+        self._types: dict[WireType, type[Message]] = {}
         for kind in topic.kinds:
             try:
                 self._types[kind] = type_of(kind, "msg", registry.message)
@@ -32,7 +32,7 @@ class Reader:
                 refuse(error.finding)
         self.is_useless = not self._types
 
-    def read(self, heard: Heard) -> Message | None:
+    def read(self, heard: HeardMessage) -> Message | None:
         """Return the message, or None if it cannot be read."""
         if heard.kind not in self._types:
             return None
@@ -48,8 +48,8 @@ class Reader:
 class _Echo:
     """Prints messages until there are enough."""
 
-    def __init__(self, topic: Name, arguments: argparse.Namespace) -> None:
-        self.reader = Reader(topic)
+    def __init__(self, topic: GraphName, arguments: argparse.Namespace) -> None:
+        self.reader = EchoReader(topic)
         self._arguments, self._count = arguments, 0
 
     @property
@@ -57,7 +57,7 @@ class _Echo:
         """Tell whether enough has been printed."""
         return self._arguments.count is not None and self._count >= self._arguments.count
 
-    def heard(self, heard: Heard) -> None:
+    def heard(self, heard: HeardMessage) -> None:
         """Print a message, unless it is one too many."""
         message = None if self.is_over else self.reader.read(heard)
         if message is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 
-from rbxcompose.bus.graph import Kind, Name, find
+from rbxcompose.bus.graph import GraphName, WireType, find
 from rbxcompose.bus.names import name_problem
 from rbxcompose.cli.bus.entities import NO_NAME, NOBODY
 from rbxcompose.cli.bus.guest import NAME, Guest
@@ -43,7 +43,7 @@ def publish(guest: Guest, arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _nobody(topic: Name | None, name: str, message: type[Message], of_type: list[Kind]) -> Finding:
+def _nobody(topic: GraphName | None, name: str, message: type[Message], of_type: list[WireType]) -> Finding:
     if topic is None or not topic.takers:
         return NOBODY.at(None, f"nobody subscribes to '{name}'")
     others = ", ".join(topic.types)

@@ -1,4 +1,4 @@
-"""What may stand at the end of a command line: verbs, options and choices from the parsers, the rest from `Values`."""
+"""What may stand at the end of a command line: verbs, options and choices of the parsers, else `CandidateValues`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _BREAKS = re.compile(r".*[:=]", re.DOTALL)  # bash counts these as ends of words
 _SEVERAL = ("*", "+")
 
 
-class Values(Protocol):
+class CandidateValues(Protocol):
     """Finds what may stand for an argument."""
 
     def of(self, metavar: str, dest: str, current: str, given: Mapping[str, str]) -> Iterable[str]:
@@ -59,7 +59,7 @@ class _Place:
         elif first.nargs not in _SEVERAL:
             self.positionals.pop(0)
 
-    def fitting(self, current: str, values: Values) -> Iterable[str]:
+    def fitting(self, current: str, values: CandidateValues) -> Iterable[str]:
         """Yield what may stand for the word that is typed now."""
         options = self.parser._option_string_actions
         name, equals, value = current.partition("=")
@@ -72,13 +72,13 @@ class _Place:
         else:
             yield from self._values(self.positionals[0], current, values)
 
-    def _values(self, action: argparse.Action, current: str, values: Values) -> Iterable[str]:
+    def _values(self, action: argparse.Action, current: str, values: CandidateValues) -> Iterable[str]:
         if action.choices is not None:
             return map(str, action.choices)
         return values.of(str(action.metavar or ""), action.dest, current, self.given)
 
 
-def candidates(words: Sequence[str], values: Values) -> list[str]:
+def candidates(words: Sequence[str], values: CandidateValues) -> list[str]:
     """Return what may stand in the place of the last of `words`, which come after `rbxcompose`; sorted."""
     *before, current = words
     if not before:

@@ -12,7 +12,7 @@ from rbxcompose.cli.output.console import FINDINGS, misused, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.executive.requests import settings
 from rbxcompose.expressions.values import Value
-from rbxcompose.mission_tests.explorer import Limits, text_of
+from rbxcompose.mission_tests.explorer import ExplorationLimits, text_of
 from rbxcompose.mission_tests.explorer import explore as explore_program
 from rbxcompose.missions.engine.inputs import bind_texts
 from rbxcompose.model.robot import Robot
@@ -29,7 +29,7 @@ def explore(arguments: argparse.Namespace) -> int:
         inputs = _inputs(robot, arguments.name, settings(arguments.sets))
     except Refused as refusal:
         return misused("mission explore", str(refusal))
-    explored = explore_program(program, robot.names, inputs, Limits(arguments.states, arguments.depth))
+    explored = explore_program(program, robot.names, inputs, ExplorationLimits(arguments.states, arguments.depth))
     tell(json.dumps(asdict(explored), indent=1) if arguments.json else text_of(explored))
     return FINDINGS if explored.found else 0
 

@@ -21,10 +21,10 @@ from rbxcompose.inspection.mission_graphs import mission_dot, mission_mermaid
 from rbxcompose.inspection.mission_html import mission_html
 from rbxcompose.inspection.mission_text import mission_text
 from rbxcompose.missions.program.program import Skill
-from rbxcompose.missions.program.sources import SkillSource, Way
+from rbxcompose.missions.program.sources import SkillSource, SkillWay
 from rbxcompose.missions.program.statuses import IDLE, NAMES
 from rbxcompose.missions.view.mirror import joined, status_list
-from rbxcompose.missions.view.picture import Picture, picture_from_data, picture_of
+from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.skills import python_skills
 from rbxcompose.sdk.skills import skill_names
@@ -84,7 +84,7 @@ def show(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _live(name: str) -> tuple[Picture, Sequence[int]] | None:
+def _live(name: str) -> tuple[MissionPicture, Sequence[int]] | None:
     """Return the picture of a mission that has been running, and how its nodes stand or ended."""
     folder = find_robot(None)
     if not any(one.name == name and one.state != NAMES[IDLE] for one in answer_of(folder, ListMissions())):
@@ -135,7 +135,7 @@ def _ends(skill: Skill) -> str:
 
 
 def _how(source: SkillSource) -> str:
-    words = [f"{source.way} {source.topic}" if source.way is not Way.PYTHON else "Python"]
+    words = [f"{source.way} {source.topic}" if source.way is not SkillWay.PYTHON else "Python"]
     words += [] if source.skill.restartable else ["cannot be restarted"]
     return ", ".join([*words, *(["can pause"] if source.skill.pausable else [])])
 

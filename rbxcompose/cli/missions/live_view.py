@@ -20,7 +20,7 @@ from rbxcompose.expressions.values import NOT_ARRIVED
 from rbxcompose.inspection.mission_text import mission_lines
 from rbxcompose.missions.engine.snapshot import from_plain
 from rbxcompose.missions.view.mirror import ACTIVE, joined, status_list
-from rbxcompose.missions.view.picture import Picture, picture_from_data
+from rbxcompose.missions.view.picture import MissionPicture, picture_from_data
 from rbxcompose.printable import fitted, plain
 from rbxcompose.runtime.folder import RobotFolder
 
@@ -28,7 +28,7 @@ MOST = 5  # transitions that are shown
 _WIDTH = 120  # of a picture for no terminal
 
 
-def lines_of(picture: Picture, seen: Mapping[str, Any], width: int, *, colour: bool = False) -> list[str]:
+def lines_of(picture: MissionPicture, seen: Mapping[str, Any], width: int, *, colour: bool = False) -> list[str]:
     """Return the lines that show how a mission stands."""
     statuses = status_list(joined({"statuses": {}, "data": {}}, seen), picture.count)
     lines = [fitted(f"mission {plain(seen['mission'])}: {seen['state']}", width)]

@@ -12,7 +12,7 @@ from rbxcompose.cli.missions.files import mission_in, robot_of
 from rbxcompose.cli.output.console import FINDINGS, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.findings import kind
-from rbxcompose.missions.engine.logbook import INPUTS, Record, ReplayError, replay
+from rbxcompose.missions.engine.logbook import INPUTS, LogRecord, ReplayError, replay
 from rbxcompose.model.robot import Robot
 from rbxcompose.regular_files import read_regular
 
@@ -50,13 +50,13 @@ def replay_log(arguments: argparse.Namespace) -> int:
     return FINDINGS if differs else 0
 
 
-def runs_in(file: str) -> dict[tuple[str, int], list[Record]]:
+def runs_in(file: str) -> dict[tuple[str, int], list[LogRecord]]:
     """Return the records of a log by mission and run.
 
     Raises:
         NotDoneError: if it cannot be read.
     """
-    runs: dict[tuple[str, int], list[Record]] = {}
+    runs: dict[tuple[str, int], list[LogRecord]] = {}
     try:
         for line in read_regular(Path(file), _LARGEST).decode("utf-8").splitlines():
             record = json.loads(line)
@@ -70,7 +70,7 @@ def runs_in(file: str) -> dict[tuple[str, int], list[Record]]:
     return runs
 
 
-def difference(records: Sequence[Record], name: str, robot: Robot, file: str) -> str:
+def difference(records: Sequence[LogRecord], name: str, robot: Robot, file: str) -> str:
     """Return in words the first record that is another one now; empty if all are the same."""
     then = [_told(record) for record in records if record["event"] not in INPUTS]
     try:
@@ -87,9 +87,9 @@ def difference(records: Sequence[Record], name: str, robot: Robot, file: str) ->
     return ""
 
 
-def _told(record: Record) -> dict[str, Any]:
+def _told(record: LogRecord) -> dict[str, Any]:
     return {key: value for key, value in record.items() if key not in _OWN}
 
 
-def _shown(records: Sequence[Record]) -> str:
+def _shown(records: Sequence[LogRecord]) -> str:
     return json.dumps(records[0]) if records else "nothing"

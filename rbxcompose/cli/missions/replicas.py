@@ -8,7 +8,7 @@ from typing import Any
 
 from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.names import admin_key
-from rbxcompose.bus.transport import Answer
+from rbxcompose.bus.transport import TransportReply
 from rbxcompose.bus.window import SCHEMA
 from rbxcompose.cli.bus.guest import LONGEST_QUEUE, NAME, Guest
 from rbxcompose.missions.program.statuses import IDLE, NAMES
@@ -52,10 +52,10 @@ class MissionsSeen:
             return
         self._asked.add(path)
         transport, answers = self._guest.transport, _Answers(self, path)
-        inbox: Inbox[Answer] = Inbox(NAME, None, answers.take, self._guest.scheduler.post)
+        inbox: Inbox[TransportReply] = Inbox(NAME, None, answers.take, self._guest.scheduler.post)
         transport.ask(admin_key(self._robot, path), b"", b"", lambda answer: inbox.put(answer, transport.wake))
 
-    def answered(self, path: str, answer: Answer) -> None:
+    def answered(self, path: str, answer: TransportReply) -> None:
         """Take what came first of a question."""
         self._asked.discard(path)
         if answer.error:
@@ -93,7 +93,7 @@ class _Answers:
         self._asking, self._path = asking, path
         self._is_over = False
 
-    def take(self, answer: Answer) -> None:
+    def take(self, answer: TransportReply) -> None:
         if not self._is_over:
             self._is_over = True
             self._asking.answered(self._path, answer)

@@ -17,10 +17,10 @@ from rbxcompose.regular_files import read_regular
 ROUNDS = 20  # one fix may let the next mistake be seen
 _WORDS = 200  # characters of a title
 
-Say = Callable[[str], None]
+PrintLine = Callable[[str], None]
 
 
-class Checked(Protocol):
+class CheckedTexts(Protocol):
     """What a check found, and the texts that it read."""
 
     @property
@@ -34,7 +34,7 @@ class Checked(Protocol):
         ...
 
 
-def fix(check: Callable[[], Checked], say: Say) -> None:
+def fix(check: Callable[[], CheckedTexts], say: PrintLine) -> None:
     """Check, apply what can safely be fixed, say it, and begin anew until nothing is left."""
     for _ in range(ROUNDS):
         checked = check()
@@ -56,7 +56,7 @@ def _is_ours(one: Fix, projects: Collection[Path]) -> bool:
     return all(any(path.is_relative_to(project) for project in projects) for path in paths)
 
 
-def _apply(fixes: list[Fix], sources: Sources, say: Say) -> bool:
+def _apply(fixes: list[Fix], sources: Sources, say: PrintLine) -> bool:
     """Write fixes, and return whether any file has changed."""
     texts = {}
     for file in dict.fromkeys(edit.span.file for one in fixes for edit in one.edits):
@@ -89,7 +89,7 @@ def _unchanged_text(file: str, read: str) -> str | None:
     return text if text.removeprefix("\ufeff").replace("\r\n", "\n") == read else None
 
 
-def _write(file: str, text: str, say: Say) -> bool:
+def _write(file: str, text: str, say: PrintLine) -> bool:
     try:
         replace_file(Path(file).resolve(), text.encode("utf-8"))
     except OSError as error:

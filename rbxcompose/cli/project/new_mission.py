@@ -27,7 +27,7 @@ class MistakenRobotError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Home:
+class MissionHome:
     """The robot that gets a mission, its file, and the project that both lie in."""
 
     robot: Robot
@@ -62,7 +62,7 @@ class Home:
         return True
 
 
-def find_home(written: str) -> Home:
+def find_home(written: str) -> MissionHome:
     """Return the robot that gets the mission; if none is written, the only one below `robots/`.
 
     Raises:
@@ -73,7 +73,7 @@ def find_home(written: str) -> Home:
     out = compile_robot(str(file), environment=os.environ)
     if out.robot is None or out.report.has_errors:
         raise MistakenRobotError(out)
-    return Home(out.robot, file, project_of(file))
+    return MissionHome(out.robot, file, project_of(file))
 
 
 def _file(written: str) -> Path:

@@ -13,7 +13,7 @@ from rbxcompose.printable import plain
 from rbxcompose.qos import Qos
 from rbxcompose.recording.codes import RECOVERED
 from rbxcompose.recording.files import recover_all
-from rbxcompose.recording.topics import Selection, Topic, by_name
+from rbxcompose.recording.topics import RecordedTopic, Selection, by_name
 
 
 def add_selection_options(parser: argparse.ArgumentParser) -> None:
@@ -68,7 +68,7 @@ def warn(finding: Finding) -> None:
     tell_report(report, {})
 
 
-def count_table(counts: Mapping[Topic, int]) -> str:
+def count_table(counts: Mapping[RecordedTopic, int]) -> str:
     """Return one line for each topic: name, type, class, number of messages."""
     rows = [("topic", "type", "class", "messages")]
     together = by_name(counts)

@@ -24,7 +24,7 @@ from rbxcompose.recording.reader import RecordingReader
 from rbxcompose.recording.recorder import Recorder
 from rbxcompose.recording.tape import PLAN
 from rbxcompose.regular_files import open_regular
-from rbxcompose.replay.comparison import Difference
+from rbxcompose.replay.comparison import RunDifference
 from rbxcompose.replay.run import Rerun, missing_topics, rerun
 
 HOW = "'rbxcompose up PATH --rate max --record FILE' records all that is needed"
@@ -121,13 +121,13 @@ def _told(arguments: argparse.Namespace, name: str, found: Rerun) -> int:
     return 0 if found.difference is None else 1
 
 
-def _text(name: str, one: Difference, equal: int) -> str:
+def _text(name: str, one: RunDifference, equal: int) -> str:
     where = f", field '{plain(one.field)}'" if one.field else ""
     values = f"recorded {plain(one.recorded)}, now {plain(one.now)}"
     return f"'{name}' differs at {one.time:.3f} s on {plain(one.topic)}{where}: {values}; {equal:,} messages were equal"
 
 
-def _fields(one: Difference | None) -> dict[str, object] | None:
+def _fields(one: RunDifference | None) -> dict[str, object] | None:
     if one is None:
         return None
     return {"time": one.time, "topic": one.topic, "field": one.field, "recorded": one.recorded, "now": one.now}

@@ -16,7 +16,7 @@ from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.cli.bus.guest import Guest
 from rbxcompose.recording.definitions import definition_of
 from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.topics import Selection, Topic, topic_of
+from rbxcompose.recording.topics import RecordedTopic, Selection, topic_of
 
 MOST_WAITING = 20_000  # messages that came and are not yet written
 MOST_TOPICS = 2_000
@@ -65,13 +65,13 @@ class Tap:
         whole = replace(topic, definition=definition_of(topic.type))
         self._guest.transport.subscribe(data, topic.qos, lambda arrival: self._arrive(whole, arrival))
 
-    def _arrive(self, topic: Topic, arrival: Arrival) -> None:
+    def _arrive(self, topic: RecordedTopic, arrival: Arrival) -> None:
         stamp = self._guest.clock.stamp()
         self._waiting.append(lambda: _recorded(topic, stamp, arrival))
         self._arrived = next(self._arrivals)
 
 
-def _recorded(topic: Topic, stamp: int, arrival: Arrival) -> Recorded:
+def _recorded(topic: RecordedTopic, stamp: int, arrival: Arrival) -> Recorded:
     try:
         sequence, published, _ = decode_attachment(arrival.attachment)
     except ValueError:
@@ -82,13 +82,13 @@ def _recorded(topic: Topic, stamp: int, arrival: Arrival) -> Recorded:
 class Player:
     """Publishes recorded messages as the node `replay`."""
 
-    def __init__(self, guest: Guest, topics: Iterable[Topic]) -> None:
+    def __init__(self, guest: Guest, topics: Iterable[RecordedTopic]) -> None:
         self._guest = guest
         self._sequence = count(1)
         transport, domain = guest.transport, guest.domain
         node = NodeToken(domain, transport.session, 0, "replay")
         transport.announce(node.key)
-        self._publishers: dict[Topic, tuple[RemotePublisher, bytes]] = {}
+        self._publishers: dict[RecordedTopic, tuple[RemotePublisher, bytes]] = {}
         for number, topic in enumerate(topics, 1):
             qos = WIRE_PROFILES["jazzy"].qos_text(ros_qos(topic.qos))
             place = (EntityKind.PUBLISHER, number, topic.name, dds_type(topic.type), topic.hash, qos)

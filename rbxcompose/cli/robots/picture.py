@@ -20,7 +20,7 @@ _MOST_OF_NAMES = 24  # columns
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ComponentPicture:
     """A component: its messages that go out [1/s], and what diagnostics say of it; None where nothing is known."""
 
     name: str
@@ -53,7 +53,7 @@ class Tree:
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class RobotPicture:
     """All that is shown: `health` has the level and the words of each group of the diagnostics."""
 
     robot: str
@@ -61,7 +61,7 @@ class Picture:
     router: str | None
     mission: str
     batteries: Sequence[tuple[str, str]]
-    parts: Sequence[Part]
+    components: Sequence[ComponentPicture]
     loads: Sequence[Load]
     health: Sequence[tuple[str, Level, str]]
     warnings: Sequence[Record]
@@ -69,7 +69,6 @@ class Picture:
 
     def to_data(self) -> dict[str, Any]:
         """Return it for JSON; levels by their names."""
-        parts = [{**asdict(one), "level": None if one.level is None else one.level.name} for one in self.parts]
         return {
             "robot": self.robot,
             "is_supervised": self.is_supervised,
@@ -77,7 +76,9 @@ class Picture:
             "mission": self.mission,
             "missions": [asdict(one) for one in self.trees],
             "batteries": dict(self.batteries),
-            "components": parts,
+            "components": [
+                {**asdict(one), "level": None if one.level is None else one.level.name} for one in self.components
+            ],
             "processes": [asdict(one) for one in self.loads],
             "diagnostics": [{"group": name, "level": level.name, "message": text} for name, level, text in self.health],
             "warnings": [
@@ -87,13 +88,17 @@ class Picture:
         }
 
 
+def _component_data(one: ComponentPicture) -> dict[str, Any]:
+    return {**asdict(one), "level": None if one.level is None else one.level.name}
+
+
 @dataclass(frozen=True, slots=True)
 class _Line:
     text: str
     colour: str = ""
 
 
-def lines_of(picture: Picture, width: int, height: int, *, colour: bool = False) -> list[str]:
+def lines_of(picture: RobotPicture, width: int, height: int, *, colour: bool = False) -> list[str]:
     """Return at most `height` lines of at most `width` columns; what does not fit is counted.
 
     Missions have the room that is left by all else; components go last.
@@ -102,13 +107,13 @@ def lines_of(picture: Picture, width: int, height: int, *, colour: bool = False)
     loads = [_Line(""), *_loads(picture.loads)]
     tail = [*_health(picture.health), *_warnings(picture.warnings)]
     room = max(2, height - len(head) - len(loads) - len(tail))
-    parts = _shortened(_parts(picture.parts), room)
-    left = height - len(head) - len(parts) - len(loads) - len(tail)
-    shown = [*head, *parts, *loads, *_trees(picture.trees, left), *tail][:height]
+    components = _shortened(_components(picture.components), room)
+    left = height - len(head) - len(components) - len(loads) - len(tail)
+    shown = [*head, *components, *loads, *_trees(picture.trees, left), *tail][:height]
     return [_painted(line, width, colour) for line in shown]
 
 
-def _head(picture: Picture) -> list[_Line]:
+def _head(picture: RobotPicture) -> list[_Line]:
     supervisor = "" if picture.is_supervised else "; its supervisor is dead, 'rbxcompose down' ends what is left"
     lines = [_Line(f"{plain(picture.robot)}: router {plain(picture.router or 'none')}{supervisor}", _BOLD)]
     if picture.mission:
@@ -118,7 +123,7 @@ def _head(picture: Picture) -> list[_Line]:
     return [*lines, _Line("")]
 
 
-def _parts(parts: Sequence[Part]) -> list[_Line]:
+def _components(components: Sequence[ComponentPicture]) -> list[_Line]:
     rows = [
         (
             one.name,
@@ -129,16 +134,16 @@ def _parts(parts: Sequence[Part]) -> list[_Line]:
             "-" if one.rate is None else f"{one.rate:.1f}",
             "" if one.level in (None, Level.OK) else f"{one.level.name}: {one.message}",
         )
-        for one in parts
+        for one in components
     ]
     head, *lines = _table([("component", "type", "state", "process", "restarts", "msg/s", ""), *rows])
-    return [_Line(head, _FAINT), *(_Line(line, _alarm(one)) for line, one in zip(lines, parts, strict=True))]
+    return [_Line(head, _FAINT), *(_Line(line, _alarm(one)) for line, one in zip(lines, components, strict=True))]
 
 
-def _alarm(part: Part) -> str:
-    if part.state in _FAILED:
+def _alarm(component: ComponentPicture) -> str:
+    if component.state in _FAILED:
         return _RED
-    return _YELLOW if part.state != "active" else _COLOURS[part.level or Level.OK]
+    return _YELLOW if component.state != "active" else _COLOURS[component.level or Level.OK]
 
 
 def _loads(loads: Sequence[Load]) -> list[_Line]:

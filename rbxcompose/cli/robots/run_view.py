@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from rbxcompose.cli.output.console import has_colour, refuse, tell
 from rbxcompose.cli.robots.live_reload import LiveReload
 from rbxcompose.cli.robots.lookup import ALREADY_UP, UNSAFE
-from rbxcompose.cli.robots.story import Story, summary
+from rbxcompose.cli.robots.story import StoryWriter, summary
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan, extent
 from rbxcompose.runtime.folder import RobotFolder
@@ -20,7 +20,7 @@ from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
 from rbxcompose.runtime.supervision.launch import (
     AlreadyUp,
     Begun,
-    Report,
+    LaunchReport,
     RunEnded,
     Started,
     Unsafe,
@@ -47,7 +47,7 @@ class _Watch:
     def __init__(self, plan: Plan, options: RunOptions, started: Started, reload: LiveReload | None) -> None:
         self._plan, self._options, self._started, self._reload = plan, options, started, reload
         self._is_up = False
-        self._story = Story([one.name for one in plan.instances], colour=has_colour(sys.stdout))
+        self._story = StoryWriter([one.name for one in plan.instances], colour=has_colour(sys.stdout))
         self._log: Follower | None = None  # none before the log of this run has begun
 
     def run(self) -> int:
@@ -82,7 +82,7 @@ class _Watch:
             if record.level is not Level.OK or not self._options.is_detached:
                 tell(self._story.line(record))
 
-    def _tell(self, report: Report) -> int | None:
+    def _tell(self, report: LaunchReport) -> int | None:
         """Tell a report and return the exit code if it is the last."""
         name = self._plan.robot
         match report:

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from rbxcompose.bus.graph import End, Graph, Name
-from rbxcompose.cli.bus.guest import Guest, Heard
+from rbxcompose.bus.graph import Graph, GraphEnd, GraphName
+from rbxcompose.cli.bus.guest import Guest, HeardMessage
 from rbxcompose.cli.missions.replicas import MissionsSeen
 from rbxcompose.cli.robots.lookup import known_state
-from rbxcompose.cli.robots.picture import MOST_WARNINGS, Load, Part, Picture, Tree
+from rbxcompose.cli.robots.picture import MOST_WARNINGS, ComponentPicture, Load, RobotPicture, Tree
 from rbxcompose.inspection.mission_text import running_lines
 from rbxcompose.levels import Level, level_of
 from rbxcompose.missions.view.mirror import ACTIVE, status_list
@@ -62,7 +62,7 @@ class Sampler:
         is_charged = self._charges.keys() >= self._gauges.keys() & self._listened
         return is_healthy and is_charged and (self._missions is None or self._missions.is_complete)
 
-    def sample(self) -> Picture | None:
+    def sample(self) -> RobotPicture | None:
         """Return how things are now, or None if the robot is down."""
         now, state = self._guest.clock.now(), known_state(self._folder)
         if state is None:
@@ -93,7 +93,7 @@ class Sampler:
         active = {name: seen for name, seen in self._missions.by_name.items() if seen["state"] in ACTIVE}
         return [_tree(name, seen) for name, seen in sorted(active.items())]
 
-    def _heard(self, topic: str, heard: Heard) -> None:
+    def _heard(self, topic: str, heard: HeardMessage) -> None:
         self._counts[heard.sender] += 1
         if topic == _HEALTH:
             self._healthy(heard)
@@ -101,7 +101,7 @@ class Sampler:
             charge = _charge(gauge, heard)
             self._charges |= {} if charge is None else {topic: charge}
 
-    def _healthy(self, heard: Heard) -> None:
+    def _healthy(self, heard: HeardMessage) -> None:
         if heard.kind.type != DiagnosticArray.TYPE:
             return
         try:
@@ -133,24 +133,24 @@ class Sampler:
         self._times = times
         return loads
 
-    def _picture(self, state: RobotState, rates: Mapping[str, float], loads: list[Load]) -> Picture:
+    def _picture(self, state: RobotState, rates: Mapping[str, float], loads: list[Load]) -> RobotPicture:
         leaves = {name.rpartition("/")[2]: one for name, one in self._statuses.items() if name.count("/") > 1}
         alive = state.alive()
-        parts = [_part(one, one.process in alive, rates, leaves.get(one.name)) for one in state.components]
-        missions = [one.message for one in parts if one.name == state.executive and one.message]
+        components = [_picture_of(one, one.process in alive, rates, leaves.get(one.name)) for one in state.components]
+        missions = [one.message for one in components if one.name == state.executive and one.message]
         batteries = [
             (name, f"{100 * self._charges[one.topic]:.1f} %")
             for name, one in state.batteries.items()
             if one.topic in self._charges
         ]
         groups = [one for one in self._statuses.values() if one.name.count("/") == 1]
-        return Picture(
+        return RobotPicture(
             robot=state.robot,
             is_supervised=state.is_supervised,
             router=state.router if "router" in alive or "router" not in state.processes else None,
             mission=missions[0] if missions else "",
             batteries=batteries,
-            parts=parts,
+            components=components,
             loads=loads,
             health=[(one.name.lstrip("/"), level_of(one.level), one.message) for one in groups],
             warnings=list(self._warnings),
@@ -158,15 +158,15 @@ class Sampler:
         )
 
 
-def _is_light(topic: Name) -> bool:
+def _is_light(topic: GraphName) -> bool:
     return all(end.qos is not None and end.qos.is_reliable and not end.qos.is_transient_local for end in topic.givers)
 
 
-def _component(end: End) -> str:
+def _component(end: GraphEnd) -> str:
     return end.node.rpartition("/")[2]
 
 
-def _charge(gauge: Gauge, heard: Heard) -> float | None:
+def _charge(gauge: Gauge, heard: HeardMessage) -> float | None:
     """Return the charge that a message tells (a ratio); None if it tells none."""
     try:
         message = decode(registry.message(heard.kind.type), heard.arrival.payload)
@@ -184,8 +184,10 @@ def _tree(name: str, seen: Mapping[str, Any]) -> Tree:
     return Tree(name, seen["state"], running_lines(picture, status_list(seen, picture.count), _WIDEST))
 
 
-def _part(one: ComponentState, is_alive: bool, rates: Mapping[str, float], told: DiagnosticStatus | None) -> Part:
-    return Part(
+def _picture_of(
+    one: ComponentState, is_alive: bool, rates: Mapping[str, float], told: DiagnosticStatus | None
+) -> ComponentPicture:
+    return ComponentPicture(
         one.name,
         one.type,
         one.state if is_alive else "dead",

@@ -16,7 +16,7 @@ _LEVELS = {Level.WARN: "\x1b[33m", Level.ERROR: "\x1b[1;31m", Level.STALE: "\x1b
 _SOURCES = ("\x1b[36m", "\x1b[32m", "\x1b[34m", "\x1b[96m", "\x1b[92m", "\x1b[94m")
 
 
-class Story:
+class StoryWriter:
     """Writes records as lines; the column of sources is as wide as the longest name that is to come."""
 
     def __init__(self, sources: Iterable[str], *, colour: bool) -> None:

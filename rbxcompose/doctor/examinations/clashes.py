@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.doctor.facts import Facts
+from rbxcompose.doctor.facts import HostFacts
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, kind
 from rbxcompose.printable import plain
@@ -23,7 +23,7 @@ Good: one type, in one version, at all ends: `rbxcompose msg show TYPE` prints i
 
 
 @examination
-def clashes(facts: Facts) -> Iterator[str | Finding]:
+def clashes(facts: HostFacts) -> Iterator[str | Finding]:
     """Compare types and hashes of all ends of each name."""
     for one in (one for one in facts.running if one.bus is not None):
         graph = one.bus.graph if one.bus else None

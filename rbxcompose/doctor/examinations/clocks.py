@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.doctor.facts import Facts
+from rbxcompose.doctor.facts import HostFacts
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
 
@@ -39,7 +39,7 @@ _HELP = "let a time server set it: timedatectl set-ntp true"
 
 
 @examination
-def clocks(facts: Facts) -> Iterator[str | Finding]:
+def clocks(facts: HostFacts) -> Iterator[str | Finding]:
     """Compare the wall clock with what must be, with the monotonic clock, and with the stamps of others."""
     clock = facts.clocks
     if clock.wall < clock.oldest:

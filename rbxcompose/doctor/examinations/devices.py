@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.doctor.facts import Facts
+from rbxcompose.doctor.facts import HostFacts
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, kind
 from rbxcompose.model.robot import Robot
@@ -30,31 +30,33 @@ Good: `port: /dev/serial/by-id/...`, and `sudo usermod -aG dialout $USER`
 
 
 @examination
-def devices(facts: Facts) -> Iterator[str | Finding]:
+def devices(facts: HostFacts) -> Iterator[str | Finding]:
     """Look whether each device is there and may be opened."""
-    named = {device: (robot, part) for robot in facts.robots for part, device in _named(robot)}
-    for device, (robot, part) in sorted(named.items()):
-        place = robot.part_span(part)
+    named = {device: (robot, component) for robot in facts.robots for component, device in _named(robot)}
+    for device, (robot, component) in sorted(named.items()):
+        place = robot.component_span(component)
         path, shown = Path(device), plain(device)
         if not path.exists():
             yield NO_DEVICE.at(
-                place, f"'{part}' names {shown}, which is not there", help="plug it in, or look below /dev"
+                place, f"'{component}' names {shown}, which is not there", help="plug it in, or look below /dev"
             )
         elif not path.is_char_device():
-            yield NO_DEVICE.at(place, f"'{part}' names {shown}, which is no device", help="look below /dev")
+            yield NO_DEVICE.at(place, f"'{component}' names {shown}, which is no device", help="look below /dev")
         elif not os.access(path, os.R_OK | os.W_OK):
             todo = f"sudo usermod -aG {_group(path)} $USER, then log in anew"
-            yield NO_DEVICE.at(place, f"'{part}' names {shown}, which this user may not open", help=todo)
+            yield NO_DEVICE.at(place, f"'{component}' names {shown}, which this user may not open", help=todo)
         else:
-            yield f"{shown} of '{part}' can be opened"
+            yield f"{shown} of '{component}' can be opened"
     if not named:
         yield "no component names a device"
 
 
 def _named(robot: Robot) -> Iterator[tuple[str, str]]:
-    for part in robot.parts.values():
-        for name in type(part.config).model_fields:
-            yield from ((part.name, text) for text in _texts(getattr(part.config, name)) if text.startswith(_PREFIX))
+    for component in robot.components.values():
+        for name in type(component.config).model_fields:
+            yield from (
+                (component.name, text) for text in _texts(getattr(component.config, name)) if text.startswith(_PREFIX)
+            )
 
 
 def _texts(value: Any) -> Iterator[str]:

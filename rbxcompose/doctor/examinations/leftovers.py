@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbxcompose.doctor.facts import Facts, Running
+from rbxcompose.doctor.facts import HostFacts, RunningRobot
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
@@ -27,7 +27,7 @@ _SUPERVISOR = "supervisor"
 
 
 @examination
-def leftovers(facts: Facts) -> Iterator[str | Finding]:
+def leftovers(facts: HostFacts) -> Iterator[str | Finding]:
     """Look for state without a supervisor, and for processes without one."""
     for one in facts.running:
         yield from _folder(one)
@@ -45,11 +45,11 @@ def leftovers(facts: Facts) -> Iterator[str | Finding]:
         yield "no process runs without a supervisor"
 
 
-def _still_runs(one: Running) -> bool:
+def _still_runs(one: RunningRobot) -> bool:
     return one.state is not None and not one.state.is_supervised and bool(one.state.alive())
 
 
-def _folder(one: Running) -> Iterator[str | Finding]:
+def _folder(one: RunningRobot) -> Iterator[str | Finding]:
     todo = f"rbxcompose down {one.name}"
     if one.state is None:
         yield LEFT.at(None, f"the state of '{one.name}' cannot be read: {one.problem}", help=todo)

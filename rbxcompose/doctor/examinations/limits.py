@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.doctor.facts import Facts
+from rbxcompose.doctor.facts import HostFacts
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
 
@@ -26,7 +26,7 @@ Good: `docker run --shm-size=256m`, `ulimit -n 4096`
 
 
 @examination
-def limits(facts: Facts) -> Iterator[str | Finding]:
+def limits(facts: HostFacts) -> Iterator[str | Finding]:
     """Tell the limits, and which are too low."""
     has = facts.limits
     if has.open_files is not None and has.open_files < FEWEST_FILES:

@@ -7,7 +7,7 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from rbxcompose.doctor.facts import Facts
+from rbxcompose.doctor.facts import HostFacts
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.files import project_of, shown_name
@@ -28,7 +28,7 @@ Good: `chmod 700 /run/user/1000/rbxcompose`, `chmod 600 secrets/token`
 
 
 @examination
-def permissions(facts: Facts) -> Iterator[str | Finding]:
+def permissions(facts: HostFacts) -> Iterator[str | Finding]:
     """Look at the folders of robots and at the secrets of their projects."""
     folders = [path for path in (facts.base, *(one.folder.path for one in facts.running)) if path.exists()]
     secrets = [path for folder in _secret_folders(facts) if folder.is_dir() for path in sorted(folder.iterdir())]
@@ -38,7 +38,7 @@ def permissions(facts: Facts) -> Iterator[str | Finding]:
         yield f"{len(folders)} folders of robots and {len(secrets)} secrets are this user's alone"
 
 
-def _secret_folders(facts: Facts) -> list[Path]:
+def _secret_folders(facts: HostFacts) -> list[Path]:
     files = (Path(robot.manifest.root.span.file) for robot in facts.robots)
     return list(dict.fromkeys(project_of(file) / FOLDER for file in files))
 

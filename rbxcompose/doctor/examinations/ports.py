@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.doctor.facts import Facts, Listener, Running
+from rbxcompose.doctor.facts import HostFacts, Listener, RunningRobot
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
-from rbxcompose.sections.bus import Bus
+from rbxcompose.sections.bus import BusModel
 
 PORT_TAKEN = kind(
     "RBX9402",
@@ -36,13 +36,13 @@ Good: `rbxcompose down`, then `rbxcompose up`
 
 
 @examination
-def ports(facts: Facts) -> Iterator[str | Finding]:
+def ports(facts: HostFacts) -> Iterator[str | Finding]:
     """Look at the routers of robots that are up, and at the port that the named robot wants."""
     for one in facts.running:
         yield from _router(one, facts)
     names = {one.name for one in facts.running}
     if facts.file is None:
-        wanted = [] if facts.running else [Bus().port]
+        wanted = [] if facts.running else [BusModel().port]
     else:
         bus = facts.file.manifest.bus
         wanted = [] if facts.file.manifest.name in names or bus.router else [bus.port]
@@ -57,7 +57,7 @@ def ports(facts: Facts) -> Iterator[str | Finding]:
         )
 
 
-def _router(one: Running, facts: Facts) -> Iterator[str | Finding]:
+def _router(one: RunningRobot, facts: HostFacts) -> Iterator[str | Finding]:
     if one.state is None or one.state.router is None or "router" not in one.state.processes:
         return  # it uses a router from elsewhere, or none is known
     if not one.state.is_supervised:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.doctor.facts import Facts, Version
+from rbxcompose.doctor.facts import HostFacts, Version
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
 
@@ -23,7 +23,7 @@ Good: `pip install -r requirements.lock`
 
 
 @examination
-def versions(facts: Facts) -> Iterator[str | Finding]:
+def versions(facts: HostFacts) -> Iterator[str | Finding]:
     """Compare what is installed with what is locked, if there is a lock."""
     wrong = [one for one in facts.versions if _is_wrong(one)]
     for one in wrong:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.bus.graph import Name
-from rbxcompose.doctor.facts import Facts, Running
+from rbxcompose.bus.graph import GraphName
+from rbxcompose.doctor.facts import HostFacts, RunningRobot
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
@@ -27,14 +27,14 @@ _MOST = 8  # names
 
 
 @examination
-def wires(facts: Facts) -> Iterator[str | Finding]:
+def wires(facts: HostFacts) -> Iterator[str | Finding]:
     """Tell which ends of wires are alone on the bus of each robot."""
     for one in facts.running:
         if one.bus is not None:
             yield from _of(one, [topic for topic in one.bus.graph.topics if not topic.is_hidden])
 
 
-def _of(one: Running, topics: list[Name]) -> Iterator[str | Finding]:
+def _of(one: RunningRobot, topics: list[GraphName]) -> Iterator[str | Finding]:
     ends = one.robot.ends if one.robot else ()
     open_inputs = {end.topic for end in ends if isinstance(end.port, In) and end.port.is_open}
     alone = [topic for topic in topics if topic.takers and not topic.givers and topic.name not in open_inputs]

@@ -1,7 +1,7 @@
 """The slips of manifests, one file each: in their text, and in values that a model refuses.
 
-Under `@value_slip(ERRORS)` stands a function of a `Refused` and the node there, which returns the node that was meant.
-It counts only if the model takes that.
+Under `@value_slip(ERRORS)` stands a function of a `RefusedValue` and the node there, which returns the node that was
+meant. It counts only if the model takes that.
 
 Under `@text_slip(WORDS)` stands a function of a `Trouble`. It has another shape, since it cannot repair anything: the
 parser has given up, and nobody knows what else stands in a text that it cannot read. Both return None for no slip.
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.parser_error import Trouble
-from rbxcompose.manifest.tree import Node, Path
+from rbxcompose.manifest.tree import KeyPath, TreeNode
 from rbxcompose.slips import Repair, Slips
 
 # What the parser says, in its words.
@@ -25,12 +25,12 @@ NO_KEY = "did not find expected key"
 ANY = ""
 
 
-class Refused(NamedTuple):
+class RefusedValue(NamedTuple):
     """A place at which a model objects: its path in the file, and what is said if that is no slip."""
 
-    path: Path
+    path: KeyPath
     finding: Finding
 
 
 text_slip: Slips[Callable[[Trouble], Finding | None]] = Slips(__name__)
-value_slip: Slips[Callable[[Refused, Node], Repair[Node] | None]] = Slips(__name__)
+value_slip: Slips[Callable[[RefusedValue, TreeNode], Repair[TreeNode] | None]] = Slips(__name__)

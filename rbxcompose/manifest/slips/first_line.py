@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rbxcompose.findings import Fix, replacement
-from rbxcompose.manifest.slips import Refused, value_slip
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.manifest.slips import RefusedValue, value_slip
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.slips import Repair
 
 KEY, VERSION = "rbx", "1"
 
 
 @value_slip("missing")
-def first_line(place: Refused, node: Node) -> Repair[Node] | None:
+def first_line(place: RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise it; there is a fix if the first key of the file is known, and begins its line."""
-    if place.path != (KEY,) or not isinstance(node, Mapping):
+    if place.path != (KEY,) or not isinstance(node, MappingNode):
         return None
     line = f"{KEY}: {VERSION}"
     first = next((entry.key for entry in node.entries.values() if entry.key.span[:3] == node.span[:3]), None)
@@ -24,6 +24,6 @@ def first_line(place: Refused, node: Node) -> Repair[Node] | None:
         edits = replacement(first.span, first.text, f"{line}\n{first.text}").edits
         fix = Fix(edits, True, f"'{line}' before '{first.text}'")
     help_text = f"write '{line}' in the first line: the version of the language"
-    right = Entry(Scalar(KEY, node.span), Scalar(VERSION, node.span))
+    right = Entry(ScalarNode(KEY, node.span), ScalarNode(VERSION, node.span))
     finding = replace(place.finding, help=help_text, fix=fix)
-    return Repair(Mapping({KEY: right, **node.entries}, node.span), (finding,))
+    return Repair(MappingNode({KEY: right, **node.entries}, node.span), (finding,))

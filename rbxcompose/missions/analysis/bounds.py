@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 from rbxcompose.expressions.tree import (
     Arithmetic,
-    Call,
     Comparison,
+    ExpressionNode,
     Flag,
+    FunctionCall,
     Junction,
     Minus,
-    Node,
     Not,
     Number,
     Variable,
@@ -36,7 +36,7 @@ _TURNED = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 _MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
 
-def truth(node: Node, known: Known) -> bool | None:
+def truth(node: ExpressionNode, known: Known) -> bool | None:
     """Return whether a condition holds whatever happens, never holds (False), or may do either (None)."""
     match node:
         case Flag(value=value):
@@ -63,7 +63,7 @@ def _compared(operator: str, left: Bounds, right: Bounds) -> bool | None:
     return None if not apart else operator == "!="
 
 
-def _joined(operands: tuple[Node, ...], known: Known, *, decides: bool) -> bool | None:
+def _joined(operands: tuple[ExpressionNode, ...], known: Known, *, decides: bool) -> bool | None:
     """Read from the left as it runs: an operand is asked only where those before it have not decided."""
     is_open = False
     for operand in operands:
@@ -75,7 +75,7 @@ def _joined(operands: tuple[Node, ...], known: Known, *, decides: bool) -> bool 
     return None if is_open else not decides
 
 
-def narrowed(known: Known, node: Node, *, holds: bool) -> Known:
+def narrowed(known: Known, node: ExpressionNode, *, holds: bool) -> Known:
     """Return what is known where a comparison of a `$name` holds, or does not."""
     if not isinstance(node, Comparison) or node.operator not in _TURNED:
         return known
@@ -91,7 +91,7 @@ def narrowed(known: Known, node: Node, *, holds: bool) -> Known:
     return {**known, name.name: Bounds(max(before.least, limit.least), before.most)}
 
 
-def bounds_of(node: Node, known: Known) -> Bounds:
+def bounds_of(node: ExpressionNode, known: Known) -> Bounds:
     """Return the bounds of a number; of anything else, that it can be anything."""
     match node:
         case Number(value=value):
@@ -103,7 +103,7 @@ def bounds_of(node: Node, known: Known) -> Bounds:
             return Bounds(-inner.most, -inner.least)
         case Arithmetic(operator=operator, left=left, right=right):
             return _computed(operator, bounds_of(left, known), bounds_of(right, known))
-        case Call(function="distance" | "age" | "count" | "abs"):
+        case FunctionCall(function="distance" | "age" | "count" | "abs"):
             return NOT_BELOW_ZERO
     return ANYTHING
 

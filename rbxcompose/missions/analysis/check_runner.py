@@ -7,7 +7,7 @@ import pkgutil
 from collections.abc import Callable, Iterable
 from functools import cache
 
-from rbxcompose.findings import Finding, Kind, Severity
+from rbxcompose.findings import Finding, FindingKind, Severity
 from rbxcompose.missions import checks as package
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.program import Program, RobotNames
@@ -20,7 +20,7 @@ _CHECKS: dict[str, MissionCheck] = {}
 
 
 def mission_check(
-    kind: str | Kind, severity: Severity = Severity.ERROR, *, is_fixable: bool = False
+    kind: str | FindingKind, severity: Severity = Severity.ERROR, *, is_fixable: bool = False
 ) -> Callable[[Find], MissionCheck]:
     """Declare a rule under its code; or under a kind of finding that reading a mission finds as well.
 
@@ -29,7 +29,7 @@ def mission_check(
     """
 
     def declare(find: Find) -> MissionCheck:
-        made = belonging(find, kind) if isinstance(kind, Kind) else declared(find, kind, severity, is_fixable)
+        made = belonging(find, kind) if isinstance(kind, FindingKind) else declared(find, kind, severity, is_fixable)
         if _CHECKS.setdefault(made.code, made) is not made:
             raise ValueError(f"two rules have the code {made.code}")
         return made

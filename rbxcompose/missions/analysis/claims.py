@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Span
-from rbxcompose.missions.program.program import Node, Program, RobotNames
+from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 
 
 def claims_of(program: Program, robot: RobotNames, within: tuple[str, ...] = ()) -> frozenset[str]:
@@ -14,7 +14,7 @@ def claims_of(program: Program, robot: RobotNames, within: tuple[str, ...] = ())
 
 
 def claims_below(
-    nodes: tuple[Node, ...], robot: RobotNames, within: tuple[str, ...] = ()
+    nodes: tuple[MissionNode, ...], robot: RobotNames, within: tuple[str, ...] = ()
 ) -> Iterator[tuple[str, Span]]:
     """Yield what nodes claim, each with its place; `within` are missions that are being looked at."""
     for node in nodes:

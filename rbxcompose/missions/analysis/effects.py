@@ -5,26 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from rbxcompose.missions.language.asked import Assignment
-from rbxcompose.missions.program.messages import Message
+from rbxcompose.missions.program.messages import MessageTemplate
 from rbxcompose.missions.program.moments import Deeds
-from rbxcompose.missions.program.program import Node, Program
+from rbxcompose.missions.program.program import MissionNode, Program
 
 
-def assignments(node: Node) -> Iterator[Assignment]:
+def assignments(node: MissionNode) -> Iterator[Assignment]:
     """Yield what a node sets."""
     yield from node.step.effects.assignments
     for deeds in _deeds(node):
         yield from deeds.assignments
 
 
-def published(node: Node) -> Iterator[Message]:
+def published(node: MissionNode) -> Iterator[MessageTemplate]:
     """Yield the messages that a node publishes."""
     if message := node.step.effects.published:
         yield message
     yield from (deeds.message for deeds in _deeds(node) if deeds.message)
 
 
-def called(node: Node) -> Iterator[Message]:
+def called(node: MissionNode) -> Iterator[MessageTemplate]:
     """Yield the request that a node makes."""
     if request := node.step.effects.called:
         yield request
@@ -48,7 +48,7 @@ def sent_by(programs: Iterable[Program]) -> tuple[set[str], set[str]]:
     return topics, {message.target.text for node in nodes for message in called(node)}
 
 
-def _deeds(node: Node) -> Iterator[Deeds]:
+def _deeds(node: MissionNode) -> Iterator[Deeds]:
     for modifier in node.modifiers.values():
         if modifier.moments:
             yield from modifier.moments.deeds.values()

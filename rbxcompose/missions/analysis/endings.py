@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import takewhile
 
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, FAILS, SUCCEEDS, Outcomes
-from rbxcompose.missions.program.program import END, Node, Program, RobotNames
+from rbxcompose.missions.program.program import END, MissionNode, Program, RobotNames
 
 
 class Ending:
@@ -23,7 +23,7 @@ class Ending:
             self._known[number] = self.inside_of(self.program.nodes[number])
         return self._known[number]
 
-    def inside_of(self, node: Node, key: str = "") -> Outcomes:
+    def inside_of(self, node: MissionNode, key: str = "") -> Outcomes:
         """Return how that may end which is inside of a modifier of a node; without one, the node itself."""
         found = node.step.may_end(node, self)
         for name in takewhile(lambda one: one != key, reversed(tuple(node.modifiers))):
@@ -47,7 +47,7 @@ class Ending:
             return ANY
         return Ending(program, self.robot, (*self.within, name)).mission()
 
-    def of_branches(self, node: Node) -> dict[str, Outcomes]:
+    def of_branches(self, node: MissionNode) -> dict[str, Outcomes]:
         """Return how each branch of a node may end, by its name."""
         names = node.step.branches.names if node.step.branches else ()
         return {name: self.of(child) for name, child in zip(names, node.children, strict=False)}

@@ -9,21 +9,21 @@ from rbxcompose.expressions.tree import (
     Arithmetic,
     Expression,
     ExpressionError,
-    Field,
+    ExpressionNode,
+    FieldAccess,
     Index,
     Number,
     Variable,
     Word,
     walk,
 )
-from rbxcompose.expressions.tree import Node as Tree
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.effects import written
 from rbxcompose.missions.language.spans import expression_of
 from rbxcompose.missions.program.answers import Skipped
-from rbxcompose.missions.program.program import Node, Program
+from rbxcompose.missions.program.program import MissionNode, Program
 
 Constants = Mapping[str, Value]  # what `$names` stand for throughout
 
@@ -39,7 +39,7 @@ def number_of(expression: Expression | None, constants: Constants) -> float | No
     return number_in(expression.tree, constants) if expression else None
 
 
-def number_in(tree: Tree, constants: Constants) -> float | None:
+def number_in(tree: ExpressionNode, constants: Constants) -> float | None:
     """Return the number that a part of an expression always gives, if it is that simple."""
     match tree:
         case Number(value=value):
@@ -61,10 +61,10 @@ def place_of(expression: Expression, constants: Constants, places: Mapping[str, 
     return None
 
 
-def goal_place(node: Node, main: str, constants: Constants, places: Mapping[str, Place]) -> Place | None:
+def goal_place(node: MissionNode, main: str, constants: Constants, places: Mapping[str, Place]) -> Place | None:
     """Return the place that a skill's main argument always is, if it is that simple."""
     for argument in node.step.arguments:
-        if argument.name in ("", main) and isinstance(argument.value, Scalar):
+        if argument.name in ("", main) and isinstance(argument.value, ScalarNode):
             try:
                 return place_of(expression_of(argument.value), constants, places)
             except ExpressionError:
@@ -72,7 +72,7 @@ def goal_place(node: Node, main: str, constants: Constants, places: Mapping[str,
     return None
 
 
-def items_of(node: Node, constants: Constants, places: Mapping[str, Place]) -> list[Place] | None:
+def items_of(node: MissionNode, constants: Constants, places: Mapping[str, Place]) -> list[Place] | None:
     """Return the places that a loop goes through, if that is all it does and they are written down."""
     items = node.step.items
     if items is None:
@@ -85,7 +85,7 @@ def items_of(node: Node, constants: Constants, places: Mapping[str, Place]) -> l
     return [place for place in found if place] if all(found) else None
 
 
-def never_skipped(program: Program, node: Node) -> bool:
+def never_skipped(program: Program, node: MissionNode) -> bool:
     """Tell whether a node is always done, so that its result is success or failure."""
     if node.may_be_left_out:
         return False
@@ -94,24 +94,24 @@ def never_skipped(program: Program, node: Node) -> bool:
     return node.step.skipped is Skipped.NEVER
 
 
-def is_simple(node: Node) -> bool:
+def is_simple(node: MissionNode) -> bool:
     """Tell whether the conditions of a node can always be asked."""
     # An item that is not there, or a division by zero, would be a failure.
     trees = (asked.expression.tree for asked in node.asked)
-    return not any(isinstance(part, Index | Field | Arithmetic) for tree in trees for part, _ in walk(tree))
+    return not any(isinstance(part, Index | FieldAccess | Arithmetic) for tree in trees for part, _ in walk(tree))
 
 
-def is_sure(node: Node, program: Program) -> bool:
+def is_sure(node: MissionNode, program: Program) -> bool:
     """Tell whether a node reads only what is there from the start, in ways that cannot go wrong."""
     read = {name.name for asked in node.asked for name in asked.expression.names}
     others = read - program.inputs.keys() - program.data.keys()
     if others and not others <= {one.item for one in program.nodes}:
         return False
     parts = (part for asked in node.asked for part, _ in walk(asked.expression.tree))
-    return not any(isinstance(part, Index | Field) or _divides(part) for part in parts)
+    return not any(isinstance(part, Index | FieldAccess) or _divides(part) for part in parts)
 
 
-def _divides(part: Tree) -> bool:
+def _divides(part: ExpressionNode) -> bool:
     return isinstance(part, Arithmetic) and part.operator == "/"
 
 
@@ -120,6 +120,6 @@ def takes_time(pause: Expression | None) -> bool:
     return pause is not None and not (isinstance(pause.tree, Number) and pause.tree.value == 0)
 
 
-def place_in_text(node: Node, expression: Expression | None) -> Span:
+def place_in_text(node: MissionNode, expression: Expression | None) -> Span:
     """Return where an expression of a node stands."""
     return next((asked.scalar.span for asked in node.asked if asked.expression is expression), node.span)

@@ -5,86 +5,83 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from rbxcompose.expressions.tree import Expression, Field, Index, Variable
-from rbxcompose.expressions.tree import Node as Tree
+from rbxcompose.expressions.tree import Expression, ExpressionNode, FieldAccess, Index, Variable
 from rbxcompose.expressions.values import Value
-from rbxcompose.manifest.tree import Mapping as LocatedMapping
-from rbxcompose.manifest.tree import Node as Located
-from rbxcompose.manifest.tree import Scalar, Sequence
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 
 ANY = None  # stands for any entry of a list or a map
 ITEM = ""  # stands for any item of a list that a loop goes through; of a map it goes through the keys
-Key = tuple[str, ...]  # where a node stands in the data: ("chores", "kitchen", "0")
-Pattern = tuple[str | None, ...]
+NodeKey = tuple[str, ...]  # where a node stands in the data: ("chores", "kitchen", "0")
+PathPattern = tuple[str | None, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class HeldNode:
     """A value that is a node of the mission; `text` is how it is shown."""
 
-    key: Key
+    key: NodeKey
     text: str
 
     def __str__(self) -> str:
         return self.text
 
 
-def pattern_of(expression: Expression, items: Mapping[str, Pattern]) -> Pattern | None:
+def pattern_of(expression: Expression, items: Mapping[str, PathPattern]) -> PathPattern | None:
     """Return where in the data an expression looks; `items` are the patterns of the loops' items. None: nowhere."""
     return _pattern(expression.tree, items)
 
 
-def _pattern(tree: Tree, items: Mapping[str, Pattern]) -> Pattern | None:
+def _pattern(tree: ExpressionNode, items: Mapping[str, PathPattern]) -> PathPattern | None:
     match tree:
         case Variable(name=name):
             return items.get(name, (name,))
         case Index(of=operand):
             inner = _pattern(operand, items)
             return None if inner is None else (*inner, ANY)
-        case Field(of=operand, name=name):
+        case FieldAccess(of=operand, name=name):
             inner = _pattern(operand, items)
             return None if inner is None else (*inner, name)
     return None
 
 
-def matching(data: Mapping[str, Located], pattern: Pattern) -> Iterator[tuple[Key, Located]]:
+def matching(data: Mapping[str, TreeNode], pattern: PathPattern) -> Iterator[tuple[NodeKey, TreeNode]]:
     """Yield what stands in the data at places of a pattern, with its key."""
     name = pattern[0] or ""
     if name in data:
         yield from _below((name,), data[name], pattern[1:])
 
 
-def _below(key: Key, node: Located, pattern: Pattern) -> Iterator[tuple[Key, Located]]:
+def _below(key: NodeKey, node: TreeNode, pattern: PathPattern) -> Iterator[tuple[NodeKey, TreeNode]]:
     if not pattern:
         yield key, node
         return
     first, rest = pattern[0], pattern[1:]
     for name, entry in _entries(node):
-        if first in (ANY, name) or (first == ITEM and isinstance(node, Sequence)):
+        if first in (ANY, name) or (first == ITEM and isinstance(node, SequenceNode)):
             yield from _below((*key, name), entry, rest)
 
 
-def _entries(node: Located) -> Iterator[tuple[str, Located]]:
-    if isinstance(node, LocatedMapping):
+def _entries(node: TreeNode) -> Iterator[tuple[str, TreeNode]]:
+    if isinstance(node, MappingNode):
         yield from ((name, entry.value) for name, entry in node.entries.items())
-    elif isinstance(node, Sequence):
+    elif isinstance(node, SequenceNode):
         yield from ((str(index), item) for index, item in enumerate(node.items))
 
 
-def brief(node: Located) -> str:
+def brief(node: TreeNode) -> str:
     """Return a node as people would say it: `mop 7 s`."""
     match node:
-        case Scalar(text=text):
+        case ScalarNode(text=text):
             return text
-        case LocatedMapping(entries=entries) if entries:
+        case MappingNode(entries=entries) if entries:
             name, entry = next(iter(entries.items()))
-            return f"{name} {brief(entry.value)}".strip() if isinstance(entry.value, Scalar) else name
-        case Sequence(items=items):
+            return f"{name} {brief(entry.value)}".strip() if isinstance(entry.value, ScalarNode) else name
+        case SequenceNode(items=items):
             return ", ".join(brief(item) for item in items[:3])
     return ""
 
 
-def with_held(value: Value, nodes: Mapping[Key, Located], key: Key) -> Value:
+def with_held(value: Value, nodes: Mapping[NodeKey, TreeNode], key: NodeKey) -> Value:
     """Return a value of the data, at this key, with `HeldNode`s where nodes stand."""
     if key in nodes:
         return HeldNode(key, brief(nodes[key]))

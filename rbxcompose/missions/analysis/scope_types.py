@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from rbxcompose.expressions.check import Problem, check_value
+from rbxcompose.expressions.check import ExpressionProblem, check_value
 from rbxcompose.expressions.tree import Expression, Word
 from rbxcompose.expressions.types import PLACE, POSE, TEXT, UNKNOWN, Type, TypeKind
-from rbxcompose.findings import Finding, Kind, Span, nearest, replacement
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.findings import Finding, FindingKind, Span, nearest, replacement
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.condition_watches import POSE as POSE_NAME
 from rbxcompose.missions.language.spans import inner_span
-from rbxcompose.missions.program.program import Node, Program, RobotNames
+from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 
 _MEASURED = (TypeKind.QUANTITY, TypeKind.COUNT, TypeKind.FLAG)  # what no place can be
 
@@ -49,7 +49,7 @@ class View:
 
     program: Program
     robot: RobotNames
-    node: Node
+    node: MissionNode
     scope: NodeScope
 
     @property
@@ -57,7 +57,7 @@ class View:
         """Tell whether the node, or any below it, takes time by itself."""
         return any(below.step.waits for below in self.program.below(self.node.number))
 
-    def typed(self, expression: Expression, wanted: Type, scalar: Scalar, kind: Kind) -> Iterator[Finding]:
+    def typed(self, expression: Expression, wanted: Type, scalar: ScalarNode, kind: FindingKind) -> Iterator[Finding]:
         """Yield what is wrong with an expression that must have the type `wanted`."""
         return findings_of(expression, wanted, scalar, self.scope, kind)
 
@@ -91,7 +91,7 @@ def views(program: Program, robot: RobotNames) -> Iterator[View]:
 
 
 def findings_of(
-    expression: Expression, wanted: Type, scalar: Scalar, scope: NodeScope, kind: Kind
+    expression: Expression, wanted: Type, scalar: ScalarNode, scope: NodeScope, kind: FindingKind
 ) -> Iterator[Finding]:
     """Yield what is wrong with an expression; what is neither a name nor a place is of the given kind."""
     for problem in check_value(expression, scope, wanted):
@@ -120,7 +120,7 @@ def findings_of(
             yield kind.at(span, problem.message, help=problem.help, fix=fix)
 
 
-def _no_text(word: str, span: Span, scope: NodeScope, kind: Kind) -> Finding:
+def _no_text(word: str, span: Span, scope: NodeScope, kind: FindingKind) -> Finding:
     """Return the finding about a bare word that stands for a text: a misspelt place, or one that needs quotes."""
     message = f"there is no place '{word}'"
     if near := nearest(word, scope.words()):
@@ -129,6 +129,6 @@ def _no_text(word: str, span: Span, scope: NodeScope, kind: Kind) -> Finding:
     return kind.at(span, message, help=f"a text needs quotes: write '\"{word}\"'", fix=fix)
 
 
-def _at(problem: Problem, names: Iterable[tuple[str, int]]) -> str:
+def _at(problem: ExpressionProblem, names: Iterable[tuple[str, int]]) -> str:
     """Return the name that stands exactly where a problem begins."""
     return next((name for name, start in names if start == problem.start), "")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from rbxcompose.missions.program.machines import States
-from rbxcompose.missions.program.program import Node, Program
+from rbxcompose.missions.program.machines import MachineStates
+from rbxcompose.missions.program.program import MissionNode, Program
 
 Leads = Mapping[str, frozenset[str]]  # the states and ends that each state leads to, by its name
 
 
-def transitions(program: Program) -> Iterator[tuple[States, list[Node], Leads]]:
+def transitions(program: Program) -> Iterator[tuple[MachineStates, list[MissionNode], Leads]]:
     """Yield each machine, its states in the order of the text, and where each leads to."""
     for node in program.nodes:
         if node.step.states:
@@ -43,5 +43,5 @@ def leading_to(goals: Iterable[str], leads: Leads) -> frozenset[str]:
     return frozenset(found)
 
 
-def _targets(state: Node) -> frozenset[str]:
+def _targets(state: MissionNode) -> frozenset[str]:
     return frozenset(state.step.leads_to.to.values() if state.step.leads_to else ())

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 from rbxcompose.config import Place
 from rbxcompose.missions.analysis.facts import Constants, goal_place, items_of, number_of
-from rbxcompose.missions.program.answers import Flow
-from rbxcompose.missions.program.program import ROOT, Node, Program
+from rbxcompose.missions.program.answers import NodeFlow
+from rbxcompose.missions.program.program import ROOT, MissionNode, Program
 
 MOST_STEPS = 2_000  # of a mission that are gone through; loops in loops would take for ever
 
@@ -30,7 +30,7 @@ class Driving:
 class TooShort:
     """A node that needs at least `needs` [s] and is given `given` [s]; between two places, if it is one drive."""
 
-    node: Node
+    node: MissionNode
     given: float
     needs: float
     leg: tuple[Place, Place] | None = None
@@ -66,22 +66,22 @@ class Ways:
             return (there if there is here else None), 0.0
         return there, 0.0 if node.is_forgiven else takes
 
-    def _inside(self, node: Node, here: Here, constants: Constants) -> tuple[Here, float]:
+    def _inside(self, node: MissionNode, here: Here, constants: Constants) -> tuple[Here, float]:
         if node.skill:
             return self._skill(node, here, constants)
         if not node.children:
             return here, number_of(node.step.lasts, constants) or 0.0
         match node.step.flow:
-            case Flow.IN_TURN:
+            case NodeFlow.IN_TURN:
                 return self._in_turn(node, here, constants)
-            case Flow.PER_ITEM:
+            case NodeFlow.PER_ITEM:
                 return self._loop(node, here, constants)
-            case Flow.ONE_OF:
+            case NodeFlow.ONE_OF:
                 for child in node.children:
                     self.go(child, None, constants)
         return None, 0.0
 
-    def _skill(self, node: Node, here: Here, constants: Constants) -> tuple[Here, float]:
+    def _skill(self, node: MissionNode, here: Here, constants: Constants) -> tuple[Here, float]:
         if node.skill != self.driving.skill:
             if here is not None:
                 self.starts_at[node.number] = here
@@ -99,14 +99,14 @@ class Ways:
         """Return the time that the straight way takes at full speed, from edge to edge of the tolerances [s]."""
         return max(0.0, distance(here, there) - 2 * self.driving.tolerance) / self.driving.speed
 
-    def _in_turn(self, node: Node, here: Here, constants: Constants) -> tuple[Here, float]:
+    def _in_turn(self, node: MissionNode, here: Here, constants: Constants) -> tuple[Here, float]:
         takes = 0.0
         for child in node.children:
             here, took = self.go(child, here, constants)
             takes += took
         return here, takes
 
-    def _loop(self, node: Node, here: Here, constants: Constants) -> tuple[Here, float]:
+    def _loop(self, node: MissionNode, here: Here, constants: Constants) -> tuple[Here, float]:
         items = items_of(node, constants, self.places)
         if items is None or not node.children:
             for child in node.children:

@@ -11,7 +11,7 @@ from rbxcompose.missions.analysis.endings import Ending
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.facts import never_skipped
 from rbxcompose.missions.program.outcomes import SUCCEEDS
-from rbxcompose.missions.program.program import Node, Program
+from rbxcompose.missions.program.program import MissionNode, Program
 
 
 @mission_check("RBX4125", Severity.WARNING)
@@ -48,7 +48,7 @@ def after_forever(mission: Examined) -> Iterator[Finding]:
             )
 
 
-def _barrier(program: Program, node: Node, ending: Ending) -> tuple[Node, Node, str] | None:
+def _barrier(program: Program, node: MissionNode, ending: Ending) -> tuple[MissionNode, MissionNode, str] | None:
     """Return the first step that none can follow, the step behind it, and why."""
     steps = [program.nodes[child] for child in node.children]
     for step, following in pairwise(steps) if node.step.goes_on_after else ():

@@ -10,7 +10,7 @@ from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.branches import ALL, Branches
 from rbxcompose.missions.program.outcomes import SUCCEEDS
-from rbxcompose.missions.program.program import Node
+from rbxcompose.missions.program.program import MissionNode
 
 
 @mission_check("RBX4138", Severity.WARNING)
@@ -64,7 +64,7 @@ def endless_branch(mission: Examined) -> Iterator[Finding]:
             )
 
 
-def _most_wanted(node: Node, branches: Branches) -> float:
+def _most_wanted(node: MissionNode, branches: Branches) -> float:
     """Return how many branches must succeed, as far as that is written down; else none."""
     if branches.succeed_when == ALL:
         return len(node.children)

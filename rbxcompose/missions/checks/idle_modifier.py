@@ -8,9 +8,9 @@ from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.facts import place_in_text
-from rbxcompose.missions.program.answers import Serves
+from rbxcompose.missions.program.answers import ModifierScope
 from rbxcompose.missions.program.outcomes import FAILS
-from rbxcompose.missions.program.program import CONTINUE, Node, Program
+from rbxcompose.missions.program.program import CONTINUE, MissionNode, Program
 
 
 @mission_check("RBX4127", Severity.WARNING)
@@ -37,13 +37,13 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
     """
     for node in mission.program.nodes:
         for key, modifier in node.modifiers.items():
-            if modifier.serves is Serves.FAILING and not mission.ending.inside_of(node, key).counting_as(FAILS):
+            if modifier.serves is ModifierScope.FAILING and not mission.ending.inside_of(node, key).counting_as(FAILS):
                 yield idle_modifier.at(
                     place_in_text(node, modifier.value),
                     f"'{key}' changes nothing here: '{node.step.word}' cannot fail",
                     help="it belongs to the step that can fail",
                 )
-            if modifier.serves is Serves.REPEATED and not _comes_again(mission.program, node):
+            if modifier.serves is ModifierScope.REPEATED and not _comes_again(mission.program, node):
                 yield idle_modifier.at(
                     node.span,
                     f"'{key}' changes nothing here: this step is done only once anyway",
@@ -51,7 +51,7 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
                 )
 
 
-def _comes_again(program: Program, node: Node) -> bool:
+def _comes_again(program: Program, node: MissionNode) -> bool:
     """Tell whether anything in the mission can start a node a second time."""
     if any(one.afterwards != CONTINUE for one in program.interrupts):
         return True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.expressions.tree import Comparison, Node, Variable, Word, walk
+from rbxcompose.expressions.tree import Comparison, ExpressionNode, Variable, Word, walk
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
@@ -74,7 +74,7 @@ def impossible_result(mission: Examined) -> Iterator[Finding]:
                     )
 
 
-def _compared(tree: Node) -> tuple[str, str] | None:
+def _compared(tree: ExpressionNode) -> tuple[str, str] | None:
     """Return the name and the word that a comparison is of."""
     match tree:
         case Comparison(operator="==", left=Variable(name=name), right=Word(name=word)):

@@ -11,7 +11,7 @@ from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.codes import NAME_CLASH
 from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.program.look import Form
-from rbxcompose.missions.program.program import Node, Program, RobotNames
+from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 from rbxcompose.missions.program.registry import kinds
 
 
@@ -37,7 +37,7 @@ def _declared(program: Program, robot: RobotNames) -> Iterator[Finding]:
         yield NAME_CLASH.at(program.data[name].span, f"'{name}' is an input and a datum", related=related)
 
 
-def _of_node(node: Node, program: Program, robot: RobotNames) -> Iterator[Finding]:
+def _of_node(node: MissionNode, program: Program, robot: RobotNames) -> Iterator[Finding]:
     if node.name in robot.skills and node.step.look.form is not Form.STATE:
         yield NAME_CLASH.at(node.span, f"a node cannot be named like the skill '{node.name}'")
     saved = node.saved
@@ -45,7 +45,7 @@ def _of_node(node: Node, program: Program, robot: RobotNames) -> Iterator[Findin
         yield NAME_CLASH.at(saved.span, f"'{saved.text}' is taken: choose another name for what is kept")
 
 
-def _branches(node: Node, program: Program, robot: RobotNames) -> Iterator[Finding]:
+def _branches(node: MissionNode, program: Program, robot: RobotNames) -> Iterator[Finding]:
     names = node.step.branches.names if node.step.branches else ()
     for branch, child in zip(names, node.children, strict=False):
         if branch in kinds() or branch in robot.skills:

@@ -10,7 +10,7 @@ from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.look import Form
 from rbxcompose.missions.program.machines import Next
 from rbxcompose.missions.program.outcomes import FAILS, Outcomes
-from rbxcompose.missions.program.program import Node
+from rbxcompose.missions.program.program import MissionNode
 
 ONE_WORD = "write 'next' as a map with 'success' and 'failure'"
 
@@ -54,7 +54,7 @@ def open_outcome(mission: Examined) -> Iterator[Finding]:
             yield from _open(node, node.step.leads_to, mission.ending.of(node.number))
 
 
-def _open(state: Node, leads_to: Next | None, ends: Outcomes) -> Iterator[Finding]:
+def _open(state: MissionNode, leads_to: Next | None, ends: Outcomes) -> Iterator[Finding]:
     if leads_to is None:
         if ends.words:
             message = f"the state '{state.name}' needs 'next': where it leads to"

@@ -8,7 +8,7 @@ from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.transitions import leading_to, reached, transitions
-from rbxcompose.missions.program.program import Node
+from rbxcompose.missions.program.program import MissionNode
 
 
 @mission_check("RBX4133", Severity.WARNING)
@@ -66,5 +66,5 @@ def trapped_state(mission: Examined) -> Iterator[Finding]:
                 )
 
 
-def _is_endless(state: Node) -> bool:
+def _is_endless(state: MissionNode) -> bool:
     return state.step.leads_to is None

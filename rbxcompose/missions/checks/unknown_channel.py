@@ -8,7 +8,7 @@ from rbxcompose.findings import Finding
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import called, published
 from rbxcompose.missions.analysis.examined import Examined
-from rbxcompose.missions.program.messages import Message
+from rbxcompose.missions.program.messages import MessageTemplate
 
 
 @mission_check("RBX4150", is_fixable=True)
@@ -40,7 +40,7 @@ def unknown_channel(mission: Examined) -> Iterator[Finding]:
             yield from _nowhere(message, "service", mission.robot.services)
 
 
-def _nowhere(message: Message, what: str, known: Mapping[str, str]) -> Iterator[Finding]:
+def _nowhere(message: MessageTemplate, what: str, known: Mapping[str, str]) -> Iterator[Finding]:
     name = message.target.text
     if name and name not in known:
         told = f"the robot has no {what} '{name}'"

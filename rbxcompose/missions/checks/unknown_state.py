@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from rbxcompose.findings import Finding
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
-from rbxcompose.missions.program.machines import States
-from rbxcompose.missions.program.program import Node
+from rbxcompose.missions.program.machines import MachineStates
+from rbxcompose.missions.program.program import MissionNode
 
 
 @mission_check("RBX4140", is_fixable=True)
@@ -52,13 +52,13 @@ def unknown_state(mission: Examined) -> Iterator[Finding]:
                 yield from _targets(mission.program.nodes[child], node.step.states)
 
 
-def _start(machine: States) -> Iterator[Finding]:
+def _start(machine: MachineStates) -> Iterator[Finding]:
     if machine.start_span and machine.names and machine.start not in machine.names:
         message, what = f"there is no state '{machine.start}'", "states of this machine"
         yield unknown_state.misspelt(machine.start_span, message, machine.start, machine.names, what)
 
 
-def _targets(state: Node, machine: States) -> Iterator[Finding]:
+def _targets(state: MissionNode, machine: MachineStates) -> Iterator[Finding]:
     leads_to = state.step.leads_to
     known = (*machine.names, *machine.ends)
     if leads_to is None:

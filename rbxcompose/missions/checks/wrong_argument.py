@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.findings import Finding
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.language.argument_types import check_written
-from rbxcompose.missions.language.asked import Argument
+from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.program.program import Skill
 
 STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
@@ -57,7 +57,7 @@ def _missing(view: View, skill: Skill) -> Iterator[Finding]:
         yield wrong_argument.at(view.node.span, message, help=help_text)
 
 
-def _argument(view: View, skill: Skill, argument: Argument) -> Iterator[Finding]:
+def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[Finding]:
     name = argument.name or skill.main
     if not name:
         yield wrong_argument.at(argument.span, f"the skill '{skill.name}' takes no single value")
@@ -66,7 +66,7 @@ def _argument(view: View, skill: Skill, argument: Argument) -> Iterator[Finding]
         taken = {one.name for one in view.node.step.arguments}
         arguments = skill.arguments
         yield wrong_argument.misspelt(argument.span, message, name, arguments, "its arguments", taken=taken)
-    elif isinstance(argument.value, Scalar):
+    elif isinstance(argument.value, ScalarNode):
         if argument.value.plain and not argument.value.text:
             yield wrong_argument.at(argument.span, f"the argument '{name}' of '{skill.name}' has no value")
         else:

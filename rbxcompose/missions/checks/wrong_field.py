@@ -12,11 +12,10 @@ from rbxcompose.missions.analysis.effects import called, published
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.language.argument_types import check_written
-from rbxcompose.missions.program.messages import Message, Shape, Written
+from rbxcompose.missions.program.messages import MessageTemplate, TemplateShape, WrittenValue
 from rbxcompose.msgs import registry
-from rbxcompose.msgs.definitions import Shape as Single
-from rbxcompose.msgs.definitions import parse_type
-from rbxcompose.msgs.types import Message as RosMessage
+from rbxcompose.msgs.definitions import FieldShape, parse_type
+from rbxcompose.msgs.types import Message
 
 FITTING = {  # the types of expressions that fit a field, by its ROS type; all others are numbers
     "bool": (TypeKind.FLAG,),
@@ -63,7 +62,7 @@ def wrong_field(mission: Examined) -> Iterator[Finding]:
                 yield from _check_body(view, message, registry.service(services[message.target.text]).Request)
 
 
-def _check_body(view: View, message: Message, ros: type[RosMessage]) -> Iterator[Finding]:
+def _check_body(view: View, message: MessageTemplate, ros: type[Message]) -> Iterator[Finding]:
     body = message.body
     if body is None:
         return
@@ -79,8 +78,8 @@ def _check_body(view: View, message: Message, ros: type[RosMessage]) -> Iterator
 
 def _check_fields(
     view: View,
-    body: Mapping[str, Shape],
-    ros: type[RosMessage],
+    body: Mapping[str, TemplateShape],
+    ros: type[Message],
     keys: Mapping[tuple[str, ...], Span],
     path: tuple[str, ...] = (),
 ) -> Iterator[Finding]:
@@ -96,22 +95,22 @@ def _check_fields(
             yield from _check_value(view, shape, ros.FIELDS[name], span)
 
 
-def _check_value(view: View, shape: Shape, ros_type: str, span: Span) -> Iterator[Finding]:
+def _check_value(view: View, shape: TemplateShape, ros_type: str, span: Span) -> Iterator[Finding]:
     field = parse_type(ros_type)
     if isinstance(shape, Mapping):
         yield wrong_field.at(span, f"a map does not fit the type {ros_type}")
-    elif isinstance(shape, Written) and (field.shape is Single.SINGLE or field.base in BYTES):
+    elif isinstance(shape, WrittenValue) and (field.shape is FieldShape.SINGLE or field.base in BYTES):
         yield from _check_written(view, shape, field.base, ros_type)
-    elif isinstance(shape, Written):
+    elif isinstance(shape, WrittenValue):
         yield from _check_list(view, shape, ros_type)
-    elif field.shape is Single.SINGLE:
+    elif field.shape is FieldShape.SINGLE:
         yield wrong_field.at(_span_of(shape) or span, f"a list does not fit the type {ros_type}")
     else:
         for item in shape if not field.is_message else ():
             yield from _check_value(view, item, field.base, span)
 
 
-def _check_list(view: View, shape: Written, ros_type: str) -> Iterator[Finding]:
+def _check_list(view: View, shape: WrittenValue, ros_type: str) -> Iterator[Finding]:
     """Yield a single value where a list must be; a name may stand for one."""
     found = check(shape.expression, view.scope)[0].kind if shape.expression else TypeKind.TEXT
     if found not in (TypeKind.LIST, TypeKind.UNKNOWN):
@@ -119,7 +118,7 @@ def _check_list(view: View, shape: Written, ros_type: str) -> Iterator[Finding]:
         yield wrong_field.at(shape.scalar.span, f"this must be a list, {ros_type}", help=help_text)
 
 
-def _check_written(view: View, shape: Written, base: str, ros_type: str) -> Iterator[Finding]:
+def _check_written(view: View, shape: WrittenValue, base: str, ros_type: str) -> Iterator[Finding]:
     if base == "string":
         yield from check_written(view, shape.scalar, TEXT, wrong_field)
     elif shape.expression is None:
@@ -132,10 +131,10 @@ def _check_written(view: View, shape: Written, base: str, ros_type: str) -> Iter
             yield wrong_field.at(shape.scalar.span, f"this must be of the type {ros_type}; it is {given.phrase}")
 
 
-def _span_of(shape: Shape) -> Span | None:
+def _span_of(shape: TemplateShape) -> Span | None:
     """Return the place of a value, or of the first one of a list."""
     match shape:
-        case Written(scalar=scalar):
+        case WrittenValue(scalar=scalar):
             return scalar.span
         case (first, *_):
             return _span_of(first)

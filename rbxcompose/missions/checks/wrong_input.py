@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Finding
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.scope_types import View
@@ -31,7 +31,7 @@ def _given(view: View, name: str, program: Program) -> Iterator[Finding]:
         if argument.name not in inputs:
             message = f"the mission '{name}' has no input '{argument.name}'"
             yield WRONG_INPUT.misspelt(argument.span, message, argument.name, inputs, "its inputs")
-        elif isinstance(argument.value, Scalar):
+        elif isinstance(argument.value, ScalarNode):
             yield from check_written(view, argument.value, inputs[argument.name].type, WRONG_INPUT)
 
 

@@ -5,7 +5,7 @@ Those that need the whole mission are rules, in `missions/checks`.
 
 from __future__ import annotations
 
-from rbxcompose.missions.codes.missing import MISSING
+from rbxcompose.missions.codes.missing_key import MISSING
 from rbxcompose.missions.codes.name_clash import NAME_CLASH
 from rbxcompose.missions.codes.no_expression import NO_EXPRESSION
 from rbxcompose.missions.codes.not_a_choice import NOT_A_CHOICE

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 from rbxcompose.missions.engine.engine_base import EngineBase
 from rbxcompose.missions.engine.leaf import Leaf
-from rbxcompose.missions.engine.observers import Branch, Named, Observed, Since
+from rbxcompose.missions.engine.observers import Branch, NamedObserver, Observed, Since
 from rbxcompose.missions.engine.run import Run
 from rbxcompose.missions.engine.scopes import ItemScope, MissionScope, SinceScope, new_names
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.modifiers.registry import decorator_of
 from rbxcompose.missions.program.history import WithHistory
-from rbxcompose.missions.program.program import Node, Program, RobotNames
+from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 from rbxcompose.missions.program.registry import task_of
 
 
@@ -56,7 +56,7 @@ class Builder:
             task = self._kept(decorator_of(modifier, site, task))
         return self._around(site, since, task, branch)
 
-    def _below(self, node: Node, run: Run, scope: MissionScope) -> Iterator[Task]:
+    def _below(self, node: MissionNode, run: Run, scope: MissionScope) -> Iterator[Task]:
         names = node.step.branches.names if node.step.branches else ()
         for child, branch in zip(node.children, names or ("",) * len(node.children), strict=True):
             yield self.build(child, run, scope, branch)
@@ -75,7 +75,7 @@ class Builder:
         if since:
             task = self._kept(Since(site, since, task))
         if node.name:
-            task = self._kept(Named(site, node.name, task))
+            task = self._kept(NamedObserver(site, node.name, task))
         elif branch:
             task = self._kept(Branch(site, branch, task))
         if self.engine.settings.observer:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.tree import Expression, Field, Index, Node, Variable
+from rbxcompose.expressions.tree import Expression, ExpressionNode, FieldAccess, Index, Variable
 from rbxcompose.expressions.values import Value, is_same
 from rbxcompose.missions.engine.scopes import MissionScope
 from rbxcompose.missions.program.results import NodeFailed
 
 
-def without(target: Node, item: Value, data: dict[str, Value], scope: MissionScope) -> None:
+def without(target: ExpressionNode, item: Value, data: dict[str, Value], scope: MissionScope) -> None:
     """Take an item out of the list (the first that is equal) or map (its key) that an expression names in the data.
 
     Raises:
@@ -22,11 +22,11 @@ def without(target: Node, item: Value, data: dict[str, Value], scope: MissionSco
     data[str(name)] = _removed(data[str(name)], path[1:], item)
 
 
-def _path(tree: Node, scope: MissionScope) -> list[Value]:
+def _path(tree: ExpressionNode, scope: MissionScope) -> list[Value]:
     match tree:
         case Variable(name=name):
             return [name]
-        case Field(of=of, name=name):
+        case FieldAccess(of=of, name=name):
             return [*_path(of, scope), name]
         case Index(of=of, index=index):
             return [*_path(of, scope), evaluate(Expression("", index), scope)]

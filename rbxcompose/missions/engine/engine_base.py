@@ -7,7 +7,7 @@ from typing import Protocol
 
 from rbxcompose.missions.engine.condition_watches import Watched
 from rbxcompose.missions.engine.events import MissionEvent
-from rbxcompose.missions.engine.resume_points import Places
+from rbxcompose.missions.engine.resume_points import ResumePoints
 from rbxcompose.missions.engine.world import Settings, World
 from rbxcompose.missions.program.program import Program, RobotNames, Target
 from rbxcompose.missions.program.results import Result
@@ -16,7 +16,7 @@ from rbxcompose.missions.program.statuses import IDLE
 ROUNDING = 1e-6  # [s] by which a deadline may seem to lie ahead when it has come
 
 
-class Source(Protocol):
+class TickSource(Protocol):
     """Who may want another tick."""
 
     @property
@@ -42,20 +42,20 @@ class EngineBase:
         self.cut_short: list[int] = []  # leaves that were halted by the latest suspension
         self.restarting: tuple[Target, ...] = ()  # what begins anew after the suspension that is going on
         self.is_aborting = False  # the mission as a whole is ended from outside
-        self.places = Places()
+        self.places = ResumePoints()
         self.reasons: dict[int, str] = {}  # why a node failed the last time
         self.draws = 0  # of chance so far
         self.arrived: list[tuple[int, Result]] = []
         self.wake: float | None = None
         self.reading: set[str] = set()
-        self.wants_again: Source | None = None  # who wants another tick at this instant
+        self.wants_again: TickSource | None = None  # who wants another tick at this instant
 
     @property
     def unpaused(self) -> float:
         """Return robot time without the pauses of the mission [s]; unlike `time` it goes on during interrupts."""
         return self.now - self.lost
 
-    def again(self, by: Source) -> None:
+    def again(self, by: TickSource) -> None:
         """Ask for another tick at this instant."""
         self.wants_again = by
 

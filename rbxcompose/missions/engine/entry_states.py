@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.missions.program.program import Node, Program
+from rbxcompose.missions.program.program import MissionNode, Program
 
 
 class NoSuchState(LookupError):  # noqa: N818 - told to who names the state
@@ -35,11 +35,11 @@ def start_at(program: Program, path: str) -> dict[int, str]:
     return found
 
 
-def _states(machine: Node) -> tuple[str, ...]:
+def _states(machine: MissionNode) -> tuple[str, ...]:
     return machine.step.states.names if machine.step.states else ()
 
 
-def _outermost(program: Program, number: int) -> Iterator[Node]:
+def _outermost(program: Program, number: int) -> Iterator[MissionNode]:
     """Yield the machines below a node, but for those inside others."""
     node = program.nodes[number]
     if node.step.states:

@@ -10,7 +10,7 @@ from rbxcompose.config import Place
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Finding, Span
-from rbxcompose.manifest.tree import NOWHERE, Entry, Scalar
+from rbxcompose.manifest.tree import NOWHERE, Entry, ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.header import range_trouble
 from rbxcompose.missions.language.literals import WrongValue, typed
@@ -21,7 +21,7 @@ def bind_texts(
     program: Program, given: Mapping[str, str], known: Mapping[str, Value], places: Mapping[str, Place]
 ) -> tuple[dict[str, Value], list[Finding]]:
     """Return the values of all inputs when some are given as text, laid over `known` ones; and what is wrong."""
-    entries = {name: Entry(Scalar(name, NOWHERE), Scalar(text, NOWHERE)) for name, text in given.items()}
+    entries = {name: Entry(ScalarNode(name, NOWHERE), ScalarNode(text, NOWHERE)) for name, text in given.items()}
     asked = {name: one for name, one in program.inputs.items() if name in given or name not in known}
     values, findings = bind_inputs(replace(program, inputs=asked), entries, places, NOWHERE)
     return {**known, **values}, findings

@@ -9,17 +9,17 @@ from rbxcompose.expressions.values import Value
 from rbxcompose.missions.engine.events import Logged, Published
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.language.asked import Assignment
-from rbxcompose.missions.program.messages import Message, Shape
+from rbxcompose.missions.program.messages import MessageTemplate, TemplateShape
 from rbxcompose.missions.program.moments import Deeds, Moments
 from rbxcompose.missions.program.results import NodeFailed
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import parse_type
-from rbxcompose.msgs.types import Message as RosMessage
+from rbxcompose.msgs.types import Message
 
 TEXT = "string"
 
 
-def fields_of(sent: Message, message: type[RosMessage], task: Task) -> dict[str, Value]:
+def fields_of(sent: MessageTemplate, message: type[Message], task: Task) -> dict[str, Value]:
     """Return the fields by name, nested ones as maps; a single value stands for the only field.
 
     Raises:
@@ -35,7 +35,7 @@ def fields_of(sent: Message, message: type[RosMessage], task: Task) -> dict[str,
     return _fields(body, message, task)
 
 
-def _fields(body: Mapping[str, Shape], message: type[RosMessage], task: Task) -> dict[str, Value]:
+def _fields(body: Mapping[str, TemplateShape], message: type[Message], task: Task) -> dict[str, Value]:
     found: dict[str, Value] = {}
     for name, shape in body.items():
         if name not in message.FIELDS:
@@ -44,7 +44,7 @@ def _fields(body: Mapping[str, Shape], message: type[RosMessage], task: Task) ->
     return found
 
 
-def _value(shape: Shape, ros_type: str, task: Task) -> Value:
+def _value(shape: TemplateShape, ros_type: str, task: Task) -> Value:
     base = parse_type(ros_type).base
     if isinstance(shape, Mapping):
         return _fields(shape, registry.message(base), task)
@@ -57,7 +57,7 @@ def _value(shape: Shape, ros_type: str, task: Task) -> Value:
     return evaluate(shape.expression, task.scope)
 
 
-def publish(message: Message, task: Task) -> None:
+def publish(message: MessageTemplate, task: Task) -> None:
     """Publish a message; raises what its expressions raise, and ValueError if a field does not fit."""
     topic = message.target.text
     fields = fields_of(message, registry.message(task.engine.robot.topics[topic]), task)

@@ -24,18 +24,18 @@ BEGIN, TICK, PAUSE, RESUME, ABORT = "begin", "tick", "pause", "resume", "abort"
 INPUTS = frozenset({BEGIN, TICK, PAUSE, RESUME, ABORT})
 
 V = TypeVar("V")
-Record = dict[str, Any]
-Write = Callable[[Record], None]
+LogRecord = dict[str, Any]
+Write = Callable[[LogRecord], None]
 _CAPITAL = re.compile(r"(?<!^)(?=[A-Z])")
 
 
-def record_of(event: MissionEvent) -> Record:
+def record_of(event: MissionEvent) -> LogRecord:
     """Return what an engine said as a record: `SkillStarted` is `skill_started`."""
     name = _CAPITAL.sub("_", type(event).__name__).lower()
     return {"event": name, **{one.name: to_plain(getattr(event, one.name)) for one in fields(event)}}
 
 
-class Logged:
+class LoggedWorld:
     """A world of which all that is read is written down, around the real one; records of ticks hold what is new."""
 
     def __init__(self, world: World, write: Write) -> None:
@@ -56,7 +56,7 @@ class Logged:
 
     def did(self, what: str) -> None:
         """Write down that something was done with the engine, and what it has read for it."""
-        record: Record = {"event": what}
+        record: LogRecord = {"event": what}
         if self._read:
             record["read"], self._read = self._read, {}
         if self._results:
@@ -127,7 +127,7 @@ class Played:
     """The world of a replay: it answers as it did, and writes down what is said."""
 
     def __init__(self) -> None:
-        self.said: list[Record] = []
+        self.said: list[LogRecord] = []
         self.time = 0.0
         self._known: dict[str, Any] = {}
         self._raised: list[Any] = []
@@ -180,7 +180,7 @@ class Played:
         self.said.append({"time": self.time, **record_of(event)})
 
 
-def replay(records: Iterable[Record], program: Program, robot: RobotNames) -> list[Record]:
+def replay(records: Iterable[LogRecord], program: Program, robot: RobotNames) -> list[LogRecord]:
     """Run a mission again from its log, and return what it says; that is what it said then, if nothing was changed.
 
     Raises:

@@ -78,7 +78,7 @@ class Around(Decorator):
         return "halted" if status == IDLE else self.engine.outcome or NAMES[status]
 
 
-class Named(Around):
+class NamedObserver(Around):
     """Says when a node with a name, or a state, starts and ends."""
 
     __slots__ = ("is_state", "name")

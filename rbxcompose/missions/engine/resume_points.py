@@ -8,28 +8,28 @@ NO_HISTORY, LAST, DEEP = "none", "last", "deep"
 HISTORIES = (NO_HISTORY, LAST, DEEP)  # the default first
 
 
-class Placed(Protocol):
+class ResumableTask(Protocol):
     """A task, as far as places know it."""
 
     number: int
 
 
-class Places:
+class ResumePoints:
     """The tasks that will start again where they were.
 
     A task keeps its place if it has a history, or if one around it that is `deep` is being halted.
     """
 
     def __init__(self) -> None:
-        self.kept: set[Placed] = set()
+        self.kept: set[ResumableTask] = set()
         self.is_deep = False
 
-    def leave(self, task: Placed) -> None:
+    def leave(self, task: ResumableTask) -> None:
         """Note that a task is being halted."""
         if self.is_deep:
             self.kept.add(task)
 
-    def take_up(self, task: Placed) -> bool:
+    def take_up(self, task: ResumableTask) -> bool:
         """Tell whether a task that starts has a place to start at; it is told once."""
         if task in self.kept:
             self.kept.remove(task)

@@ -10,7 +10,7 @@ from rbxcompose.expressions.types import Type
 from rbxcompose.expressions.values import Value
 from rbxcompose.missions.engine import value_text
 from rbxcompose.missions.engine.engine_base import EngineBase
-from rbxcompose.missions.engine.resume_points import Placed
+from rbxcompose.missions.engine.resume_points import ResumableTask
 from rbxcompose.missions.engine.scopes import MissionScope, RunScope
 from rbxcompose.missions.program.program import Program, RobotNames
 
@@ -70,5 +70,5 @@ class RunBase(ABC):
         """Stop the leaves that run, and keep the place."""
 
     @abstractmethod
-    def main_tasks(self) -> Iterable[Placed]:
+    def main_tasks(self) -> Iterable[ResumableTask]:
         """Return the tasks of the main node that can keep a place."""

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from rbxcompose.config import Place
-from rbxcompose.expressions.tree import Call, Expression, Variable, walk
+from rbxcompose.expressions.tree import Expression, FunctionCall, Variable, walk
 from rbxcompose.expressions.values import NotArrived, Value
 
 
-class Values(Protocol):
+class RobotValues(Protocol):
     """The robot's values, as the world knows them."""
 
     def value(self, name: str, /) -> Value | NotArrived:
@@ -54,7 +54,7 @@ class RunScope:
     """What all of a mission sees; `data` is its own, and written by `set`."""
 
     def __init__(
-        self, data: dict[str, Value], inputs: Mapping[str, Value], places: Mapping[str, Place], values: Values
+        self, data: dict[str, Value], inputs: Mapping[str, Value], places: Mapping[str, Place], values: RobotValues
     ) -> None:
         self.data = data
         self._inputs = inputs
@@ -147,5 +147,5 @@ def new_names(expression: Expression) -> frozenset[str]:
     """Return the names about which an expression asks `new($x)`."""
     if not any(call.name == "new" for call in expression.calls):
         return frozenset()
-    calls = (node for node, _ in walk(expression.tree) if isinstance(node, Call) and node.function == "new")
+    calls = (node for node, _ in walk(expression.tree) if isinstance(node, FunctionCall) and node.function == "new")
     return frozenset(argument.name for call in calls for argument in call.arguments if isinstance(argument, Variable))

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import assert_never
 
-from rbxcompose.expressions.values import Place, Value
+from rbxcompose.expressions.values import NamedPose, Value
 from rbxcompose.levels import Level
 from rbxcompose.missions.engine.events import (
     BranchEnded,
@@ -31,7 +31,7 @@ LEVELS = {"info": Level.OK, "warn": Level.WARN, "error": Level.ERROR}
 RESULTS = {"success": Level.OK, "halted": Level.OK, "failure": Level.WARN}
 
 
-class Story:
+class MissionStory:
     """Tells the story of one mission."""
 
     def __init__(self, mission: str, skills: Mapping[str, Skill]) -> None:
@@ -87,7 +87,7 @@ class Story:
         skill = self._skills[name]
         texts = []
         for argument, value in arguments.items():
-            text = value.name if isinstance(value, Place) else show(skill.arguments.get(argument), value)
+            text = value.name if isinstance(value, NamedPose) else show(skill.arguments.get(argument), value)
             texts.append(text if argument == skill.main else f"{argument} {text}")
         return texts
 

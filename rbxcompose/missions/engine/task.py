@@ -13,7 +13,7 @@ from rbxcompose.missions.engine.engine_base import EngineBase
 from rbxcompose.missions.engine.events import Reported
 from rbxcompose.missions.engine.run_base import RunBase
 from rbxcompose.missions.engine.scopes import ItemScope, MissionScope
-from rbxcompose.missions.program.program import Node, Target
+from rbxcompose.missions.program.program import MissionNode, Target
 from rbxcompose.missions.program.results import NodeFailed, words
 from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING
 
@@ -28,7 +28,7 @@ class Site:
 
     engine: EngineBase
     run: RunBase
-    node: Node
+    node: MissionNode
     scope: MissionScope
     children: tuple[Task, ...] = ()
     item: ItemScope | None = None

@@ -8,10 +8,10 @@ from typing import Protocol
 
 from rbxcompose.expressions.values import Value
 from rbxcompose.missions.engine.events import MissionEvent
-from rbxcompose.missions.engine.scopes import Values
+from rbxcompose.missions.engine.scopes import RobotValues
 
 
-class World(Values, Protocol):
+class World(RobotValues, Protocol):
     """What a mission needs from outside: values, skills, topics and services, someone who listens."""
 
     def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:

@@ -10,10 +10,10 @@ from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.task import Site
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.messages import Message
-from rbxcompose.missions.program.moments import Effects
+from rbxcompose.missions.program.messages import MessageTemplate
+from rbxcompose.missions.program.moments import NodeEffects
 from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import RUNNING
 from rbxcompose.msgs import registry
@@ -24,7 +24,7 @@ class CallTask(Leaf):
 
     __slots__ = ("message",)
 
-    def __init__(self, site: Site, step: Call) -> None:
+    def __init__(self, site: Site, step: CallStep) -> None:
         super().__init__(site)
         self.message = step.message
 
@@ -48,7 +48,7 @@ class CallTask(Leaf):
 
 @kind("call", CallTask, {"request": "The fields of the request; a single value stands for the only field."})
 @dataclass(frozen=True, slots=True)
-class Call(LeafStep):
+class CallStep(LeafStep):
     """Call a service of the robot; an answer that says `success: false` is a failure.
 
     Example:
@@ -58,7 +58,7 @@ class Call(LeafStep):
           timeout: 2 s
     """
 
-    message: Message
+    message: MessageTemplate
 
     waits = True
     has_result = True
@@ -70,15 +70,15 @@ class Call(LeafStep):
         """Read the service and `request`."""
         return cls(reader.message(reader.key, "request"))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that the service may refuse."""
         return ANY
 
-    def text(self, node: Node) -> str:
+    def text(self, node: MissionNode) -> str:
         """Return the service."""
         return self.message.target.text
 
     @property
-    def effects(self) -> Effects:
+    def effects(self) -> NodeEffects:
         """Return the request."""
-        return Effects(called=self.message)
+        return NodeEffects(called=self.message)

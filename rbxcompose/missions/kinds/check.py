@@ -12,7 +12,7 @@ from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.families import LeafStep
 from rbxcompose.missions.program.moments import NO_EFFECTS
 from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
 
@@ -22,7 +22,7 @@ class CheckTask(Task):
 
     __slots__ = ("condition",)
 
-    def __init__(self, site: Site, step: Check) -> None:
+    def __init__(self, site: Site, step: CheckStep) -> None:
         super().__init__(site)
         self.condition = step.condition
 
@@ -33,7 +33,7 @@ class CheckTask(Task):
 
 @kind("check", CheckTask)
 @dataclass(frozen=True, slots=True)
-class Check(LeafStep):
+class CheckStep(LeafStep):
     """Succeed if the condition holds, else fail.
 
     Example:
@@ -55,6 +55,6 @@ class Check(LeafStep):
         """Read the condition."""
         return cls(reader.condition(reader.key))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that either may come out."""
         return ANY

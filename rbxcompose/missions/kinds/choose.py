@@ -10,10 +10,10 @@ from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.expressions.values import is_same
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.branches import Choice
+from rbxcompose.missions.program.branches import BranchChoice
 from rbxcompose.missions.program.families import Choosing
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SKIPPED
 
@@ -24,7 +24,7 @@ class ChooseTask(Task):
     __slots__ = ("choice", "chosen", "index")
     saved = ("index",)
 
-    def __init__(self, site: Site, step: Choose) -> None:
+    def __init__(self, site: Site, step: ChooseStep) -> None:
         super().__init__(site)
         self.choice = step.choice
         self.chosen = site.children
@@ -51,7 +51,7 @@ class ChooseTask(Task):
 
 @kind("choose", ChooseTask, {"cases": "What is done for which value.", "else": "What is done for all other values."})
 @dataclass(frozen=True, slots=True)
-class Choose(Choosing):
+class ChooseStep(Choosing):
     """Do the case of a value, which is asked once; without a match it is skipped.
 
     Example:
@@ -68,7 +68,7 @@ class Choose(Choosing):
             log: Nothing to do in $room
     """
 
-    choice: Choice = field()  # `else` is the child behind those of its cases
+    choice: BranchChoice = field()  # `else` is the child behind those of its cases
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
@@ -77,14 +77,14 @@ class Choose(Choosing):
         cases = reader.cases("cases")
         if reader.has("else"):
             reader.child("else")
-        return cls(Choice(asked, cases))
+        return cls(BranchChoice(asked, cases))
 
     @property
     def ways(self) -> tuple[str, ...]:
         """Return the cases, and what is done for all other values."""
         return (*(f"case {case.expression.text}" for case in self.choice.cases), "else")
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return what any case may do; a value that is not there is a failure."""
         found = ALWAYS_SUCCEEDS.both(either(map(endings.of, node.children)))
         return found.both(ALWAYS_FAILS) if node.asked else found

@@ -11,7 +11,7 @@ from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.families import Deed
 from rbxcompose.missions.program.moments import NO_EFFECTS
 from rbxcompose.missions.program.outcomes import FAILS, NEVER, SUCCEEDS, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
 
@@ -21,7 +21,7 @@ class EndTask(Task):
 
     __slots__ = ("step",)
 
-    def __init__(self, site: Site, step: End) -> None:
+    def __init__(self, site: Site, step: EndStep) -> None:
         super().__init__(site)
         self.step = step
 
@@ -38,7 +38,7 @@ class EndTask(Task):
 
 @kind("end", EndTask, {"message": "What is told about it."})
 @dataclass(frozen=True, slots=True)
-class End(Deed):
+class EndStep(Deed):
     """End the mission in which this is written, in `success` or in `failure`; what runs is halted.
 
     Where two branches of a parallel end it at one tick, failure beats success.
@@ -64,7 +64,7 @@ class End(Deed):
         result = reader.choice(reader.key, (SUCCEEDS, FAILS))
         return cls(result, reader.template("message") if reader.has("message") else None)
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it never ends: the mission does."""
         return NEVER
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.missions.program.answers import Flow
+from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.in_turn import OPTIONS, RANDOM, InTurn, InTurnTask
-from rbxcompose.missions.program.look import Look
+from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
 from rbxcompose.missions.program.possible import Possibility, started
-from rbxcompose.missions.program.program import Node, RobotNames
+from rbxcompose.missions.program.program import MissionNode, RobotNames
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SUCCESS
 
@@ -22,7 +22,7 @@ class FallbackTask(InTurnTask):
 
 
 @kind("fallback", FallbackTask, OPTIONS)
-class Fallback(InTurn):
+class FallbackStep(InTurn):
     """Try the nodes of a list in order; the first success is the fallback's own, a skipped one is passed over.
 
     Example:
@@ -34,15 +34,17 @@ class Fallback(InTurn):
 
     __slots__ = ()
     decides = SUCCEEDS
-    flow = Flow.ONE_OF
-    look = Look("?")
+    flow = NodeFlow.ONE_OF
+    look = NodeLook("?")
 
     @property
     def goes_on_after(self) -> str:
         """Return failure."""
         return "" if self.order == RANDOM else FAILS
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield each node but the first, which is always tried."""
         for index, child in enumerate(node.children[1:], 2):
             yield Possibility(nodes[child].span, f"{node.path}: alternative {index}", started(child))

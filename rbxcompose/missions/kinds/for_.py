@@ -9,7 +9,7 @@ from typing import Self
 
 from rbxcompose.expressions.check import StaticScope, check
 from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.tree import Expression, Field, Index, Variable
+from rbxcompose.expressions.tree import Expression, FieldAccess, Index, Variable
 from rbxcompose.expressions.types import TEXT, UNKNOWN, Type, TypeKind
 from rbxcompose.expressions.values import NOT_ARRIVED, Located, NotArrivedError, Value
 from rbxcompose.missions.analysis.facts import constants_of
@@ -18,13 +18,13 @@ from rbxcompose.missions.engine.data_edits import without
 from rbxcompose.missions.engine.scopes import ItemScope
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Flow
+from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.families import Loop
-from rbxcompose.missions.program.look import Look
-from rbxcompose.missions.program.moments import NO_EFFECTS, Effects
+from rbxcompose.missions.program.look import NodeLook
+from rbxcompose.missions.program.moments import NO_EFFECTS, NodeEffects
 from rbxcompose.missions.program.outcomes import ANY as ANYHOW
 from rbxcompose.missions.program.outcomes import Outcomes
-from rbxcompose.missions.program.program import NOTHING, Endings, Node, Program, Target
+from rbxcompose.missions.program.program import NOTHING, Endings, MissionNode, Program, Target
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.results import NodeFailed
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
@@ -40,7 +40,7 @@ class ForTask(Task):
     __slots__ = ("body", "did", "done", "failed", "left", "step", "taken", "view")
     saved = ("did", "done", "failed", "left", "taken")
 
-    def __init__(self, site: Site, step: For) -> None:
+    def __init__(self, site: Site, step: ForStep) -> None:
         super().__init__(site)
         if site.item is None:
             raise TypeError(f"the loop '{site.node.path}' has no item")
@@ -158,7 +158,7 @@ class ForTask(Task):
     },
 )
 @dataclass(frozen=True, slots=True)
-class For(Loop):
+class ForStep(Loop):
     """Do the body for each item, which the body sees as `$item`.
 
     Example:
@@ -177,8 +177,8 @@ class For(Loop):
     removes_done: bool
 
     has_result = True
-    flow = Flow.PER_ITEM
-    look = Look("↻")
+    flow = NodeFlow.PER_ITEM
+    look = NodeLook("↻")
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
@@ -194,7 +194,7 @@ class For(Loop):
             reader.flag("remove_done") if reader.has("remove_done") else False,
         )
 
-    def shows(self, node: Node, scope: StaticScope) -> Mapping[str, Type]:
+    def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
         """Return the item, with the type that all items have."""
         if not node.item:
             return {}
@@ -204,7 +204,7 @@ class For(Loop):
         found, _ = check(self.items, scope)
         return {node.item: TEXT if found.kind is TypeKind.MAP else found.entry}
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it fails with its body, and may fail to read its list."""
         if self.order == NEAREST or self.removes_done or not node.children or not self._is_read(endings.program):
             return ANYHOW
@@ -220,7 +220,7 @@ class For(Loop):
     def endless(self, ends: Outcomes) -> None:
         """Say nothing: every list has an end."""
 
-    def text(self, node: Node) -> str:
+    def text(self, node: MissionNode) -> str:
         """Return the item and what it goes through."""
         items = ", ".join(asked.scalar.text for asked in node.asked[: node.own])
         return f"{node.item} in {items}" if items else node.item
@@ -231,11 +231,11 @@ class For(Loop):
         return frozenset({POSE}) if self.order == NEAREST else NOTHING
 
     @property
-    def effects(self) -> Effects:
+    def effects(self) -> NodeEffects:
         """Return the data that it takes its items from, if it removes those that are done."""
         if not self.removes_done:
             return NO_EFFECTS
         tree = None if isinstance(self.items, tuple) else self.items.tree
-        while isinstance(tree, Field | Index):
+        while isinstance(tree, FieldAccess | Index):
             tree = tree.of
-        return Effects(shortened=tree.name if isinstance(tree, Variable) else "")
+        return NodeEffects(shortened=tree.name if isinstance(tree, Variable) else "")

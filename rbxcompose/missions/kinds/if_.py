@@ -12,7 +12,7 @@ from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.families import Choosing
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SKIPPED
 
@@ -23,7 +23,7 @@ class IfTask(Task):
     __slots__ = ("branches", "condition", "index")
     saved = ("index",)
 
-    def __init__(self, site: Site, step: If) -> None:
+    def __init__(self, site: Site, step: IfStep) -> None:
         super().__init__(site)
         self.condition = step.condition
         self.branches = site.children
@@ -42,7 +42,7 @@ class IfTask(Task):
 
 @kind("if", IfTask, {"then": "What is done if the condition holds.", "else": "What is done if it does not."})
 @dataclass(frozen=True, slots=True)
-class If(Choosing):
+class IfStep(Choosing):
     """Ask the condition once, then do `then` or `else`; without a match it is skipped.
 
     Example:
@@ -68,7 +68,7 @@ class If(Choosing):
             reader.child("else")
         return cls(condition)
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return what either may do; a condition that cannot be asked is a failure."""
         found = ALWAYS_SUCCEEDS.both(either(map(endings.of, node.children)))
         return found if is_simple(node) else found.both(ALWAYS_FAILS)

@@ -13,7 +13,7 @@ from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.families import Deed
 from rbxcompose.missions.program.moments import LEVELS, NO_EFFECTS
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SUCCESS
 
@@ -23,7 +23,7 @@ class LogTask(Task):
 
     __slots__ = ("step",)
 
-    def __init__(self, site: Site, step: Log) -> None:
+    def __init__(self, site: Site, step: LogStep) -> None:
         super().__init__(site)
         self.step = step
 
@@ -35,7 +35,7 @@ class LogTask(Task):
 
 @kind("log", LogTask, {"level": "How bad it is."})
 @dataclass(frozen=True, slots=True)
-class Log(Deed):
+class LogStep(Deed):
     """Write one line; `$name` in it is filled in.
 
     Example:
@@ -54,6 +54,6 @@ class Log(Deed):
         """Read the text and `level`."""
         return cls(reader.template(reader.key), reader.choice("level", LEVELS))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that only what it reads can fail."""
         return ALWAYS_SUCCEEDS if is_sure(node, endings.program) else ANY

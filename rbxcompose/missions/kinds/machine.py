@@ -11,14 +11,14 @@ from rbxcompose.missions.engine.events import Transition
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.machine_reader import read_machine, read_state
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Advice, Flow, Skipped
+from rbxcompose.missions.program.answers import Advice, NodeFlow, Skipped
 from rbxcompose.missions.program.families import Loop, Straight
 from rbxcompose.missions.program.history import WithHistory
-from rbxcompose.missions.program.look import Form, Look
-from rbxcompose.missions.program.machines import ENDS, FAILED, FINISHED, STATE, Next, States
+from rbxcompose.missions.program.look import Form, NodeLook
+from rbxcompose.missions.program.machines import ENDS, FAILED, FINISHED, STATE, MachineStates, Next
 from rbxcompose.missions.program.outcomes import ANY, Outcomes
 from rbxcompose.missions.program.possible import Possibility, led
-from rbxcompose.missions.program.program import Endings, Node, RobotNames
+from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.results import NodeFailed
 from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SKIPPED, SUCCESS
@@ -30,7 +30,7 @@ class MachineTask(WithHistory):
     __slots__ = ("index", "is_first", "leads", "machine", "states")
     saved = ("index", "is_first")
 
-    def __init__(self, site: Site, step: Machine) -> None:
+    def __init__(self, site: Site, step: MachineStep) -> None:
         super().__init__(site)
         self.machine = step.states
         self.history = step.history
@@ -85,7 +85,7 @@ class MachineTask(WithHistory):
 
 @kind("machine", MachineTask)
 @dataclass(frozen=True, slots=True)
-class Machine(Loop):
+class MachineStep(Loop):
     """Be in one state after the other; how a state's body ends decides which is next.
 
     Below it stand `start`, `states`, and perhaps `ends` and `history`. A state has `do` or `machine`, modifiers,
@@ -109,18 +109,18 @@ class Machine(Loop):
                 failure: failed
     """
 
-    states: States = field()
+    states: MachineStates = field()
     history: str = field()
 
-    flow = Flow.OPEN
-    look = Look("◉", Form.MACHINE)
+    flow = NodeFlow.OPEN
+    look = NodeLook("◉", Form.MACHINE)
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
         """Read the states and what stands beside them."""
         return cls(*read_machine(reader))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the ends that its states lead to."""
         leads = (endings.program.nodes[child].step.leads_to for child in node.children)
         reached = {to for one in leads if one for to in one.to.values()}
@@ -132,7 +132,9 @@ class Machine(Loop):
         advice = Advice("this machine never ends and never waits", "put a 'wait' into a state, or lead to an end")
         return None if ends.words else advice
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield the transitions."""
         for state in (nodes[child] for child in node.children):
             following = state.step.leads_to or Next()
@@ -147,7 +149,7 @@ class StateTask(Task):
 
     __slots__ = ("body",)
 
-    def __init__(self, site: Site, step: State) -> None:
+    def __init__(self, site: Site, step: StateStep) -> None:
         super().__init__(site)
         self.body = site.children[0]
 
@@ -166,20 +168,20 @@ class StateTask(Task):
 
 @kind(STATE, StateTask, is_inner=True)
 @dataclass(frozen=True, slots=True)
-class State(Straight):
+class StateStep(Straight):
     """A state of a machine: its body, and where it leads to (None: its body never ends)."""
 
     leads_to: Next | None = field()
 
     skipped = Skipped.WITH_ALL_INSIDE
-    flow = Flow.IN_TURN
-    look = Look(form=Form.STATE)
+    flow = NodeFlow.IN_TURN
+    look = NodeLook(form=Form.STATE)
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
         """Read the body and where it leads to."""
         return cls(read_state(reader))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return how the body may end."""
         return endings.of(node.children[0]) if node.children else ANY

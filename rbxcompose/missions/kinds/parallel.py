@@ -9,12 +9,12 @@ from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Flow, Skipped
-from rbxcompose.missions.program.branches import ALL, ANY, Branches, BranchScope, Ended, read_outcomes
+from rbxcompose.missions.program.answers import NodeFlow, Skipped
+from rbxcompose.missions.program.branches import ALL, ANY, Branches, BranchResult, BranchScope, read_outcomes
 from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.look import Form, Look
+from rbxcompose.missions.program.look import Form, NodeLook
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes, either
-from rbxcompose.missions.program.program import Endings, Node, Target
+from rbxcompose.missions.program.program import Endings, MissionNode, Target
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.results import NodeFailed
 from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
@@ -28,7 +28,7 @@ class ParallelTask(Task):
     __slots__ = ("branches", "children", "names", "results", "runs", "waits_for_all", "wanted")
     saved = ("names", "results", "runs", "wanted")
 
-    def __init__(self, site: Site, step: Parallel) -> None:
+    def __init__(self, site: Site, step: ParallelStep) -> None:
         super().__init__(site)
         self.children = site.children
         self.branches = step.branches
@@ -120,7 +120,7 @@ class ParallelTask(Task):
         self.engine.outcome = self.names[branches.names.index(branches.ends_with)] if branches.ends_with else ""
         if not branches.outcomes:
             return
-        ended = {name: Ended.of(self.results[i], self.names[i]) for i, name in enumerate(branches.names)}
+        ended = {name: BranchResult.of(self.results[i], self.names[i]) for i, name in enumerate(branches.names)}
         scope = BranchScope(self.scope, ended)
         for outcome in branches.outcomes:
             if outcome.condition is None or holds(outcome.condition, scope):
@@ -150,7 +150,7 @@ class ParallelTask(Task):
     },
 )
 @dataclass(frozen=True, slots=True)
-class Parallel(Straight):
+class ParallelStep(Straight):
     """Do several nodes at the same time; at each tick all that have not ended are ticked, then it is judged.
 
     Example:
@@ -166,8 +166,8 @@ class Parallel(Straight):
     waits_for_all: bool
 
     skipped = Skipped.WITH_ALL_INSIDE
-    flow = Flow.OPEN
-    look = Look("⇉", Form.BESIDE, has_roles=True)
+    flow = NodeFlow.OPEN
+    look = NodeLook("⇉", Form.BESIDE, has_roles=True)
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
@@ -186,7 +186,7 @@ class Parallel(Straight):
         conditions = (one.condition for one in self.branches.outcomes if one.condition)
         return frozenset(name.name for one in conditions for name in one.names).difference(self.branches.names)
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the outcomes by conditions, else those of the branch it ends with, else the plain ones."""
         branches = self.branches
         if branches.outcomes:

@@ -9,10 +9,10 @@ from rbxcompose.missions.engine.instant_actions import publish
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.families import Deed
-from rbxcompose.missions.program.messages import Message
-from rbxcompose.missions.program.moments import Effects
+from rbxcompose.missions.program.messages import MessageTemplate
+from rbxcompose.missions.program.moments import NodeEffects
 from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SUCCESS
 
@@ -22,7 +22,7 @@ class PublishTask(Task):
 
     __slots__ = ("message",)
 
-    def __init__(self, site: Site, step: Publish) -> None:
+    def __init__(self, site: Site, step: PublishStep) -> None:
         super().__init__(site)
         self.message = step.message
 
@@ -34,7 +34,7 @@ class PublishTask(Task):
 
 @kind("publish", PublishTask, {"message": "The fields of the message; a single value stands for the only field."})
 @dataclass(frozen=True, slots=True)
-class Publish(Deed):
+class PublishStep(Deed):
     """Publish a message on a topic of the robot; fields that are left out are zero or empty.
 
     Example:
@@ -45,22 +45,22 @@ class Publish(Deed):
               x: 0.1
     """
 
-    message: Message
+    message: MessageTemplate
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
         """Read the topic and `message`."""
         return cls(reader.message(reader.key, "message"))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that a value may be missing or may not fit."""
         return ANY
 
-    def text(self, node: Node) -> str:
+    def text(self, node: MissionNode) -> str:
         """Return the topic."""
         return self.message.target.text
 
     @property
-    def effects(self) -> Effects:
+    def effects(self) -> NodeEffects:
         """Return the message."""
-        return Effects(published=self.message)
+        return NodeEffects(published=self.message)

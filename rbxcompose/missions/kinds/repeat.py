@@ -11,11 +11,11 @@ from rbxcompose.expressions.tree import Expression, Number
 from rbxcompose.missions.analysis.facts import is_simple, takes_time
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Advice, Counted, Flow
+from rbxcompose.missions.program.answers import Advice, Counted, NodeFlow
 from rbxcompose.missions.program.families import Loop
-from rbxcompose.missions.program.look import Look
+from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
 
@@ -28,7 +28,7 @@ class RepeatTask(Task):
     times = ("due",)
     fresh = ("due", "period")
 
-    def __init__(self, site: Site, step: Repeat) -> None:
+    def __init__(self, site: Site, step: RepeatStep) -> None:
         super().__init__(site)
         self.body = site.children[0]
         self.step = step
@@ -89,7 +89,7 @@ class RepeatTask(Task):
     },
 )
 @dataclass(frozen=True, slots=True)
-class Repeat(Loop):
+class RepeatStep(Loop):
     """Do the body again and again; a round that fails fails it, a number that is used up succeeds.
 
     Example:
@@ -105,8 +105,8 @@ class Repeat(Loop):
     until: Expression | None
     every: Expression | None  # from start to start
 
-    flow = Flow.IN_TURN
-    look = Look("↻")
+    flow = NodeFlow.IN_TURN
+    look = NodeLook("↻")
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
@@ -116,14 +116,14 @@ class Repeat(Loop):
         until = reader.condition("until") if reader.has("until") else None
         return cls(rounds, until, reader.duration("every") if reader.has("every") else None)
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that a loop for ever ends with a failure only."""
         body = endings.of(node.children[0]).plain if node.children else ANY
         if self.rounds is None and self.until is None:
             return Outcomes(succeeds=False, fails=body.fails)
         return Outcomes(fails=body.fails) if self._is_counted(node) else ANY
 
-    def _is_counted(self, node: Node) -> bool:
+    def _is_counted(self, node: MissionNode) -> bool:
         """Tell whether the number of rounds and the time of one are written out, and `until` can always be asked."""
         if not any(asked.expression.names for asked in node.asked):
             return True

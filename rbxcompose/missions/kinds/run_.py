@@ -11,11 +11,11 @@ from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.missions.analysis.held_nodes import HeldNode
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Flow, Skipped
+from rbxcompose.missions.program.answers import NodeFlow, Skipped
 from rbxcompose.missions.program.families import Straight
 from rbxcompose.missions.program.look import PLAIN
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ANY, Outcomes, either
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.results import NodeFailed
 
@@ -26,7 +26,7 @@ class RunTask(Task):
     __slots__ = ("children", "expression", "index", "keys")
     saved = ("index",)
 
-    def __init__(self, site: Site, step: Run) -> None:
+    def __init__(self, site: Site, step: RunStep) -> None:
         super().__init__(site)
         self.expression = step.expression
         self.children = site.children
@@ -50,7 +50,7 @@ class RunTask(Task):
 
 @kind("run", RunTask)
 @dataclass(frozen=True, slots=True)
-class Run(Straight):
+class RunStep(Straight):
     """Do a node that stands in the data: a chore of a list, a step that was chosen before.
 
     Example:
@@ -68,7 +68,7 @@ class Run(Straight):
     expression: Expression
 
     skipped = Skipped.PERHAPS
-    flow = Flow.OPEN
+    flow = NodeFlow.OPEN
     look = PLAIN
 
     @classmethod
@@ -78,6 +78,6 @@ class Run(Straight):
         reader.held(expression)
         return cls(expression)
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return what any of the nodes in the data may do; it fails where there is none."""
         return either([ALWAYS_FAILS, *map(endings.of, node.children)]) if node.children else ANY

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rbxcompose.missions.program.answers import Flow
+from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.in_turn import OPTIONS, RANDOM, InTurn, InTurnTask
-from rbxcompose.missions.program.look import Look
+from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import FAILURE
@@ -19,7 +19,7 @@ class SequenceTask(InTurnTask):
 
 
 @kind("sequence", SequenceTask, OPTIONS)
-class Sequence(InTurn):
+class SequenceStep(InTurn):
     """Do the nodes of a list in order; the first failure is the sequence's own.
 
     Example:
@@ -31,8 +31,8 @@ class Sequence(InTurn):
 
     __slots__ = ()
     decides = FAILS
-    flow = Flow.IN_TURN
-    look = Look("→")
+    flow = NodeFlow.IN_TURN
+    look = NodeLook("→")
 
     @property
     def goes_on_after(self) -> str:

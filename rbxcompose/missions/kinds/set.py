@@ -11,9 +11,9 @@ from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.asked import Assignment
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.families import Deed
-from rbxcompose.missions.program.moments import Effects
+from rbxcompose.missions.program.moments import NodeEffects
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SUCCESS
 
@@ -23,7 +23,7 @@ class SetTask(Task):
 
     __slots__ = ("assignments",)
 
-    def __init__(self, site: Site, step: Set) -> None:
+    def __init__(self, site: Site, step: SetStep) -> None:
         super().__init__(site)
         self.assignments = step.assignments
 
@@ -35,7 +35,7 @@ class SetTask(Task):
 
 @kind("set", SetTask)
 @dataclass(frozen=True, slots=True)
-class Set(Deed):
+class SetStep(Deed):
     """Compute all right sides first, then set them.
 
     Example:
@@ -55,15 +55,15 @@ class Set(Deed):
         """Read the map from names to expressions."""
         return cls(reader.assignments(reader.key))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that only what it reads can fail."""
         return ALWAYS_SUCCEEDS if is_sure(node, endings.program) else ANY
 
-    def text(self, node: Node) -> str:
+    def text(self, node: MissionNode) -> str:
         """Return what is set."""
         return ", ".join(f"{one.name} = {one.asked.scalar.text}" for one in self.assignments)
 
     @property
-    def effects(self) -> Effects:
+    def effects(self) -> NodeEffects:
         """Return what is set."""
-        return Effects(assignments=self.assignments)
+        return NodeEffects(assignments=self.assignments)

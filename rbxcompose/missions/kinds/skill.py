@@ -7,20 +7,18 @@ from dataclasses import dataclass, field
 from typing import Self
 
 from rbxcompose.expressions.values import Value
-from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.manifest.tree import Node as Located
-from rbxcompose.manifest.tree import Scalar, Sequence
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.engine.events import Reported, SkillEnded, SkillStarted
 from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.task import Site
-from rbxcompose.missions.language.asked import Argument
+from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.written import Getter, getter
 from rbxcompose.missions.program.families import LeafStep
 from rbxcompose.missions.program.moments import NO_EFFECTS
 from rbxcompose.missions.program.outcomes import ANY, FAILS, SUCCEEDS, Outcomes
 from rbxcompose.missions.program.possible import Possibility, ended
-from rbxcompose.missions.program.program import Endings, Node, RobotNames
+from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
 from rbxcompose.missions.program.registry import SKILL, kind
 from rbxcompose.missions.program.results import Result
 from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SUCCESS
@@ -34,7 +32,7 @@ class SkillTask(Leaf):
     fresh = ("arguments",)
     told = ("started",)
 
-    def __init__(self, site: Site, step: AskedSkill) -> None:
+    def __init__(self, site: Site, step: SkillStep) -> None:
         super().__init__(site)
         self.skill = site.engine.robot.skills[step.skill]
         names = [(argument.name or self.skill.main, argument.value) for argument in step.arguments]
@@ -103,11 +101,11 @@ class SkillTask(Leaf):
 
 @kind(SKILL, SkillTask, is_inner=True)
 @dataclass(frozen=True, slots=True)
-class AskedSkill(LeafStep):
+class SkillStep(LeafStep):
     """A skill by its name, with its arguments."""
 
     skill: str = field()
-    arguments: tuple[Argument, ...] = field()
+    arguments: tuple[WrittenArgument, ...] = field()
 
     waits = True
     has_result = True
@@ -125,27 +123,29 @@ class AskedSkill(LeafStep):
         """Return the name of the skill."""
         return self.skill
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return what the robot declares."""
         skill = endings.robot.skills.get(self.skill)
         return Outcomes(named=skill.outcomes) if skill else ANY
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield its outcomes."""
         if self.skill in robot.skills:
             for outcome in (SUCCEEDS, FAILS, *robot.skills[self.skill].outcomes):
                 yield Possibility(node.span, f"{node.path}: {outcome}", ended(node.number, outcome))
 
-    def text(self, node: Node) -> str:
+    def text(self, node: MissionNode) -> str:
         """Return its arguments."""
         return ", ".join(f"{one.name} {_written(one.value)}".strip() for one in self.arguments)
 
 
-def _written(value: Located) -> str:
+def _written(value: TreeNode) -> str:
     match value:
-        case Scalar():
+        case ScalarNode():
             return value.text
-        case Sequence():
+        case SequenceNode():
             return ", ".join(map(_written, value.items))
-        case Tree():
+        case MappingNode():
             return ", ".join(f"{key} {_written(entry.value)}" for key, entry in value.entries.items())

@@ -7,18 +7,18 @@ from typing import Self
 
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.values import NotArrivedError, Value
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.resume_points import LAST
 from rbxcompose.missions.engine.task import Site
-from rbxcompose.missions.language.asked import Argument
+from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.written import PLACED, getter, place
-from rbxcompose.missions.program.answers import Flow, Skipped
+from rbxcompose.missions.program.answers import NodeFlow, Skipped
 from rbxcompose.missions.program.families import Straight
 from rbxcompose.missions.program.history import HISTORY, WithHistory, read_history
-from rbxcompose.missions.program.look import Look
+from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.outcomes import Outcomes
-from rbxcompose.missions.program.program import Endings, Node, Target
+from rbxcompose.missions.program.program import Endings, MissionNode, Target
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING
 
@@ -29,7 +29,7 @@ class UseTask(WithHistory):
     __slots__ = ("getters", "inner", "outputs")
     saved = ("outputs",)
 
-    def __init__(self, site: Site, step: Use) -> None:
+    def __init__(self, site: Site, step: UseStep) -> None:
         super().__init__(site)
         if site.inner is None:
             raise TypeError(f"the mission of '{site.node.path}' is not linked")
@@ -106,7 +106,7 @@ class UseTask(WithHistory):
 
 @kind("use", UseTask, {"with": "Values for the inputs of the mission.", "history": HISTORY})
 @dataclass(frozen=True, slots=True)
-class Use(Straight):
+class UseStep(Straight):
     """Run another mission of the robot; its outputs can be kept with `save`.
 
     It sees the robot's values and places, and of this mission only what `with` gives it.
@@ -119,28 +119,28 @@ class Use(Straight):
               rounds: 1
     """
 
-    uses: Scalar = field()
-    arguments: tuple[Argument, ...] = field()
+    uses: ScalarNode = field()
+    arguments: tuple[WrittenArgument, ...] = field()
     history: str = field()
 
     skipped = Skipped.PERHAPS
     has_result = True
-    flow = Flow.OPEN
-    look = Look("↗")
+    flow = NodeFlow.OPEN
+    look = NodeLook("↗")
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
         """Read the name of the mission, `with` and `history`."""
-        name = reader.scalar(reader.key, "the name of a mission") or Scalar("", reader.span)
+        name = reader.scalar(reader.key, "the name of a mission") or ScalarNode("", reader.span)
         given = reader.map_of("with", "a map from inputs to values") if reader.has("with") else None
         entries = given.entries.items() if given else ()
-        arguments = tuple(Argument(key, entry.value, entry.key.span) for key, entry in entries)
+        arguments = tuple(WrittenArgument(key, entry.value, entry.key.span) for key, entry in entries)
         return cls(name, arguments, read_history(reader))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return how the mission may end."""
         return endings.of_mission(self.uses.text)
 
-    def text(self, node: Node) -> str:
+    def text(self, node: MissionNode) -> str:
         """Return the mission."""
         return self.uses.text

@@ -12,7 +12,7 @@ from rbxcompose.missions.program.answers import Counted
 from rbxcompose.missions.program.families import LeafStep
 from rbxcompose.missions.program.moments import NO_EFFECTS
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import RUNNING, SUCCESS
 
@@ -23,7 +23,7 @@ class WaitTask(Task):
     __slots__ = ("deadline", "duration")
     saved = times = fresh = ("deadline",)
 
-    def __init__(self, site: Site, step: Wait) -> None:
+    def __init__(self, site: Site, step: WaitStep) -> None:
         super().__init__(site)
         self.duration = step.lasts
         self.deadline = 0.0
@@ -40,7 +40,7 @@ class WaitTask(Task):
 
 @kind("wait", WaitTask)
 @dataclass(frozen=True, slots=True)
-class Wait(LeafStep):
+class WaitStep(LeafStep):
     """Succeed after a time; it goes on with the rest when the mission was cut short meanwhile.
 
     Example:
@@ -61,7 +61,7 @@ class Wait(LeafStep):
         """Read the duration."""
         return cls(reader.duration(reader.key))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that a time that is written out can be waited for."""
         return ALWAYS_SUCCEEDS if isinstance(self.lasts.tree, Number) else ANY
 

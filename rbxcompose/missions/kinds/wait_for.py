@@ -14,7 +14,7 @@ from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.families import LeafStep
 from rbxcompose.missions.program.moments import NO_EFFECTS
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import IDLE, RUNNING, SUCCESS
 
@@ -24,7 +24,7 @@ class WaitForTask(Task):
 
     __slots__ = ("watched",)
 
-    def __init__(self, site: Site, step: WaitFor) -> None:
+    def __init__(self, site: Site, step: WaitForStep) -> None:
         super().__init__(site)
         self.watched = Watched.of(step.condition)
 
@@ -48,7 +48,7 @@ class WaitForTask(Task):
 
 @kind("wait_for", WaitForTask)
 @dataclass(frozen=True, slots=True)
-class WaitFor(LeafStep):
+class WaitForStep(LeafStep):
     """Succeed as soon as the condition holds; `timeout` bounds it.
 
     Example:
@@ -70,6 +70,6 @@ class WaitFor(LeafStep):
         """Read the condition."""
         return cls(reader.condition(reader.key))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that only a condition which cannot be asked is a failure."""
         return ALWAYS_SUCCEEDS if is_simple(node) else ANY

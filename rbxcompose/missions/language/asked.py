@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import Type
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Node as Located
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode, TreeNode
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +19,7 @@ class Asked:
 
     expression: Expression
     wanted: Type
-    scalar: Scalar
+    scalar: ScalarNode
     is_assigned: bool = False
 
 
@@ -34,9 +33,9 @@ class Assignment:
 
 
 @dataclass(frozen=True, slots=True)
-class Argument:
+class WrittenArgument:
     """An argument of a skill or a mission as written; what it means depends on that. The main one has no name."""
 
     name: str
-    value: Located
+    value: TreeNode
     span: Span

@@ -8,8 +8,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import BROKEN, Entry, Node, Scalar, Sequence
-from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.tree import BROKEN, Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 
 LEVELS = 40  # of steps within steps
 LIST = "sequence"  # what a list is
@@ -40,26 +39,26 @@ class Takes(StrEnum):
     OTHER = "other"
 
 
-class Slot(NamedTuple):
+class KeySlot(NamedTuple):
     """What the value of a key takes; `choices` are words that may stand in its place."""
 
     takes: Takes
     choices: tuple[str, ...] = ()
 
 
-STEP = Slot(Takes.STEP)
+STEP = KeySlot(Takes.STEP)
 # What stands below each place, by its key. What the keys of a step take, its kind and its modifiers tell.
-BELOW: Mapping[Takes, Mapping[str, Slot]] = {
-    Takes.MISSION: {"do": STEP, "machine": Slot(Takes.MACHINE), "interrupts": Slot(Takes.INTERRUPTS)},
-    Takes.INTERRUPTS: {EACH: Slot(Takes.INTERRUPT)},
-    Takes.INTERRUPT: {"do": STEP, "afterwards": Slot(Takes.AFTERWARDS)},
+BELOW: Mapping[Takes, Mapping[str, KeySlot]] = {
+    Takes.MISSION: {"do": STEP, "machine": KeySlot(Takes.MACHINE), "interrupts": KeySlot(Takes.INTERRUPTS)},
+    Takes.INTERRUPTS: {EACH: KeySlot(Takes.INTERRUPT)},
+    Takes.INTERRUPT: {"do": STEP, "afterwards": KeySlot(Takes.AFTERWARDS)},
     Takes.STEPS: {EACH: STEP},
     Takes.BRANCHES: {EACH: STEP},
     Takes.CASES: {EACH: STEP},
-    Takes.MACHINE: {"states": Slot(Takes.STATES)},
-    Takes.STATES: {EACH: Slot(Takes.STATE)},
-    Takes.STATE: {"do": STEP, "machine": Slot(Takes.MACHINE), "next": Slot(Takes.NEXT)},
-    Takes.HOOK: {"set": Slot(Takes.ASSIGNMENTS)},
+    Takes.MACHINE: {"states": KeySlot(Takes.STATES)},
+    Takes.STATES: {EACH: KeySlot(Takes.STATE)},
+    Takes.STATE: {"do": STEP, "machine": KeySlot(Takes.MACHINE), "next": KeySlot(Takes.NEXT)},
+    Takes.HOOK: {"set": KeySlot(Takes.ASSIGNMENTS)},
 }
 
 
@@ -67,8 +66,8 @@ BELOW: Mapping[Takes, Mapping[str, Slot]] = {
 class Words:
     """The words that mean something in a mission: of the language, and the skills of the robot as far as known."""
 
-    kinds: Mapping[str, Mapping[str, Slot]]  # what the keys of each kind of step take, its own word among them
-    modifiers: Mapping[str, Slot]  # of any step, `name` among them
+    kinds: Mapping[str, Mapping[str, KeySlot]]  # what the keys of each kind of step take, its own word among them
+    modifiers: Mapping[str, KeySlot]  # of any step, `name` among them
     skills: Collection[str] = ()
 
     def is_step(self, word: str) -> bool:
@@ -83,11 +82,11 @@ class Words:
         """Return, for people, the kinds that have such a key beside their word; nothing if there are none."""
         return " and ".join(f"'{kind}'" for kind, slots in self.kinds.items() if key in slots and key != kind)
 
-    def own(self, step: Tree) -> list[str]:
+    def own(self, step: MappingNode) -> list[str]:
         """Return the keys of a step that not every step may have."""
         return [key for key in step.entries if key not in self.modifiers]
 
-    def kind_of(self, step: Tree) -> str:
+    def kind_of(self, step: MappingNode) -> str:
         """Return the word of the kind of a step; nothing for a skill. `if` beside another step is no step."""
         own = self.own(step)
         found = (key for key in own if key in self.kinds and (key != "if" or "then" in step or own[0] == key))
@@ -95,44 +94,44 @@ class Words:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class GrammarPlace:
     """A place of the grammar: what it takes, and the key behind which it stands."""
 
     takes: Takes
-    key: Scalar
+    key: ScalarNode
     words: Words
     choices: tuple[str, ...] = ()
 
 
-def long_form(step: Node) -> Tree:
+def long_form(step: TreeNode) -> MappingNode:
     """Return a step as a map: a list is a sequence, a word is a skill without arguments."""
     match step:
-        case Tree():
+        case MappingNode():
             return step
-        case Sequence(span=span):
-            return Tree({LIST: Entry(Scalar(LIST, span), step)}, span)
-        case Scalar(text=text, span=span):
-            return Tree({text: Entry(step, Scalar("", span))}, span)
+        case SequenceNode(span=span):
+            return MappingNode({LIST: Entry(ScalarNode(LIST, span), step)}, span)
+        case ScalarNode(text=text, span=span):
+            return MappingNode({text: Entry(step, ScalarNode("", span))}, span)
 
 
-def is_empty(node: Node) -> bool:
+def is_empty(node: TreeNode) -> bool:
     """Tell whether nothing was written: `do:` with no value."""
-    return isinstance(node, Scalar) and node.plain and not node.text
+    return isinstance(node, ScalarNode) and node.plain and not node.text
 
 
-def told(span: Span) -> Scalar:
+def told(span: Span) -> ScalarNode:
     """Return what stands for a value of which all was said."""
-    return Scalar("", span, filled=BROKEN)
+    return ScalarNode("", span, filled=BROKEN)
 
 
-def without_word(step: Tree, words: Words) -> Tree:
+def without_word(step: MappingNode, words: Words) -> MappingNode:
     """Return a step of whose word all was said: what is left of it are its modifiers."""
     left = {key: entry for key, entry in step.entries.items() if key in words.modifiers}
-    return Tree({"": Entry(told(step.span), told(step.span)), **left}, step.span)
+    return MappingNode({"": Entry(told(step.span), told(step.span)), **left}, step.span)
 
 
-def is_told(node: Node | None) -> bool:
+def is_told(node: TreeNode | None) -> bool:
     """Tell whether all was said of a value, or of the word of a step."""
-    if isinstance(node, Tree) and "" in node:
+    if isinstance(node, MappingNode) and "" in node:
         node = node.entries[""].key
-    return isinstance(node, Scalar) and node.filled is BROKEN
+    return isinstance(node, ScalarNode) and node.filled is BROKEN

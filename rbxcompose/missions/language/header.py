@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from rbxcompose.expressions.types import TYPES, Type, choice_of
 from rbxcompose.findings import Report
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.language.literals import WrongValue, literal, typed
@@ -19,19 +19,19 @@ CHOICE = "choice"
 FASTEST = 1000.0  # [Hz]
 
 
-def read_data(node: Node | None, report: Report) -> dict[str, Datum]:
+def read_data(node: TreeNode | None, report: Report) -> dict[str, Datum]:
     """Return the initial values under `data:`."""
     entries = _named(node, "data", report)
     return {name: replace(literal(entry.value), span=entry.key.span) for name, entry in entries.items()}
 
 
-def read_inputs(node: Node | None, report: Report) -> dict[str, Input]:
+def read_inputs(node: TreeNode | None, report: Report) -> dict[str, Input]:
     """Return the inputs under `inputs:`; one whose type cannot be read is left out."""
     read = (_input(name, entry, report) for name, entry in _named(node, "inputs", report).items())
     return {one.name: one for one in read if one}
 
 
-def read_rate(node: Node | None, report: Report) -> float:
+def read_rate(node: TreeNode | None, report: Report) -> float:
     """Return how often conditions are asked that nothing announces [Hz]."""
     rate = _value(node, TYPES["frequency"], "'rate'", report) if node else None
     if not rate or not isinstance(rate.value, float):
@@ -42,11 +42,11 @@ def read_rate(node: Node | None, report: Report) -> float:
     return rate.value
 
 
-def _named(node: Node | None, section: str, report: Report) -> dict[str, Entry]:
+def _named(node: TreeNode | None, section: str, report: Report) -> dict[str, Entry]:
     """Return the entries of a section whose names may stand in expressions."""
-    if node is None or (isinstance(node, Scalar) and node.plain and not node.text):
+    if node is None or (isinstance(node, ScalarNode) and node.plain and not node.text):
         return {}
-    if not isinstance(node, Mapping):
+    if not isinstance(node, MappingNode):
         report.add(codes.WRONG_SHAPE.at(node.span, f"'{section}' needs names with their values below it"))
         return {}
     for name, entry in node.entries.items():
@@ -59,7 +59,7 @@ def _named(node: Node | None, section: str, report: Report) -> dict[str, Entry]:
 
 def _input(name: str, entry: Entry, report: Report) -> Input | None:
     value, place = entry.value, entry.key.span
-    if not isinstance(value, Mapping):
+    if not isinstance(value, MappingNode):
         message = f"the input '{name}' needs its 'type' below it"
         report.add(codes.WRONG_SHAPE.at(value.span, message, help="give 'type' and perhaps 'default'"))
         return None
@@ -78,15 +78,15 @@ def _input(name: str, entry: Entry, report: Report) -> Input | None:
     return read
 
 
-def _type(name: str, value: Mapping, entry: Entry, report: Report) -> Type | None:
+def _type(name: str, value: MappingNode, entry: Entry, report: Report) -> Type | None:
     word = value.get("type")
-    if not isinstance(word, Scalar):
+    if not isinstance(word, ScalarNode):
         report.add(codes.MISSING.at(word.span if word else entry.key.span, f"the input '{name}' needs a 'type'"))
         return None
     if word.text == CHOICE:
         choices = value.get("choices")
-        if isinstance(choices, Sequence) and choices.items:
-            return choice_of(*(item.text for item in choices.items if isinstance(item, Scalar)))
+        if isinstance(choices, SequenceNode) and choices.items:
+            return choice_of(*(item.text for item in choices.items if isinstance(item, ScalarNode)))
         report.add(codes.MISSING.at(entry.key.span, f"the input '{name}' needs 'choices': a list of words"))
         return None
     if word.text not in TYPES:
@@ -96,7 +96,7 @@ def _type(name: str, value: Mapping, entry: Entry, report: Report) -> Type | Non
     return TYPES[word.text]
 
 
-def _value(node: Node | None, wanted: Type, what: str, report: Report) -> Datum | None:
+def _value(node: TreeNode | None, wanted: Type, what: str, report: Report) -> Datum | None:
     if node is None:
         return None
     try:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from functools import cache
 
-from rbxcompose.manifest.tree import Mapping
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import is_told
 from rbxcompose.missions.language.value_reader import Nodes
 from rbxcompose.missions.modifiers.registry import modifier_keys
-from rbxcompose.missions.program.registry import Kind, kinds
+from rbxcompose.missions.program.registry import StepType, kinds
 
 
 @cache
@@ -18,7 +18,7 @@ def anywhere() -> tuple[str, ...]:
     return ("name", *modifier_keys())
 
 
-def find_key(step: Mapping, nodes: Nodes) -> tuple[str, Kind | None]:
+def find_key(step: MappingNode, nodes: Nodes) -> tuple[str, StepType | None]:
     """Return the key of a step and its kind; None for a skill, an empty key and a finding if there is neither."""
     if is_told(step):
         return "", None

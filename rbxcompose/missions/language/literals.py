@@ -18,7 +18,7 @@ from rbxcompose.expressions.types import (
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import suggest
 from rbxcompose.manifest.scalars import describe, plain_value
-from rbxcompose.manifest.tree import Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.program.program import Datum
 from rbxcompose.units import NUMBER, Quantity, UnitError, parse_quantity, to_si
 
@@ -33,21 +33,21 @@ class WrongValue(ValueError):  # noqa: N818 - a user's mistake, told apart from 
         self.help = help
 
 
-def literal(node: Node) -> Datum:
+def literal(node: TreeNode) -> Datum:
     """Return what a node writes down: a number in SI, a flag, a text, a list or a map of these."""
     match node:
-        case Mapping(entries=entries):
+        case MappingNode(entries=entries):
             values = {name: literal(entry.value) for name, entry in entries.items()}
             return Datum({name: one.value for name, one in values.items()}, map_of(_common(values.values())), node.span)
-        case Sequence(items=items):
+        case SequenceNode(items=items):
             read = [literal(item) for item in items]
             return Datum([one.value for one in read], list_of(_common(read)), node.span)
-        case Scalar():
+        case ScalarNode():
             value = node.filled if node.filled is not None else _measured(node)
             return Datum(*_typed(value), node.span)
 
 
-def typed(node: Node, wanted: Type) -> Datum:
+def typed(node: TreeNode, wanted: Type) -> Datum:
     """Return what a node writes down, as a value of the type `wanted`; places stay texts.
 
     Raises:
@@ -58,12 +58,12 @@ def typed(node: Node, wanted: Type) -> Datum:
         if found.type.kind is not wanted.kind:
             raise WrongValue(f"must be {wanted.phrase}", label=f"this is {found.type.phrase}")
         return found
-    if not isinstance(node, Scalar):
-        raise WrongValue(f"must be {wanted.phrase}", label=describe([] if isinstance(node, Sequence) else {}))
+    if not isinstance(node, ScalarNode):
+        raise WrongValue(f"must be {wanted.phrase}", label=describe([] if isinstance(node, SequenceNode) else {}))
     return Datum(_scalar(node, wanted), wanted, node.span)
 
 
-def _scalar(scalar: Scalar, wanted: Type) -> Value:
+def _scalar(scalar: ScalarNode, wanted: Type) -> Value:
     value = plain_value(scalar) if scalar.filled is None else scalar.filled
     label = "" if isinstance(value, Quantity) else describe(value)
     if wanted.dimension:
@@ -86,7 +86,7 @@ def _scalar(scalar: Scalar, wanted: Type) -> Value:
     return text
 
 
-def _measured(scalar: Scalar) -> object:
+def _measured(scalar: ScalarNode) -> object:
     value = plain_value(scalar)
     if isinstance(value, str) and scalar.plain:
         try:

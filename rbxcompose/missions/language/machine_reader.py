@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Entry, Scalar
-from rbxcompose.manifest.tree import Mapping as Tree
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.resume_points import NO_HISTORY
 from rbxcompose.missions.language.grammar import Takes, is_told
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.value_reader import WORDS
 from rbxcompose.missions.program.history import read_history
-from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS, Next, States
+from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS, MachineStates, Next
 from rbxcompose.missions.program.statuses import FAILURE, NAMES, SUCCESS
 
 BODIES = ("do", "machine")
@@ -21,15 +20,15 @@ STATE_KEYS = (*BODIES, "on_enter", "on_exit", "next")
 RESULTS = (NAMES[SUCCESS], NAMES[FAILURE])
 
 
-def read_machine(reader: NodeReader) -> tuple[States, str]:
+def read_machine(reader: NodeReader) -> tuple[MachineStates, str]:
     """Read the map below `machine`: the first state, the states and ends; and the history."""
     value = reader.map_of(reader.key, "'start' and 'states' below it", Takes.MACHINE)
     if value is None:
-        return States(), NO_HISTORY
+        return MachineStates(), NO_HISTORY
     inner = reader.inside(value, MACHINE_KEYS, "a machine")
     states = value.get("states")
     names: tuple[str, ...] = ()
-    if isinstance(states, Tree) and states.entries:
+    if isinstance(states, MappingNode) and states.entries:
         names = tuple(states.entries)
         for name, entry in states.entries.items():
             reader.state(name, entry)
@@ -45,7 +44,7 @@ def read_machine(reader: NodeReader) -> tuple[States, str]:
     if "start" not in value:
         reader.add(codes.MISSING.at(reader.span, "a machine needs 'start': the state in which it begins"))
     history = read_history(inner)
-    return States(start.text if start else "", names, ends, start.span if start else None), history
+    return MachineStates(start.text if start else "", names, ends, start.span if start else None), history
 
 
 def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:
@@ -53,7 +52,7 @@ def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:
     value = inner.mapping.get("ends")
     if value is None:
         return ENDS
-    if not isinstance(value, Tree):
+    if not isinstance(value, MappingNode):
         inner.add(codes.WRONG_SHAPE.at(value.span, "'ends' needs names below it, such as 'lost: failure'"))
         return ENDS
     read = dict(ENDS)
@@ -65,7 +64,7 @@ def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:
             inner.add(
                 codes.NAME_CLASH.at(entry.key.span, f"an end cannot be named '{name}': that means something else")
             )
-        word = entry.value.text if isinstance(entry.value, Scalar) else ""
+        word = entry.value.text if isinstance(entry.value, ScalarNode) else ""
         if word not in RESULTS:
             message = f"the end '{name}' must count as 'success' or 'failure'"
             inner.add(codes.NOT_A_CHOICE.misspelt(entry.value.span, message, word, RESULTS, WORDS))
@@ -84,7 +83,7 @@ def read_state(reader: NodeReader) -> Next | None:
         reader.child("do")
     else:
         entry = reader.mapping.entries["machine"]
-        reader.child_node(Tree({"machine": entry}, entry.key.span), "machine")
+        reader.child_node(MappingNode({"machine": entry}, entry.key.span), "machine")
     return _next(reader)
 
 
@@ -94,9 +93,9 @@ def _next(reader: NodeReader) -> Next | None:
         return None
     if is_told(value):
         return Next(dict(zip(RESULTS, ENDS, strict=True)))  # so that nothing else is said of where it leads
-    if isinstance(value, Scalar) and value.text:
+    if isinstance(value, ScalarNode) and value.text:
         return Next({"": value.text}, {"": value.span})
-    if not isinstance(value, Tree) or not value.entries:
+    if not isinstance(value, MappingNode) or not value.entries:
         reader.add(
             codes.WRONG_SHAPE.at(
                 reader.key_span("next"),
@@ -107,13 +106,13 @@ def _next(reader: NodeReader) -> Next | None:
     to: dict[str, str] = {}
     spans: dict[str, Span] = {}
     for outcome, entry in value.entries.items():
-        if isinstance(entry.value, Scalar) and entry.value.text:
+        if isinstance(entry.value, ScalarNode) and entry.value.text:
             to[outcome], spans[outcome] = entry.value.text, entry.value.span
         else:
             reader.add(codes.WRONG_SHAPE.at(entry.key.span, f"the outcome '{outcome}' needs the name of a state"))
     return Next(to, spans, {outcome: entry.key.span for outcome, entry in value.entries.items()})
 
 
-def as_state(entry: Entry) -> Tree:
+def as_state(entry: Entry) -> MappingNode:
     """Return the mapping of a state, also if it was written wrongly."""
-    return entry.value if isinstance(entry.value, Tree) else Tree({}, entry.key.span)
+    return entry.value if isinstance(entry.value, MappingNode) else MappingNode({}, entry.key.span)

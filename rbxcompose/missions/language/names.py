@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from rbxcompose.findings import Finding, Fix
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
@@ -19,7 +19,7 @@ def cure(text: str) -> str:
     return meant if NAME.fullmatch(meant) else ""
 
 
-def no_name(scalar: Scalar, fix: Fix | None = None) -> Finding:
+def no_name(scalar: ScalarNode, fix: Fix | None = None) -> Finding:
     """Return the finding about a text that stands where a name should."""
     meant = cure(scalar.text)
     help_text = f"write '{meant}': names have small letters, digits and underscores" if meant else NAME_HELP

@@ -9,35 +9,35 @@ from rbxcompose.expressions.text import Template, parse_template
 from rbxcompose.expressions.tree import Expression, ExpressionError
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.asked import Argument, Asked, Assignment
+from rbxcompose.missions.language.asked import Asked, Assignment, WrittenArgument
 from rbxcompose.missions.language.grammar import Takes, is_told
 from rbxcompose.missions.language.spans import expression_of
 from rbxcompose.missions.language.value_reader import Nodes, ValueReader, read_expression
-from rbxcompose.missions.program.messages import Message, Shape, Written
+from rbxcompose.missions.program.messages import MessageTemplate, TemplateShape, WrittenValue
 from rbxcompose.missions.program.moments import DEEDS, LEVELS, OPTIONS, Deeds, Moments
 
 
 class NodeReader(ValueReader):
     """One mapping of a mission, being read, with the nodes below it."""
 
-    def __init__(self, mapping: Mapping, key: str, number: int, nodes: Nodes) -> None:
+    def __init__(self, mapping: MappingNode, key: str, number: int, nodes: Nodes) -> None:
         super().__init__(mapping, key, nodes)
         self.number = number
         self.children: list[int] = []
         self.item = ""
 
-    def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Mapping | None:
+    def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> MappingNode | None:
         """Return an option that must be a map with entries; None, and a finding, if it is not."""
         value = self.take(key, takes)
-        if isinstance(value, Mapping) and value.entries:
+        if isinstance(value, MappingNode) and value.entries:
             return value
         if not is_told(value):
             self.add(codes.WRONG_SHAPE.at(self.key_span(key), f"'{key}' needs {what}"))
         return None
 
-    def inside(self, mapping: Mapping, keys: Iterable[str], what: str) -> NodeReader:
+    def inside(self, mapping: MappingNode, keys: Iterable[str], what: str) -> NodeReader:
         """Return a reader of a map below this node; keys that do not belong to it are findings."""
         for key, entry in mapping.entries.items():
             if key not in keys:
@@ -46,7 +46,7 @@ class NodeReader(ValueReader):
                 self.add(codes.UNKNOWN_KEY.misspelt(entry.key.span, message, key, keys, of, taken=taken))
         return NodeReader(mapping, self.key, self.number, self.nodes)
 
-    def child_node(self, node: Node, step: str) -> None:
+    def child_node(self, node: TreeNode, step: str) -> None:
         """Read a node that belongs to this one."""
         self.children.append(self.nodes.child(node, step, self.number))
 
@@ -61,7 +61,7 @@ class NodeReader(ValueReader):
     def branches(self) -> tuple[str, ...]:
         """Read the branches of a parallel: a list, or a map, of which the names are returned."""
         value = self.take(self.key, Takes.BRANCHES)
-        if not isinstance(value, Mapping):
+        if not isinstance(value, MappingNode):
             self._list(value)
             return ()
         if not value.entries:
@@ -85,19 +85,19 @@ class NodeReader(ValueReader):
         self.asked.extend(asked for asked in read if asked.expression.names)  # a bare word need be no place
         return tuple(read)
 
-    def asked_later(self, mapping: Mapping, key: str) -> Asked | None:
+    def asked_later(self, mapping: MappingNode, key: str) -> Asked | None:
         """Read a condition whose names only its kind knows, so that the kind has to check it."""
         reader = NodeReader(mapping, key, self.number, self.nodes)
         reader.condition(key)
         return reader.asked[0] if reader.asked else None
 
-    def message(self, target: str, body: str) -> Message:
+    def message(self, target: str, body: str) -> MessageTemplate:
         """Read where a message goes, and what is in it."""
         scalar = self.scalar(target, "the name of a topic or a service")
         value = self.mapping.get(body)
         shape = None if value is None else self._shape(value)
         keys = {} if value is None else dict(_keys_of(value))
-        return Message(scalar or Scalar("", self.key_span(target)), shape, keys)
+        return MessageTemplate(scalar or ScalarNode("", self.key_span(target)), shape, keys)
 
     def moments(self, keys: Iterable[str]) -> Moments:
         """Read hooks: what is set, logged or published at some moments."""
@@ -121,20 +121,20 @@ class NodeReader(ValueReader):
         self.asked.extend(inner.asked)
         return deeds
 
-    def _shape(self, node: Node) -> Shape:
+    def _shape(self, node: TreeNode) -> TemplateShape:
         match node:
-            case Mapping(entries=entries):
+            case MappingNode(entries=entries):
                 return {name: self._shape(entry.value) for name, entry in entries.items()}
-            case Sequence(items=items):
+            case SequenceNode(items=items):
                 return tuple(self._shape(item) for item in items)
-            case Scalar():
+            case ScalarNode():
                 try:
                     expression = expression_of(node)
                 except ExpressionError:
                     expression = None
-                return Written(node, self._quiet_template(node), expression)
+                return WrittenValue(node, self._quiet_template(node), expression)
 
-    def _quiet_template(self, scalar: Scalar) -> Template:
+    def _quiet_template(self, scalar: ScalarNode) -> Template:
         try:
             return parse_template(scalar.text)
         except ExpressionError:
@@ -143,7 +143,7 @@ class NodeReader(ValueReader):
     def child(self, key: str) -> None:
         """Read the node under a key, which must be there."""
         value = self.take(key, Takes.STEP)
-        if value is None or (isinstance(value, Scalar) and value.plain and not value.text):
+        if value is None or (isinstance(value, ScalarNode) and value.plain and not value.text):
             span = self.key_span(key) if value else self.span
             self.nodes.add(codes.MISSING.at(span, f"'{self.key}' needs '{key}': what is to be done"))
             return
@@ -153,8 +153,8 @@ class NodeReader(ValueReader):
         """Read the list that is the kind's value."""
         self._list(self.take(self.key, Takes.STEPS))
 
-    def _list(self, value: Node | None) -> None:
-        items = value.items if isinstance(value, Sequence) else ()
+    def _list(self, value: TreeNode | None) -> None:
+        items = value.items if isinstance(value, SequenceNode) else ()
         for index, item in enumerate(items):
             self.child_node(item, str(index))
         if value and not items and not is_told(value):
@@ -169,13 +169,13 @@ class NodeReader(ValueReader):
     def items(self, key: str) -> Expression | tuple[Expression, ...]:
         """Read a list that is written out, or an expression that gives one (of a map: its keys)."""
         value = self.take(key, Takes.ITEMS)
-        if not isinstance(value, Sequence):
+        if not isinstance(value, SequenceNode):
             expression = self.expression(key, UNKNOWN, "a list")
             self.nodes.loop(self.item, expression)
             return expression
         items = []
         for item in value.items:
-            if isinstance(item, Scalar):
+            if isinstance(item, ScalarNode):
                 items.append(self._asked(item, UNKNOWN))
             else:
                 self.nodes.add(codes.WRONG_SHAPE.at(item.span, "an item must be a word, a number or '$name'"))
@@ -186,7 +186,7 @@ class NodeReader(ValueReader):
         value = self.take(key, Takes.ASSIGNMENTS)
         if is_told(value):
             return ()
-        if not isinstance(value, Mapping) or not value.entries:
+        if not isinstance(value, MappingNode) or not value.entries:
             message = f"'{key}' needs names and their values"
             help_text = f"write 'name: value' on the line below '{key}:', further right and without a dash"
             self.nodes.add(codes.WRONG_SHAPE.at(self.key_span(key), message, help=help_text))
@@ -199,19 +199,19 @@ class NodeReader(ValueReader):
         self.asked.extend(replace(asked, is_assigned=True) for asked in inner.asked)
         return tuple(read)
 
-    def arguments(self) -> tuple[Argument, ...]:
+    def arguments(self) -> tuple[WrittenArgument, ...]:
         """Read the arguments of a skill: one value, or a map of several."""
         match self.mapping.get(self.key):
-            case Mapping(entries=entries):
-                return tuple(Argument(name, entry.value, entry.key.span) for name, entry in entries.items())
-            case Scalar(text="", plain=True) | None:
+            case MappingNode(entries=entries):
+                return tuple(WrittenArgument(name, entry.value, entry.key.span) for name, entry in entries.items())
+            case ScalarNode(text="", plain=True) | None:
                 return ()
             case value:
-                return (Argument("", value, value.span),)
+                return (WrittenArgument("", value, value.span),)
 
 
-def _keys_of(node: Node, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Span]]:
+def _keys_of(node: TreeNode, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Span]]:
     """Yield the places of all keys of maps in maps, by their paths."""
-    for name, entry in node.entries.items() if isinstance(node, Mapping) else ():
+    for name, entry in node.entries.items() if isinstance(node, MappingNode) else ():
         yield (*path, name), entry.key.span
         yield from _keys_of(entry.value, (*path, name))

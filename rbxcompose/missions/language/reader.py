@@ -8,9 +8,9 @@ from dataclasses import replace
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Finding, Related, Report, Span
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.analysis.held_nodes import ITEM, Pattern, matching, pattern_of, with_held
+from rbxcompose.missions.analysis.held_nodes import ITEM, PathPattern, matching, pattern_of, with_held
 from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.language.grammar import LEVELS, Takes, long_form
 from rbxcompose.missions.language.header import read_data, read_inputs, read_rate
@@ -23,14 +23,14 @@ from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
 from rbxcompose.missions.program import program
 from rbxcompose.missions.program.machines import STATE
 from rbxcompose.missions.program.program import AFTERWARDS, RESTART, Interrupt, Program, Target
-from rbxcompose.missions.program.registry import SKILL, Kind, all_kinds, kinds
+from rbxcompose.missions.program.registry import SKILL, StepType, all_kinds, kinds
 
 BODIES = ("do", "machine")
 KEYS = ("rbx", "kind", "name", "about", "inputs", "data", "outputs", "interrupts", "rate", *BODIES)
 INTERRUPT_KEYS = ("when", "do", "afterwards")
 
 
-def read_program(root: Mapping, report: Report, skills: Collection[str] = ()) -> Program | None:
+def read_program(root: MappingNode, report: Report, skills: Collection[str] = ()) -> Program | None:
     """Return the program of a mission file, None if it has nothing to do; `skills` are the robot's, if known.
 
     What could not be read is left out of the program, so that the rest can be checked; it may run only if the report
@@ -67,7 +67,7 @@ def read_program(root: Mapping, report: Report, skills: Collection[str] = ()) ->
     )
 
 
-def _body(root: Mapping, report: Report) -> Node | None:
+def _body(root: MappingNode, report: Report) -> TreeNode | None:
     """Return what a mission does: the node under `do`, or a machine."""
     bodies = [key for key in BODIES if root.get(key) is not None]
     if not bodies:
@@ -79,25 +79,25 @@ def _body(root: Mapping, report: Report) -> Node | None:
     if bodies[0] == "do":
         return root.get("do")
     entry = root.entries["machine"]
-    return Mapping({"machine": entry}, entry.key.span)
+    return MappingNode({"machine": entry}, entry.key.span)
 
 
-def _text(root: Mapping, key: str) -> str:
+def _text(root: MappingNode, key: str) -> str:
     value = root.get(key)
-    return value.text if isinstance(value, Scalar) else ""
+    return value.text if isinstance(value, ScalarNode) else ""
 
 
 class _Reader:
     """Numbers the nodes in the order of the text, and keeps where it is."""
 
-    def __init__(self, report: Report, root: Mapping, repairs: Repairs) -> None:
+    def __init__(self, report: Report, root: MappingNode, repairs: Repairs) -> None:
         self.report = report
         self.repairs = repairs
         data = root.get("data")
-        self.data = {name: entry.value for name, entry in data.entries.items()} if isinstance(data, Mapping) else {}
-        self.patterns: dict[str, Pattern] = {}  # where in the data the items of loops stand
-        self.found: dict[tuple[str, ...], Node] = {}  # the nodes in the data
-        self.nodes: list[program.Node | None] = []
+        self.data = {name: entry.value for name, entry in data.entries.items()} if isinstance(data, MappingNode) else {}
+        self.patterns: dict[str, PathPattern] = {}  # where in the data the items of loops stand
+        self.found: dict[tuple[str, ...], TreeNode] = {}  # the nodes in the data
+        self.nodes: list[program.MissionNode | None] = []
         self.names: dict[str, Span] = {}
         self.paths: list[str] = []  # of the nodes that are being read, from the outside in
 
@@ -105,14 +105,14 @@ class _Reader:
         """Keep a finding."""
         self.report.add(finding)
 
-    def child(self, node: Node, step: str, parent: int | None) -> int:
+    def child(self, node: TreeNode, step: str, parent: int | None) -> int:
         """Read a node and all below it, and return its number."""
         number = len(self.nodes)
         self.nodes.append(None)
         mapping = long_form(node)
         if len(self.paths) == LEVELS:
             self.add(codes.TOO_DEEP.at(node.span, f"more than {LEVELS} levels of steps"))
-            mapping = Mapping(span=node.span)
+            mapping = MappingNode(span=node.span)
             key, kind = "", None
         else:
             key, kind = find_key(mapping, self)
@@ -160,11 +160,11 @@ class _Reader:
             numbers.append(number)
         return numbers
 
-    def outputs(self, node: Node | None) -> dict[str, Asked]:
+    def outputs(self, node: TreeNode | None) -> dict[str, Asked]:
         """Read the outputs: a map from names to expressions."""
         if node is None:
             return {}
-        if not isinstance(node, Mapping):
+        if not isinstance(node, MappingNode):
             self.add(codes.WRONG_SHAPE.at(node.span, "'outputs' needs names with their values below it"))
             return {}
         reader = NodeReader(node, "outputs", len(self.nodes), self)
@@ -185,8 +185,8 @@ class _Reader:
         return f"{self.paths[-1]}.{word}" if step in ("do", word) else f"{self.paths[-1]}.{step}.{word}"
 
     def read(
-        self, reader: NodeReader, kind: Kind | None, parent: int | None, name: str, span: Span | None = None
-    ) -> program.Node:
+        self, reader: NodeReader, kind: StepType | None, parent: int | None, name: str, span: Span | None = None
+    ) -> program.MissionNode:
         """Read the value, the options and the modifiers of a node."""
         step = (kind or all_kinds()[SKILL]).read(reader)
         own, read = len(reader.asked), {}
@@ -194,7 +194,7 @@ class _Reader:
         for key, cls in modifiers().items():
             if any(reader.has(one) for one in (key, *cls.keys)) and (is_state or not cls.only_states):
                 read[key] = cls.read(reader, key)
-        return program.Node(
+        return program.MissionNode(
             number=reader.number,
             step=step,
             name=name,
@@ -209,12 +209,12 @@ class _Reader:
             item=reader.item,
         )
 
-    def name_of(self, mapping: Mapping) -> str:
+    def name_of(self, mapping: MappingNode) -> str:
         """Return the name of a node, if it has one; a name belongs to one node only."""
         value = mapping.get("name")
         if value is None:
             return ""
-        if not isinstance(value, Scalar):
+        if not isinstance(value, ScalarNode):
             self.add(codes.WRONG_SHAPE.at(value.span, "this is no name", help=NAME_HELP))
             return ""
         if not NAME.fullmatch(value.text):
@@ -232,11 +232,11 @@ class _Reader:
         self.names.setdefault(value.text, value.span)
         return value.text
 
-    def interrupts(self, node: Node | None) -> tuple[Interrupt, ...]:
+    def interrupts(self, node: TreeNode | None) -> tuple[Interrupt, ...]:
         """Read the interrupts in their order."""
         if node is None:
             return ()
-        if not isinstance(node, Mapping):
+        if not isinstance(node, MappingNode):
             self.add(codes.WRONG_SHAPE.at(node.span, "'interrupts' needs names below it, each with 'when' and 'do'"))
             return ()
         read = [self.interrupt(name, entry) for name, entry in node.entries.items()]
@@ -248,7 +248,7 @@ class _Reader:
         value = entry.value
         if not NAME.fullmatch(name):
             self.add(no_name(entry.key))
-        if not isinstance(value, Mapping):
+        if not isinstance(value, MappingNode):
             self.add(codes.WRONG_SHAPE.at(value.span, f"the interrupt '{name}' needs 'when' and 'do'"))
             return None
         for key, unknown in value.entries.items():
@@ -268,15 +268,15 @@ class _Reader:
             return None
         return Interrupt(name, reader.asked[0], root, afterwards, entry.key.span, restarts)
 
-    def afterwards(self, reader: NodeReader) -> tuple[str, Scalar | None]:
+    def afterwards(self, reader: NodeReader) -> tuple[str, ScalarNode | None]:
         """Read what comes after a reaction: a word, or `restart` with the name of what begins anew."""
         value = reader.take("afterwards", Takes.AFTERWARDS)
-        if not isinstance(value, Mapping):
+        if not isinstance(value, MappingNode):
             return reader.choice("afterwards", AFTERWARDS), None
         inner = reader.inside(value, (RESTART,), "'afterwards'")
         return RESTART, inner.scalar(RESTART, "the name of a step, a state or a loop's item")
 
-    def targets(self, named: Scalar | None) -> tuple[Target, ...]:
+    def targets(self, named: ScalarNode | None) -> tuple[Target, ...]:
         """Return all nodes, states and loops over an item with a name; nothing if none is named."""
         if named is None:
             return ()

@@ -6,9 +6,18 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from rbxcompose.findings import Report
-from rbxcompose.manifest.tree import Key, Node, Scalar, with_children
-from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.missions.language.grammar import BELOW, EACH, LEVELS, Place, Slot, Takes, Words, is_empty, long_form
+from rbxcompose.manifest.tree import Key, MappingNode, ScalarNode, TreeNode, with_children
+from rbxcompose.missions.language.grammar import (
+    BELOW,
+    EACH,
+    LEVELS,
+    GrammarPlace,
+    KeySlot,
+    Takes,
+    Words,
+    is_empty,
+    long_form,
+)
 from rbxcompose.missions.language.layout import state_slots, step_slots, words
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import repaired
@@ -26,37 +35,37 @@ class Repairs:
         """Return what repairs a mission of a robot with these skills, as far as they are known."""
         return cls(report, words(frozenset(skills)))
 
-    def mission(self, root: Tree) -> Tree:
+    def mission(self, root: MappingNode) -> MappingNode:
         """Return the tree of a mission without slips."""
-        found = self._node(Slot(Takes.MISSION), Scalar("", root.span), root, 0)
-        return found if isinstance(found, Tree) else root
+        found = self._node(KeySlot(Takes.MISSION), ScalarNode("", root.span), root, 0)
+        return found if isinstance(found, MappingNode) else root
 
-    def step(self, node: Node, depth: int) -> Node:
+    def step(self, node: TreeNode, depth: int) -> TreeNode:
         """Return a step without slips that stands within `depth` others."""
-        return self._node(Slot(Takes.STEP), Scalar("", node.span), node, depth)
+        return self._node(KeySlot(Takes.STEP), ScalarNode("", node.span), node, depth)
 
-    def _node(self, slot: Slot, key: Scalar, node: Node, depth: int) -> Node:
+    def _node(self, slot: KeySlot, key: ScalarNode, node: TreeNode, depth: int) -> TreeNode:
         is_step = slot.takes is Takes.STEP
         if is_step and (depth == LEVELS or is_empty(node)):
             return node
-        place = Place(slot.takes, key, self.words, slot.choices)
+        place = GrammarPlace(slot.takes, key, self.words, slot.choices)
         node = repaired(slip.at(slot.takes), place, long_form(node) if is_step else node, self.report)
         slots = self._below(slot.takes, node)
         inside = depth + (slot.takes in (Takes.STEP, Takes.STATE))
 
-        def below(name: Key, child: Node) -> Node:
+        def below(name: Key, child: TreeNode) -> TreeNode:
             inner = slots.get(str(name)) or slots.get(EACH)
             if inner is None or inner.takes is Takes.OTHER:
                 return child
-            behind = node.entries[str(name)].key if isinstance(node, Tree) else key
+            behind = node.entries[str(name)].key if isinstance(node, MappingNode) else key
             return self._node(inner, behind, child, inside)
 
         return with_children(node, below) if slots else node
 
-    def _below(self, takes: Takes, node: Node) -> Mapping[str, Slot]:
+    def _below(self, takes: Takes, node: TreeNode) -> Mapping[str, KeySlot]:
         """Return what stands below a node, by key."""
         if takes is Takes.STATE:
             return state_slots()
-        if takes is Takes.STEP and isinstance(node, Tree):
+        if takes is Takes.STEP and isinstance(node, MappingNode):
             return step_slots(self.words.kind_of(node))
         return BELOW.get(takes, {})

@@ -5,11 +5,11 @@ from __future__ import annotations
 from rbxcompose.expressions.parser import parse
 from rbxcompose.expressions.tree import Expression, Flag, Number, Text, Word
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.units import NUMBER, Quantity
 
 
-def inner_span(scalar: Scalar, start: int, end: int) -> Span:
+def inner_span(scalar: ScalarNode, start: int, end: int) -> Span:
     """Return the place of the characters `start` to `end` of a scalar.
 
     Where the text in the file is another one (folded lines, escapes, what was filled in), it is the whole scalar.
@@ -22,7 +22,7 @@ def inner_span(scalar: Scalar, start: int, end: int) -> Span:
     return span._replace(column=first, end_column=max(first + 1, span.column + quotes + end))
 
 
-def expression_of(scalar: Scalar) -> Expression:
+def expression_of(scalar: ScalarNode) -> Expression:
     """Return the expression that a scalar holds; what `${...}` gave it is a value already.
 
     Raises:
@@ -42,7 +42,7 @@ def expression_of(scalar: Scalar) -> Expression:
             return Expression(scalar.text, Text(0, end, str(text)))
 
 
-def _parsed(scalar: Scalar) -> Expression:
+def _parsed(scalar: ScalarNode) -> Expression:
     # Quotes round a whole word are meant: people write 'hello' for a text, and YAML takes the quotes away.
     expression = parse(scalar.text)
     if not scalar.plain and isinstance(expression.tree, Word):

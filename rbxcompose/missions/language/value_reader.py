@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from rbxcompose.expressions.text import Slot, Template, parse_template
+from rbxcompose.expressions.text import Template, TextSlot, parse_template
 from rbxcompose.expressions.tree import Expression, ExpressionError, Number
 from rbxcompose.expressions.types import COUNT, FLAG, UNKNOWN, Type, quantity_of
 from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.language.grammar import Takes, is_told
@@ -27,7 +27,7 @@ UNREADABLE = Expression("", Number(0, 0, 0.0, NUMBER))
 class Nodes(Protocol):
     """Who reads the nodes below, and keeps the findings."""
 
-    def child(self, node: Node, step: str, parent: int) -> int:
+    def child(self, node: TreeNode, step: str, parent: int) -> int:
         """Read a node below `parent` and return its number; `step` is the next part of its path."""
         ...
 
@@ -48,7 +48,7 @@ class Nodes(Protocol):
         ...
 
 
-def read_expression(scalar: Scalar, nodes: Nodes) -> Expression | None:
+def read_expression(scalar: ScalarNode, nodes: Nodes) -> Expression | None:
     """Return the expression in a scalar; None, and a finding, if there is none."""
     try:
         return expression_of(scalar)
@@ -61,7 +61,7 @@ def read_expression(scalar: Scalar, nodes: Nodes) -> Expression | None:
 class ValueReader:
     """The values of one mapping of a mission: `key` is the word of its kind, or the name of its skill."""
 
-    def __init__(self, mapping: Mapping, key: str, nodes: Nodes) -> None:
+    def __init__(self, mapping: MappingNode, key: str, nodes: Nodes) -> None:
         self.mapping = mapping
         self.key = key
         self.nodes = nodes
@@ -81,22 +81,22 @@ class ValueReader:
         entry = self.mapping.entries.get(key)
         return entry.key.span if entry else self.mapping.span
 
-    def take(self, key: str, takes: Takes = Takes.OTHER, choices: tuple[str, ...] = ()) -> Node | None:
+    def take(self, key: str, takes: Takes = Takes.OTHER, choices: tuple[str, ...] = ()) -> TreeNode | None:
         """Return the value of a key, at which the grammar takes this, or one of some words."""
         return self.mapping.get(key)
 
-    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> Scalar | None:
+    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> ScalarNode | None:
         """Return an option that must be one word, number or text; None, and a finding, if it is not."""
         value = self.take(key, takes)
         if is_told(value):
             return None
-        if isinstance(value, Scalar) and (value.text or not value.plain):
+        if isinstance(value, ScalarNode) and (value.text or not value.plain):
             return value
-        if value is None or isinstance(value, Scalar):
+        if value is None or isinstance(value, ScalarNode):
             self.nodes.add(codes.MISSING.at(self.key_span(key), f"'{key}' needs {what}"))
             return None
-        found = "a list" if isinstance(value, Sequence) else "names with values"
-        help_text = _FLOW_HELP if isinstance(value, Mapping) and what == "a condition" else ""
+        found = "a list" if isinstance(value, SequenceNode) else "names with values"
+        help_text = _FLOW_HELP if isinstance(value, MappingNode) and what == "a condition" else ""
         self.nodes.add(codes.WRONG_SHAPE.at(value.span, f"'{key}' needs {what}, not {found}", help=help_text))
         return None
 
@@ -121,7 +121,7 @@ class ValueReader:
     def count_or(self, key: str, words: tuple[str, ...]) -> Expression | str:
         """Read a whole number, or one of some words."""
         value = self.take(key, Takes.COUNT, words)
-        if isinstance(value, Scalar) and value.text in words:
+        if isinstance(value, ScalarNode) and value.text in words:
             return value.text
         return self.expression(key, COUNT, f"a number or {' or '.join(repr(word) for word in words)}")
 
@@ -148,14 +148,14 @@ class ValueReader:
         scalar = self.scalar(key, "a text")
         return self.template_of(scalar) if scalar else Template("", ())
 
-    def template_of(self, scalar: Scalar) -> Template:
+    def template_of(self, scalar: ScalarNode) -> Template:
         """Return the text of a scalar with its slots."""
         try:
             template = parse_template(scalar.text)
         except ExpressionError as error:
             self.nodes.add(codes.NO_EXPRESSION.at(inner_span(scalar, error.start, error.end), error.message))
             return Template("", ())
-        slots = (part for part in template.parts if isinstance(part, Slot))
+        slots = (part for part in template.parts if isinstance(part, TextSlot))
         self.asked.extend(Asked(slot.value, UNKNOWN, _part_of(scalar, slot)) for slot in slots)
         return template
 
@@ -163,19 +163,19 @@ class ValueReader:
         """Keep a finding."""
         self.nodes.add(finding)
 
-    def name(self, key: str, what: str) -> Scalar:
+    def name(self, key: str, what: str) -> ScalarNode:
         """Read a name; one without text, and a finding, if there is none."""
         scalar = self.scalar(key, what)
-        return scalar if scalar and self.check_name(scalar) else Scalar("", self.key_span(key))
+        return scalar if scalar and self.check_name(scalar) else ScalarNode("", self.key_span(key))
 
-    def check_name(self, scalar: Scalar) -> bool:
+    def check_name(self, scalar: ScalarNode) -> bool:
         """Tell whether a word may be a name; a finding says it if not."""
         if not NAME.fullmatch(scalar.text):
             self.add(no_name(scalar))
             return False
         return True
 
-    def _asked(self, scalar: Scalar, wanted: Type) -> Expression:
+    def _asked(self, scalar: ScalarNode, wanted: Type) -> Expression:
         expression = read_expression(scalar, self.nodes)
         if expression is None:
             return UNREADABLE
@@ -194,5 +194,5 @@ class ValueReader:
 _FLOW_HELP = "inside '{}', commas and colons divide: put quotes round the condition, or write it in block style"
 
 
-def _part_of(scalar: Scalar, slot: Slot) -> Scalar:
-    return Scalar(f"${slot.path}", inner_span(scalar, slot.start, slot.end))
+def _part_of(scalar: ScalarNode, slot: TextSlot) -> ScalarNode:
+    return ScalarNode(f"${slot.path}", inner_span(scalar, slot.start, slot.end))

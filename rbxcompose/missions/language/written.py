@@ -7,9 +7,8 @@ from collections.abc import Callable
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.text import parse_template
 from rbxcompose.expressions.types import Type, TypeKind
-from rbxcompose.expressions.values import Place, Value
-from rbxcompose.manifest.tree import Node as Located
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.expressions.values import NamedPose, Value
+from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.language.literals import literal
 from rbxcompose.missions.language.spans import expression_of
@@ -19,9 +18,9 @@ Getter = Callable[[Task], Value]
 PLACED = (TypeKind.PLACE, TypeKind.POSE)
 
 
-def getter(value: Located, wanted: Type) -> Getter:
+def getter(value: TreeNode, wanted: Type) -> Getter:
     """Return what computes an argument of the type `wanted` from what was written."""
-    if not isinstance(value, Scalar):
+    if not isinstance(value, ScalarNode):
         constant = literal(value).value
         return lambda task: constant
     if wanted.kind is TypeKind.TEXT:
@@ -45,4 +44,4 @@ def place(task: Task, value: Value) -> Value:
 
 def _word(value: Value) -> Value:
     """Return a choice as text, also where a place has the same name."""
-    return value.name if isinstance(value, Place) else value
+    return value.name if isinstance(value, NamedPose) else value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rbxcompose.missions.program.answers import Serves
+from rbxcompose.missions.program.answers import ModifierScope
 from rbxcompose.missions.program.modifier import Modifier
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, Outcomes
 
@@ -12,7 +12,7 @@ class Plain(Modifier):
 
     __slots__ = ()
     may_skip = False
-    serves = Serves.ALL
+    serves = ModifierScope.ALL
 
     def changed(self, inner: Outcomes) -> Outcomes:
         """Return what is inside."""

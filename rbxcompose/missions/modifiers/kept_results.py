@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.families import Plain
@@ -53,7 +53,7 @@ class Save(Plain):
           - log: $tour.failed could not be reached
     """
 
-    kept_as: Scalar
+    kept_as: ScalarNode
 
     value = None
 
@@ -63,7 +63,7 @@ class Save(Plain):
         return cls(reader.name(key, "a name for the result"))
 
     @property
-    def saved(self) -> Scalar | None:
+    def saved(self) -> ScalarNode | None:
         """Return the name."""
         return self.kept_as if self.kept_as.text else None
 

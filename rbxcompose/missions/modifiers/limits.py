@@ -14,7 +14,7 @@ from rbxcompose.missions.engine.condition_watches import Watched
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.answers import Advice, Counted, Serves
+from rbxcompose.missions.program.answers import Advice, Counted, ModifierScope
 from rbxcompose.missions.program.modifier import Modifier
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, SUCCEEDS, Outcomes
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING
@@ -28,7 +28,7 @@ class Cutting(Modifier):
 
     __slots__ = ()
     may_skip = False
-    serves = Serves.ALL
+    serves = ModifierScope.ALL
 
     def changed(self, inner: Outcomes) -> Outcomes:
         """Return that it may also fail."""
@@ -228,9 +228,9 @@ class Attempts(Modifier):
         return inner.of(SUCCEEDS) if self.value is None and not self.timeout else inner
 
     @property
-    def serves(self) -> Serves:
+    def serves(self) -> ModifierScope:
         """Return those that may fail; an attempt that may be cut short always may."""
-        return Serves.ALL if self.timeout else Serves.FAILING
+        return ModifierScope.ALL if self.timeout else ModifierScope.FAILING
 
     @property
     def said(self) -> str:

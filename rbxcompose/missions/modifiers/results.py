@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.answers import Serves
+from rbxcompose.missions.program.answers import ModifierScope
 from rbxcompose.missions.program.modifier import Modifier
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, FAILS, SUCCEEDS, Outcomes
 from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
@@ -73,9 +73,9 @@ class Optional(Turning):
         return inner.of(SUCCEEDS).both(ALWAYS_SUCCEEDS)
 
     @property
-    def serves(self) -> Serves:
+    def serves(self) -> ModifierScope:
         """Return those that may fail."""
-        return Serves.FAILING if self.is_on else Serves.ALL
+        return ModifierScope.FAILING if self.is_on else ModifierScope.ALL
 
     @property
     def forgives(self) -> bool:
@@ -96,7 +96,7 @@ class Invert(Turning):
 
     __slots__ = ()
     turns = {FAILURE: SUCCESS, SUCCESS: FAILURE}
-    serves = Serves.ALL
+    serves = ModifierScope.ALL
 
     def changed(self, inner: Outcomes) -> Outcomes:
         """Return that each is the other."""

@@ -11,7 +11,7 @@ from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.families import Skipping
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.answers import Serves
+from rbxcompose.missions.program.answers import ModifierScope
 from rbxcompose.missions.program.statuses import RUNNING, SKIPPED
 
 
@@ -50,7 +50,7 @@ class Conditional(Skipping):
 
     value: Expression = field()
 
-    serves = Serves.ALL
+    serves = ModifierScope.ALL
 
     @classmethod
     def read(cls, reader: NodeReader, key: str) -> Self:
@@ -147,9 +147,9 @@ class Once(Skipping):
         return cls(reader.flag(key))
 
     @property
-    def serves(self) -> Serves:
+    def serves(self) -> ModifierScope:
         """Return those that come again."""
-        return Serves.REPEATED if self.is_on else Serves.ALL
+        return ModifierScope.REPEATED if self.is_on else ModifierScope.ALL
 
 
 class CooldownTask(CountingTask):
@@ -186,7 +186,7 @@ class Cooldown(Skipping):
 
     value: Expression = field()
 
-    serves = Serves.REPEATED
+    serves = ModifierScope.REPEATED
 
     @classmethod
     def read(cls, reader: NodeReader, key: str) -> Self:

@@ -23,7 +23,7 @@ class Counted(NamedTuple):
     least: float
 
 
-class Flow(Enum):
+class NodeFlow(Enum):
     """How a node goes through those inside it when all goes well."""
 
     IN_TURN = auto()
@@ -40,7 +40,7 @@ class Skipped(Enum):
     PERHAPS = auto()
 
 
-class Serves(Enum):
+class ModifierScope(Enum):
     """For which nodes a modifier is there."""
 
     ALL = auto()

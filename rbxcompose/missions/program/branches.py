@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.values import NotArrived, Value
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.scopes import Inner, MissionScope
 from rbxcompose.missions.language.asked import Asked
@@ -20,7 +20,7 @@ RESULTS = (NAMES[SUCCESS], NAMES[FAILURE], NAMES[SKIPPED], HALTED)
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class OutcomeRule:
     """An outcome and the condition for it over the branches; None for `otherwise`."""
 
     name: str
@@ -39,7 +39,7 @@ class Branches:
     succeed_when: Expression | str = ALL
     fail_when: Expression | str = ANY
     ends_with: str = ""
-    outcomes: tuple[Outcome, ...] = ()
+    outcomes: tuple[OutcomeRule, ...] = ()
 
     def deciding(self, children: tuple[int, ...]) -> tuple[int, ...]:
         """Return the children whose results count."""
@@ -47,21 +47,21 @@ class Branches:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class BranchChoice:
     """What is asked, and the value of each case, in the order of the children."""
 
     asked: Expression
     cases: tuple[Asked, ...] = ()
 
 
-class Ended(str):
+class BranchResult(str):
     """The result of a branch as a text: one with an outcome of its own also equals what that counts as."""
 
     __slots__ = ("counts_as",)
     counts_as: str
 
     @classmethod
-    def of(cls, status: int, outcome: str) -> Ended:
+    def of(cls, status: int, outcome: str) -> BranchResult:
         """Return the result of a branch; one that has not ended was halted."""
         plain = NAMES[status] if NAMES[status] in RESULTS else HALTED
         ended = cls(outcome or plain)
@@ -80,7 +80,7 @@ class Ended(str):
 class BranchScope(Inner):
     """What the conditions of a parallel's outcomes see: also the result of each branch."""
 
-    def __init__(self, outer: MissionScope, ended: Mapping[str, Ended]) -> None:
+    def __init__(self, outer: MissionScope, ended: Mapping[str, BranchResult]) -> None:
         super().__init__(outer)
         self._ended = ended
 
@@ -89,7 +89,7 @@ class BranchScope(Inner):
         return self._ended[name] if name in self._ended else self.outer.variable(name)
 
 
-def read_outcomes(reader: NodeReader, branches: tuple[str, ...]) -> tuple[Outcome, ...]:
+def read_outcomes(reader: NodeReader, branches: tuple[str, ...]) -> tuple[OutcomeRule, ...]:
     """Read the outcomes of a parallel with these branches; `otherwise` comes last and must be there."""
     if not reader.has("outcomes"):
         return ()
@@ -102,12 +102,12 @@ def read_outcomes(reader: NodeReader, branches: tuple[str, ...]) -> tuple[Outcom
     read = []
     for index, (name, entry) in enumerate(value.entries.items()):
         is_last = index + 1 == len(value.entries)
-        is_otherwise = isinstance(entry.value, Scalar) and entry.value.text == OTHERWISE
+        is_otherwise = isinstance(entry.value, ScalarNode) and entry.value.text == OTHERWISE
         if is_otherwise != is_last:
             message = "'otherwise' comes last" if is_otherwise else f"the last outcome must be '{OTHERWISE}'"
             help_text = f"add a line such as 'lost: {OTHERWISE}'"
             reader.add(codes.WRONG_SHAPE.at(entry.value.span, message, help=help_text))
         reader.check_name(entry.key)
         asked = None if is_otherwise else reader.asked_later(value, name)
-        read.append(Outcome(name, asked.expression if asked else None, asked))
+        read.append(OutcomeRule(name, asked.expression if asked else None, asked))
     return tuple(read)

@@ -8,12 +8,12 @@ from collections.abc import Iterator, Mapping
 from rbxcompose.expressions.check import StaticScope
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import Type
-from rbxcompose.missions.program.answers import Flow, Skipped
-from rbxcompose.missions.program.look import PLAIN, Form, Look
-from rbxcompose.missions.program.moments import NO_EFFECTS, Effects
+from rbxcompose.missions.program.answers import NodeFlow, Skipped
+from rbxcompose.missions.program.look import PLAIN, Form, NodeLook
+from rbxcompose.missions.program.moments import NO_EFFECTS, NodeEffects
 from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.possible import Possibility, skipped, started
-from rbxcompose.missions.program.program import Node, RobotNames, Step
+from rbxcompose.missions.program.program import MissionNode, RobotNames, Step
 
 
 class LeafStep(Step):
@@ -22,17 +22,19 @@ class LeafStep(Step):
     __slots__ = ()
     skipped = Skipped.NEVER
     comes_again = False
-    flow = Flow.IN_TURN
+    flow = NodeFlow.IN_TURN
     look = PLAIN
 
     def endless(self, ends: Outcomes) -> None:
         """Say nothing: it is done once."""
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield nothing: whether it was started at all, the nodes around it tell."""
         yield from ()
 
-    def shows(self, node: Node, scope: StaticScope) -> Mapping[str, Type]:
+    def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
         """Return nothing: there is none inside."""
         return {}
 
@@ -52,7 +54,7 @@ class Deed(LeafStep):
     lasts = None
 
 
-class Group(Step):
+class GroupStep(Step):
     """A node that does nothing by itself: what is done is done by those inside, which see what it sees."""
 
     __slots__ = ()
@@ -62,7 +64,7 @@ class Group(Step):
         """Tell that it decides more than an answer."""
         return False
 
-    def shows(self, node: Node, scope: StaticScope) -> Mapping[str, Type]:
+    def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
         """Return nothing: those inside see what it sees."""
         return {}
 
@@ -72,7 +74,7 @@ class Group(Step):
         return False
 
     @property
-    def effects(self) -> Effects:
+    def effects(self) -> NodeEffects:
         """Return that it has none."""
         return NO_EFFECTS
 
@@ -82,7 +84,7 @@ class Group(Step):
         return False
 
 
-class Straight(Group):
+class Straight(GroupStep):
     """A group that goes once through what is inside; tests need not see more of it than that."""
 
     __slots__ = ()
@@ -95,19 +97,23 @@ class Straight(Group):
     def endless(self, ends: Outcomes) -> None:
         """Say nothing: it is done once."""
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield nothing: there is one way through it."""
         yield from ()
 
 
-class Loop(Group):
+class Loop(GroupStep):
     """A group that comes back to what is inside, or does nothing at all."""
 
     __slots__ = ()
     comes_again = True
     skipped = Skipped.PERHAPS
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield nothing: how often it comes back is a matter of data."""
         yield from ()
 
@@ -117,15 +123,17 @@ class Choosing(Straight):
 
     __slots__ = ()
     skipped = Skipped.PERHAPS
-    flow = Flow.ONE_OF
-    look = Look(form=Form.BESIDE, has_roles=True)
+    flow = NodeFlow.ONE_OF
+    look = NodeLook(form=Form.BESIDE, has_roles=True)
 
     @property
     @abstractmethod
     def ways(self) -> tuple[str, ...]:
         """Return its ways in words, in the order of its nodes; the last of them may be that nothing is done."""
 
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield each node, and that nothing fits."""
         for index, word in enumerate(self.ways):
             if index < len(node.children):

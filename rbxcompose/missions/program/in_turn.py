@@ -13,7 +13,7 @@ from rbxcompose.missions.program.answers import Skipped
 from rbxcompose.missions.program.families import Straight
 from rbxcompose.missions.program.history import HISTORY, WithHistory, read_history
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, FAILS, NEVER, Outcomes
-from rbxcompose.missions.program.program import Endings, Node
+from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED
 
 WRITTEN, RANDOM = "written", "random"
@@ -43,7 +43,7 @@ class InTurn(Straight):
         reactive = reader.flag("reactive") if reader.has("reactive") else False
         return cls(reactive, read_history(reader), reader.choice("order", (WRITTEN, RANDOM)))
 
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return what decides of any child, and all of the last one that is reached."""
         found, goes_on_never = NEVER, ALWAYS_FAILS if self.decides == FAILS else ALWAYS_SUCCEEDS
         for child in map(endings.of, node.children[:-1]):
@@ -170,9 +170,9 @@ def _conditions(site: Site) -> dict[int, tuple[Watched, ...]]:
     return {node.number: tuple(_asked(nodes[node.number : node.end])) for node in asking}
 
 
-def _only_asks(nodes: tuple[Node, ...], node: Node) -> bool:
+def _only_asks(nodes: tuple[MissionNode, ...], node: MissionNode) -> bool:
     return node.step.only_asks and all(_only_asks(nodes, nodes[child]) for child in node.children)
 
 
-def _asked(nodes: tuple[Node, ...]) -> list[Watched]:
+def _asked(nodes: tuple[MissionNode, ...]) -> list[Watched]:
     return [Watched.of(asked.expression) for node in nodes for asked in node.asked]

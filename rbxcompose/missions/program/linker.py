@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from rbxcompose.missions.program.program import Interrupt, Node, Program, Target
+from rbxcompose.missions.program.program import Interrupt, MissionNode, Program, Target
 
 MOST_NODES = 20_000  # of a mission with all that it uses
 DEEPEST = 16  # missions within missions
@@ -29,7 +29,7 @@ class _Linker:
 
     def __init__(self, missions: Mapping[str, Program]) -> None:
         self.missions = missions
-        self.nodes: list[Node | None] = []
+        self.nodes: list[MissionNode | None] = []
 
     def mission(self, program: Program, parent: int | None, path: str) -> Program:
         """Copy the nodes of a mission, and return it with their new numbers."""

@@ -19,7 +19,7 @@ class Form(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class NodeLook:
     """The sign before the title, the form, and whether the keys of the nodes inside say something."""
 
     sign: str = ""
@@ -27,4 +27,4 @@ class Look:
     has_roles: bool = False
 
 
-PLAIN = Look()
+PLAIN = NodeLook()

@@ -24,7 +24,7 @@ class Next:
 
 
 @dataclass(frozen=True, slots=True)
-class States:
+class MachineStates:
     """The first state, the names of the states in the order of the children, the ends with what they count as."""
 
     start: str = ""

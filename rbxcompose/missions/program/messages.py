@@ -9,30 +9,30 @@ from typing import TypeAlias
 from rbxcompose.expressions.text import Template
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class WrittenValue:
     """One value as it was written: a text with slots, and an expression if it can be read as one."""
 
-    scalar: Scalar
+    scalar: ScalarNode
     template: Template
     expression: Expression | None
 
 
-Shape: TypeAlias = "Written | Mapping[str, Shape] | tuple[Shape, ...]"
+TemplateShape: TypeAlias = "WrittenValue | Mapping[str, TemplateShape] | tuple[TemplateShape, ...]"
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class MessageTemplate:
     """What is sent where; `body` is None for a message whose fields all keep their zero values.
 
     `keys` are the places of the names of fields, by the path to each.
     """
 
-    target: Scalar
-    body: Shape | None
+    target: ScalarNode
+    body: TemplateShape | None
     keys: Mapping[tuple[str, ...], Span] = field(default_factory=dict)
 
     @property
@@ -41,9 +41,9 @@ class Message:
         return frozenset(_names(self.body))
 
 
-def _names(shape: Shape | None) -> Iterator[str]:
+def _names(shape: TemplateShape | None) -> Iterator[str]:
     match shape:
-        case Written():
+        case WrittenValue():
             yield from (name.name for name in shape.template.names)
         case Mapping():
             for inner in shape.values():

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import ClassVar, Self
 
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Advice, Counted, Serves
+from rbxcompose.missions.program.answers import Advice, Counted, ModifierScope
 from rbxcompose.missions.program.moments import Moments
 from rbxcompose.missions.program.outcomes import Outcomes
 
@@ -38,7 +38,7 @@ class Modifier(ABC):
 
     @property
     @abstractmethod
-    def serves(self) -> Serves:
+    def serves(self) -> ModifierScope:
         """Return for which nodes it is there."""
 
     @property
@@ -77,7 +77,7 @@ class Modifier(ABC):
         return False
 
     @property
-    def saved(self) -> Scalar | None:
+    def saved(self) -> ScalarNode | None:
         """Return the name under which the result is kept."""
         return None
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from rbxcompose.expressions.text import Template
 from rbxcompose.missions.language.asked import Assignment
-from rbxcompose.missions.program.messages import Message
+from rbxcompose.missions.program.messages import MessageTemplate
 
 LEVELS = ("info", "warn", "error")  # of a log
 DEEDS = ("set", "log", "publish")
@@ -21,7 +21,7 @@ class Deeds:
     assignments: tuple[Assignment, ...] = ()
     text: Template | None = None
     level: str = "info"
-    message: Message | None = None
+    message: MessageTemplate | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,16 +37,16 @@ class Moments:
 
 
 @dataclass(frozen=True, slots=True)
-class Effects:
+class NodeEffects:
     """What a node does to the mission and the robot by itself: what it sets, sends and asks.
 
     `shortened` is the name of the data that it takes items out of, empty if it should and names none; None: nothing.
     """
 
     assignments: tuple[Assignment, ...] = ()
-    published: Message | None = None
-    called: Message | None = None
+    published: MessageTemplate | None = None
+    called: MessageTemplate | None = None
     shortened: str | None = None
 
 
-NO_EFFECTS = Effects()
+NO_EFFECTS = NodeEffects()

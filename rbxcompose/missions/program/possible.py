@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeAlias
 
 from rbxcompose.findings import Span
 
-Key: TypeAlias = tuple[Hashable, ...]
+StateKey: TypeAlias = tuple[Hashable, ...]
 
 
 class Possibility(NamedTuple):
@@ -15,29 +15,29 @@ class Possibility(NamedTuple):
 
     span: Span
     text: str
-    key: Key
+    key: StateKey
 
 
-def started(number: int) -> Key:
+def started(number: int) -> StateKey:
     """Return the key of the start of a node."""
     return ("node", number)
 
 
-def skipped(number: int) -> Key:
+def skipped(number: int) -> StateKey:
     """Return the key of a node that ends skipped."""
     return ("skipped", number)
 
 
-def ended(leaf: int, outcome: str) -> Key:
+def ended(leaf: int, outcome: str) -> StateKey:
     """Return the key of a skill that ends with an outcome."""
     return ("skill", leaf, outcome)
 
 
-def led(machine: int, state: str, to: str, outcome: str = "") -> Key:
+def led(machine: int, state: str, to: str, outcome: str = "") -> StateKey:
     """Return the key of a transition; without an outcome it is that on any."""
     return ("transition", machine, state, to, *([outcome] if outcome else []))
 
 
-def cut(interrupt: str) -> Key:
+def cut(interrupt: str) -> StateKey:
     """Return the key of an interrupt that acts."""
     return ("interrupt", interrupt)

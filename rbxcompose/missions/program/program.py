@@ -14,17 +14,16 @@ from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import Type
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Span
-from rbxcompose.manifest.tree import Mapping as LocatedMapping
-from rbxcompose.manifest.tree import Scalar
+from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.missions.engine.resume_points import NO_HISTORY
-from rbxcompose.missions.language.asked import Argument, Asked
+from rbxcompose.missions.language.asked import Asked, WrittenArgument
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Advice, Counted, Flow, Skipped
-from rbxcompose.missions.program.branches import Branches, Choice
-from rbxcompose.missions.program.look import Look
-from rbxcompose.missions.program.machines import Next, States
+from rbxcompose.missions.program.answers import Advice, Counted, NodeFlow, Skipped
+from rbxcompose.missions.program.branches import BranchChoice, Branches
+from rbxcompose.missions.program.look import NodeLook
+from rbxcompose.missions.program.machines import MachineStates, Next
 from rbxcompose.missions.program.modifier import Modifier
-from rbxcompose.missions.program.moments import Effects
+from rbxcompose.missions.program.moments import NodeEffects
 from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.possible import Possibility
 
@@ -126,15 +125,17 @@ class Step(ABC):
         """Read the kind's value and options."""
 
     @abstractmethod
-    def may_end(self, node: Node, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return how it may end, its modifiers left aside."""
 
     @abstractmethod
-    def possibilities(self, node: Node, nodes: tuple[Node, ...], robot: RobotNames) -> Iterator[Possibility]:
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
         """Yield what may come of it, as far as a test should see each of it."""
 
     @abstractmethod
-    def shows(self, node: Node, scope: StaticScope) -> Mapping[str, Type]:
+    def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
         """Return the names that only the nodes inside see, with their types."""
 
     @abstractmethod
@@ -163,7 +164,7 @@ class Step(ABC):
 
     @property
     @abstractmethod
-    def effects(self) -> Effects:
+    def effects(self) -> NodeEffects:
         """Return what it does by itself."""
 
     @property
@@ -173,12 +174,12 @@ class Step(ABC):
 
     @property
     @abstractmethod
-    def flow(self) -> Flow:
+    def flow(self) -> NodeFlow:
         """Return how it goes through those inside."""
 
     @property
     @abstractmethod
-    def look(self) -> Look:
+    def look(self) -> NodeLook:
         """Return how it is drawn."""
 
     # Capabilities: what only some kinds have.
@@ -188,7 +189,7 @@ class Step(ABC):
         """Return what people call it: the word of the language, or the name of a skill."""
         return self.name
 
-    def text(self, node: Node) -> str:
+    def text(self, node: MissionNode) -> str:
         """Return what stands in it where it is drawn: its own expressions."""
         return ", ".join(asked.scalar.text for asked in node.asked[: min(node.own, 2)])
 
@@ -203,12 +204,12 @@ class Step(ABC):
         return ""
 
     @property
-    def uses(self) -> Scalar | None:
+    def uses(self) -> ScalarNode | None:
         """Return the name of the mission that it runs."""
         return None
 
     @property
-    def arguments(self) -> tuple[Argument, ...]:
+    def arguments(self) -> tuple[WrittenArgument, ...]:
         """Return what it gives to its skill or mission."""
         return ()
 
@@ -243,7 +244,7 @@ class Step(ABC):
         return None
 
     @property
-    def choice(self) -> Choice | None:
+    def choice(self) -> BranchChoice | None:
         """Return by which value it chooses one of its children."""
         return None
 
@@ -253,7 +254,7 @@ class Step(ABC):
         return None
 
     @property
-    def states(self) -> States | None:
+    def states(self) -> MachineStates | None:
         """Return the states that its children are."""
         return None
 
@@ -264,7 +265,7 @@ class Step(ABC):
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class MissionNode:
     """One mission node. Those below it have the numbers from `number + 1` to `end` (exclusive).
 
     `step` is what it does; `modifiers` are by key, from the outside in. `asked` are all expressions, for checking, and
@@ -294,7 +295,7 @@ class Node:
         return self.step.skill
 
     @property
-    def saved(self) -> Scalar | None:
+    def saved(self) -> ScalarNode | None:
         """Return the name under which it keeps its result."""
         return next((one.saved for one in self.modifiers.values() if one.saved), None)
 
@@ -339,7 +340,7 @@ class Interrupt:
     root: int | None
     afterwards: str
     span: Span
-    restarts: Scalar | None = None
+    restarts: ScalarNode | None = None
     targets: tuple[Target, ...] = ()
 
 
@@ -354,16 +355,16 @@ class Program:
     name: str
     about: str
     file: str
-    nodes: tuple[Node, ...]
+    nodes: tuple[MissionNode, ...]
     inputs: Mapping[str, Input] = field(default_factory=dict)
     data: Mapping[str, Datum] = field(default_factory=dict)
     interrupts: tuple[Interrupt, ...] = ()
     rate: float = RATE
     outputs: Mapping[str, Asked] = field(default_factory=dict)
     main: int = ROOT
-    root: LocatedMapping = field(default_factory=LocatedMapping, repr=False)
+    root: MappingNode = field(default_factory=MappingNode, repr=False)
 
-    def asked(self) -> Iterator[tuple[Node | None, Asked]]:
+    def asked(self) -> Iterator[tuple[MissionNode | None, Asked]]:
         """Yield all expressions, with the node that asks; None for an interrupt or an output."""
         for node in self.nodes:
             for asked in node.asked:
@@ -373,7 +374,7 @@ class Program:
         for asked in self.outputs.values():
             yield None, asked
 
-    def below(self, number: int) -> tuple[Node, ...]:
+    def below(self, number: int) -> tuple[MissionNode, ...]:
         """Return a node and all below it."""
         return self.nodes[number : self.nodes[number].end]
 
@@ -389,6 +390,6 @@ class Program:
             step, messages = node.step, (node.step.effects.published, node.step.effects.called)
             read.update(step.reads, *(message.names for message in messages if message))
             read.update(*(one.moments.names for one in node.modifiers.values() if one.moments))
-            texts = (one.value.text for one in step.arguments if isinstance(one.value, Scalar))
+            texts = (one.value.text for one in step.arguments if isinstance(one.value, ScalarNode))
             read.update(name.name for text in texts for name in parse_template(text).names)
         return frozenset(read)

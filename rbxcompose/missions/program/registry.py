@@ -14,11 +14,11 @@ from rbxcompose.missions import kinds as package
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.program.program import Step
 
-Kind: TypeAlias = type[Step]
+StepType: TypeAlias = type[Step]
 S = TypeVar("S", bound=Step)
 SKILL = "skill"  # the kind of all nodes that are named after a skill of the robot
-KINDS: dict[str, Kind] = {}
-_TASKS: dict[Kind, Callable[[Site], Task]] = {}
+KINDS: dict[str, StepType] = {}
+_TASKS: dict[StepType, Callable[[Site], Task]] = {}
 
 
 def kind(
@@ -70,13 +70,13 @@ def task_of(site: Site) -> Task:
 
 
 @cache
-def kinds() -> dict[str, Kind]:
+def kinds() -> dict[str, StepType]:
     """Return all kinds that a mission may write, by their word, sorted."""
     return {name: found for name, found in all_kinds().items() if not found.is_inner}
 
 
 @cache
-def all_kinds() -> dict[str, Kind]:
+def all_kinds() -> dict[str, StepType]:
     """Return all kinds of nodes in a program by name, sorted."""
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{package.__name__}.{module.name}")

@@ -28,7 +28,7 @@ class ValueSource:
     group: str = ""
 
 
-class Way(StrEnum):
+class SkillWay(StrEnum):
     """How a skill is carried out."""
 
     ACTION = "action"
@@ -69,7 +69,7 @@ class SkillSource:
     skill: Skill
     action: str
     topic: str
-    way: Way = Way.ACTION
+    way: SkillWay = SkillWay.ACTION
     orders: Orders = Orders("event", ())
 
 

@@ -1,14 +1,14 @@
 """The slips of missions, one file each: what is written at a place of the grammar, what to say, and what was meant.
 
-Each is a function of a `Place` and the node there under `@slip(PLACES)`; it returns None for what is no slip.
+Each is a function of a `GrammarPlace` and the node there under `@slip(PLACES)`; it returns None for what is no slip.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from rbxcompose.manifest.tree import Node
-from rbxcompose.missions.language.grammar import Place
+from rbxcompose.manifest.tree import TreeNode
+from rbxcompose.missions.language.grammar import GrammarPlace
 from rbxcompose.slips import Repair, Slips
 
-slip: Slips[Callable[[Place, Node], Repair[Node] | None]] = Slips(__name__)
+slip: Slips[Callable[[GrammarPlace, TreeNode], Repair[TreeNode] | None]] = Slips(__name__)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rbxcompose.manifest.tree import Mapping, Node
+from rbxcompose.manifest.tree import MappingNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, told
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, told
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 
@@ -12,9 +12,11 @@ _ASKING = ("if", "then", "else", "when", "check", "choose", "cases")
 
 
 @slip(Takes.NEXT)
-def asking_next(place: Place, node: Node) -> Repair[Node] | None:
+def asking_next(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise words that ask."""
-    asking = [entry.key for word, entry in node.entries.items() if word in _ASKING] if isinstance(node, Mapping) else []
+    asking = (
+        [entry.key for word, entry in node.entries.items() if word in _ASKING] if isinstance(node, MappingNode) else []
+    )
     if not asking:
         return None
     help_text = (

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 
 from rbxcompose.findings import replacement
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, told
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, told
 from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
@@ -19,9 +19,9 @@ _EXAMPLE = "'name: value'"
 
 
 @slip(Takes.ASSIGNMENTS)
-def assigned_in_line(place: Place, node: Node) -> Repair[Node] | None:
+def assigned_in_line(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a text below `set`; what is no assignment at all is told as well, and nothing else is said of it."""
-    if not isinstance(node, Scalar):
+    if not isinstance(node, ScalarNode):
         return None
     key = place.key
     found = _WRITTEN.fullmatch(node.text) if node.plain else None
@@ -42,6 +42,6 @@ def assigned_in_line(place: Place, node: Node) -> Repair[Node] | None:
     where = "" if is_below else f" on the line below '{key.text}:', further right"
     fix = replacement(node.span, node.text, meant) if is_below else None
     finding = codes.WRONG_SHAPE.at(node.span, message, help=f"write '{meant}'{where}", fix=fix)
-    left = Scalar(name, inner_span(node, found.start("name"), found.end("name")))
-    right = Scalar(value, inner_span(node, found.start("value"), len(node.text)))
-    return Repair(Mapping({name: Entry(left, right)}, node.span), (finding,))
+    left = ScalarNode(name, inner_span(node, found.start("name"), found.end("name")))
+    right = ScalarNode(value, inner_span(node, found.start("value"), len(node.text)))
+    return Repair(MappingNode({name: Entry(left, right)}, node.span), (finding,))

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from rbxcompose.findings import replacement
-from rbxcompose.manifest.tree import Node, Scalar
+from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 
@@ -24,9 +24,9 @@ _TIMES = re.compile(r"(?P<digits>\d+)\s*(times?|x|rounds?|attempts?|tries)")
 
 
 @slip(Takes.COUNT)
-def count_in_words(place: Place, node: Node) -> Repair[Node] | None:
+def count_in_words(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise what people say for a number, and for no end where that may stand."""
-    if not isinstance(node, Scalar) or node.text in place.choices:
+    if not isinstance(node, ScalarNode) or node.text in place.choices:
         return None
     key, forever = place.key.text, ENDLESS.get(node.text, "")
     if forever in place.choices:
@@ -39,7 +39,7 @@ def count_in_words(place: Place, node: Node) -> Repair[Node] | None:
     return Repair(replace(node, text=meant), (replace(told, help=f"write '{meant}'", fix=fix),))
 
 
-def _digits(node: Scalar) -> str:
+def _digits(node: ScalarNode) -> str:
     text = node.text.lower() if node.plain else ""
     found = _TIMES.fullmatch(text)
     return found["digits"] if found else NUMBERS.get(text, "")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from rbxcompose.findings import Edit, Fix
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Sequence
+from rbxcompose.manifest.tree import Entry, MappingNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.steps_below_a_hook import is_step, steps_below_a_hook
 from rbxcompose.slips import Repair
@@ -14,11 +14,11 @@ _DASH = "- "
 
 
 @slip(Takes.HOOK, before=(steps_below_a_hook,))
-def dashes_below_a_hook(place: Place, node: Node) -> Repair[Node] | None:
+def dashes_below_a_hook(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a list of maps; where all that it holds are steps, its dashes are not what is wrong."""
     hook = place.key.text
-    items = node.items if isinstance(node, Sequence) else ()
-    maps = [item for item in items if isinstance(item, Mapping) and item.entries]
+    items = node.items if isinstance(node, SequenceNode) else ()
+    maps = [item for item in items if isinstance(item, MappingNode) and item.entries]
     if not maps or len(maps) < len(items):
         return None
     entries: dict[str, Entry] = {}
@@ -29,7 +29,7 @@ def dashes_below_a_hook(place: Place, node: Node) -> Repair[Node] | None:
         edits.append(Edit(dash, _DASH, " " * len(_DASH)))
         for name, entry in item.entries.items():
             entries.setdefault(name, entry)
-    meant = Mapping(entries, node.span)
+    meant = MappingNode(entries, node.span)
     if all(is_step(name, place.words) for name in entries):
         return Repair(meant, ())
     is_once = len(entries) == sum(len(item.entries) for item in maps)

@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rbxcompose.findings import replacement
-from rbxcompose.manifest.tree import Node, Scalar
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.manifest.tree import ScalarNode, TreeNode
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.language.names import NAME, no_name
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 
 
 @slip(Takes.ITEM_NAME)
-def dollar_before_a_name(place: Place, node: Node) -> Repair[Node] | None:
+def dollar_before_a_name(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a name as it is written where it is used."""
-    bare = node.text[1:] if isinstance(node, Scalar) and node.text.startswith("$") else ""
-    if not NAME.fullmatch(bare) or not isinstance(node, Scalar):
+    bare = node.text[1:] if isinstance(node, ScalarNode) and node.text.startswith("$") else ""
+    if not NAME.fullmatch(bare) or not isinstance(node, ScalarNode):
         return None
     fix = replacement(node.span, node.text, bare)
     finding = replace(no_name(node), help=f"write '{bare}' without '$'", fix=fix)

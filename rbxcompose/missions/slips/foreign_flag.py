@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rbxcompose.findings import replacement
-from rbxcompose.manifest.tree import Node, Scalar
+from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 
@@ -15,11 +15,11 @@ FLAGS: Mapping[str, str] = {"no": "false", "off": "false", "on": "true", "yes": 
 
 
 @slip(Takes.FLAG)
-def foreign_flag(place: Place, node: Node) -> Repair[Node] | None:
+def foreign_flag(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise other words for true and false."""
-    meant = FLAGS.get(node.text.lower(), "") if isinstance(node, Scalar) and node.filled is None else ""
-    if not meant or not isinstance(node, Scalar):
+    meant = FLAGS.get(node.text.lower(), "") if isinstance(node, ScalarNode) and node.filled is None else ""
+    if not meant or not isinstance(node, ScalarNode):
         return None
     message, fix = f"'{place.key.text}' must be true or false", replacement(node.span, node.text, meant)
     finding = codes.NOT_A_CHOICE.at(node.span, message, help=f"write '{meant}'", fix=fix)
-    return Repair(Scalar(meant, node.span), (finding,))
+    return Repair(ScalarNode(meant, node.span), (finding,))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.manifest.tree import Entry, Mapping, Node, children, with_children
+from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode, children, with_children
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.program.machines import MACHINE_KEYS
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
@@ -15,12 +15,12 @@ MACHINE = "machine"
 
 
 @slip(Takes.MISSION, Takes.STEP, Takes.STATE)
-def keys_outside_their_machine(place: Place, node: Node) -> Repair[Node] | None:
+def keys_outside_their_machine(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise keys beside their machine, and those of any machine at the very left of a mission.
 
     The latter go to the machine that they may belong to, if there is one only.
     """
-    if not isinstance(node, Mapping) or not any(key in node for key in MACHINE_KEYS):
+    if not isinstance(node, MappingNode) or not any(key in node for key in MACHINE_KEYS):
         return None
     own, is_mission = _machine_of(node), place.takes is Takes.MISSION
     pairs = list(_machines(node)) if is_mission else []
@@ -38,27 +38,27 @@ def keys_outside_their_machine(place: Place, node: Node) -> Repair[Node] | None:
         for key in strays
     )
     left = {key: entry for key, entry in node.entries.items() if key not in strays}
-    return Repair(_with(Mapping(left, node.span), added), tuple(findings))
+    return Repair(_with(MappingNode(left, node.span), added), tuple(findings))
 
 
-def _machine_of(node: Node) -> Mapping | None:
+def _machine_of(node: TreeNode) -> MappingNode | None:
     """Return the machine that stands in a map; only one with states is taken for one."""
-    machine = node.get(MACHINE) if isinstance(node, Mapping) else None
-    return machine if isinstance(machine, Mapping) and "states" in machine else None
+    machine = node.get(MACHINE) if isinstance(node, MappingNode) else None
+    return machine if isinstance(machine, MappingNode) and "states" in machine else None
 
 
-def _machines(root: Mapping) -> Iterator[tuple[Mapping, Mapping]]:
+def _machines(root: MappingNode) -> Iterator[tuple[MappingNode, MappingNode]]:
     """Yield all maps with a machine, and their machine."""
-    waiting: list[Node] = [root]
+    waiting: list[TreeNode] = [root]
     while waiting:
         node = waiting.pop()
-        if isinstance(node, Mapping) and (machine := _machine_of(node)):
+        if isinstance(node, MappingNode) and (machine := _machine_of(node)):
             yield node, machine
         waiting += (below for _, below in children(node))
 
 
-def _with(node: Node, added: dict[int, dict[str, Entry]]) -> Node:
+def _with(node: TreeNode, added: dict[int, dict[str, Entry]]) -> TreeNode:
     """Return a tree in which each machine has what is added to it."""
     new = with_children(node, lambda _, below: _with(below, added))
     more = added.get(id(node), {})
-    return Mapping({**new.entries, **more}, new.span, new.tag) if more and isinstance(new, Mapping) else new
+    return MappingNode({**new.entries, **more}, new.span, new.tag) if more and isinstance(new, MappingNode) else new

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Edit, Fix
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar, Sequence
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, Words, told
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, told
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 
@@ -15,36 +15,36 @@ _DASH = "- "
 
 
 @slip(Takes.STEPS, Takes.BRANCHES)
-def missing_dashes(place: Place, node: Node) -> Repair[Node] | None:
+def missing_dashes(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a `sequence` or another list of steps that is none."""
-    if isinstance(node, Sequence) or (isinstance(node, Mapping) and place.takes is Takes.BRANCHES):
+    if isinstance(node, SequenceNode) or (isinstance(node, MappingNode) and place.takes is Takes.BRANCHES):
         return None
     key = place.key
     message = f"'{key.text}' needs a list: each of its steps has a dash"
-    if isinstance(node, Scalar) or not node.entries:
-        word = node.text.split()[0] if isinstance(node, Scalar) and node.text.strip() else "go_to: dock"
+    if isinstance(node, ScalarNode) or not node.entries:
+        word = node.text.split()[0] if isinstance(node, ScalarNode) and node.text.strip() else "go_to: dock"
         help_text = f"write each step on a line of its own below '{key.text}:', such as '- {word}'"
         return Repair(told(node.span), (codes.WRONG_SHAPE.at(key.span, message, help=help_text),))
     first = next(iter(node.entries.values()))
-    shown = f"- {first.key.text}" + (f": {first.value.text}" if isinstance(first.value, Scalar) else ":")
+    shown = f"- {first.key.text}" + (f": {first.value.text}" if isinstance(first.value, ScalarNode) else ":")
     help_text = f"put a dash before each step: '{shown.removesuffix(': ')}'"
     fix = _dashed(node, place.words)
     finding = codes.WRONG_SHAPE.at(first.key.span, message, label="put a dash here", help=help_text, fix=fix)
-    return Repair(Sequence(tuple(_steps(node, place.words)), node.span), (finding,))
+    return Repair(SequenceNode(tuple(_steps(node, place.words)), node.span), (finding,))
 
 
-def _steps(value: Mapping, words: Words) -> Iterator[Mapping]:
+def _steps(value: MappingNode, words: Words) -> Iterator[MappingNode]:
     """Yield the steps that the keys of a map were meant to be; a setting belongs to the step above it."""
     entries: dict[str, Entry] = {}
     for name, entry in value.entries.items():
         if entries and name not in words.modifiers and not words.is_option(name):
-            yield Mapping(entries, next(iter(entries.values())).key.span)
+            yield MappingNode(entries, next(iter(entries.values())).key.span)
             entries = {}
         entries[name] = entry
-    yield Mapping(entries, next(iter(entries.values())).key.span)
+    yield MappingNode(entries, next(iter(entries.values())).key.span)
 
 
-def _dashed(value: Mapping, words: Words) -> Fix | None:
+def _dashed(value: MappingNode, words: Words) -> Fix | None:
     """Return the fix that puts a dash before each step, if each is one known word with a value on its line."""
     entries = list(value.entries.items())
     lines = [entry.key.span.line for _, entry in entries]
@@ -53,7 +53,7 @@ def _dashed(value: Mapping, words: Words) -> Fix | None:
         and name not in words.modifiers
         and not words.is_option(name)
         and entry.key.plain
-        and isinstance(entry.value, Scalar)
+        and isinstance(entry.value, ScalarNode)
         and entry.value.span.end_line == entry.key.span.line
         for name, entry in entries
     )

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from rbxcompose.findings import nearest
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.tight_dashes import tight_dashes
 from rbxcompose.slips import Repair
 
 
 @slip(Takes.STEP, after=(tight_dashes,))
-def misspelt_kind(place: Place, node: Node) -> Repair[Node] | None:
+def misspelt_kind(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a step of no kind with an option of some kind, and a word near to that of a kind."""
     words = place.words
-    if not isinstance(node, Mapping) or words.kind_of(node):
+    if not isinstance(node, MappingNode) or words.kind_of(node):
         return None
     own = words.own(node)
     others = [key for key in own if not words.is_option(key)]
@@ -23,7 +23,7 @@ def misspelt_kind(place: Place, node: Node) -> Repair[Node] | None:
         if meant := nearest(word, words.kinds):
             key = node.entries[word].key
             finding = codes.UNKNOWN_KEY.misspelt(key.span, f"unknown step '{word}'", word, words.kinds)
-            right = Entry(Scalar(meant[0], key.span), node.entries[word].value)
+            right = Entry(ScalarNode(meant[0], key.span), node.entries[word].value)
             entries = dict((meant[0], right) if one[0] == word else one for one in node.entries.items())
-            return Repair(Mapping(entries, node.span), (finding,))
+            return Repair(MappingNode(entries, node.span), (finding,))
     return None

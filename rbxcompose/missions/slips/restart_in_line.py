@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 
 from rbxcompose.findings import Edit, Fix
-from rbxcompose.manifest.tree import Entry, Mapping, Node, Scalar
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.program.program import RESTART
 from rbxcompose.missions.slips import slip
@@ -18,22 +18,22 @@ _DEEPER = "  "
 
 
 @slip(Takes.AFTERWARDS)
-def restart_in_line(place: Place, node: Node) -> Repair[Node] | None:
+def restart_in_line(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise `restart NAME` and `restart: NAME`."""
-    found = _IN_LINE.fullmatch(node.text) if isinstance(node, Scalar) and node.plain else None
-    if not found or not isinstance(node, Scalar):
+    found = _IN_LINE.fullmatch(node.text) if isinstance(node, ScalarNode) and node.plain else None
+    if not found or not isinstance(node, ScalarNode):
         return None
     meant = f"{RESTART}: {found['name']}"
     message = f"'{RESTART}' and what begins anew stand on a line of their own"
     help_text = f"write '{meant}' on the line below '{place.key.text}:', further right"
     fix = _on_a_line_below(place.key, node, meant)
-    key = Scalar(RESTART, inner_span(node, 0, len(RESTART)))
-    name = Scalar(found["name"], inner_span(node, found.start("name"), len(node.text)))
+    key = ScalarNode(RESTART, inner_span(node, 0, len(RESTART)))
+    name = ScalarNode(found["name"], inner_span(node, found.start("name"), len(node.text)))
     finding = codes.WRONG_SHAPE.at(node.span, message, help=help_text, fix=fix)
-    return Repair(Mapping({RESTART: Entry(key, name)}, node.span), (finding,))
+    return Repair(MappingNode({RESTART: Entry(key, name)}, node.span), (finding,))
 
 
-def _on_a_line_below(key: Scalar, value: Scalar, meant: str) -> Fix:
+def _on_a_line_below(key: ScalarNode, value: ScalarNode, meant: str) -> Fix:
     """Return the fix, which applies to a key with nothing before it on its line: within `{}` lines mean nothing."""
     span, indent = key.span, " " * (key.span.column - 1)
     before = span._replace(column=1, end_line=span.line, end_column=span.column)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from rbxcompose.findings import Edit, Finding, Fix
-from rbxcompose.manifest.tree import Mapping, Node
+from rbxcompose.manifest.tree import MappingNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, Words
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.keys_outside_their_machine import keys_outside_their_machine
 from rbxcompose.missions.slips.misspelt_kind import misspelt_kind
@@ -17,9 +17,9 @@ _DASH = "- "
 
 
 @slip(Takes.STEP, after=(tight_dashes, misspelt_kind, keys_outside_their_machine), before=(unknown_settings,))
-def second_step(place: Place, node: Node) -> Repair[Node] | None:
+def second_step(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise keys that are steps of their own; only the first one is read here."""
-    if not isinstance(node, Mapping) or len(place.words.own(node)) < 2:
+    if not isinstance(node, MappingNode) or len(place.words.own(node)) < 2:
         return None
     kind = place.words.kind_of(node)
     slots = place.words.kinds.get(kind, {})
@@ -29,17 +29,17 @@ def second_step(place: Place, node: Node) -> Repair[Node] | None:
         return None
     findings = tuple(_missing_dash(node, steps[0], second, place.words) for second in steps[1:])
     gone = set(steps) - {kind or steps[0]}
-    return Repair(Mapping({key: one for key, one in node.entries.items() if key not in gone}, node.span), findings)
+    return Repair(MappingNode({key: one for key, one in node.entries.items() if key not in gone}, node.span), findings)
 
 
-def _missing_dash(step: Mapping, first: str, second: str, words: Words) -> Finding:
+def _missing_dash(step: MappingNode, first: str, second: str, words: Words) -> Finding:
     message = f"'{second}' is a second step beside '{first}', without a dash of its own"
     help_text = f"write '- {second}: ...' as its own step"
     fix = _dash_before(step, second, words) if words.is_step(second) else None
     return codes.TWO_STEPS.at(step.entries[second].key.span, message, label="put a dash here", help=help_text, fix=fix)
 
 
-def _dash_before(step: Mapping, key: str, words: Words) -> Fix | None:
+def _dash_before(step: MappingNode, key: str, words: Words) -> Fix | None:
     """Return the fix that makes a key of a list's item the next item, if nothing behind it may belong to either."""
     first, second = next(iter(step.entries.values())).key.span, step.entries[key].key.span
     if first.column != second.column or second.line == first.line:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rbxcompose.findings import Finding, nearest
-from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.manifest.tree import Node, Scalar
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, Words, told
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, told
 from rbxcompose.missions.program.moments import DEEDS, OPTIONS
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
@@ -25,19 +24,19 @@ _CURES: Mapping[str, str] = {
 
 
 @slip(Takes.HOOK)
-def steps_below_a_hook(place: Place, node: Node) -> Repair[Node] | None:
+def steps_below_a_hook(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise words of steps in the line of a hook or below it; what else stands there is read."""
-    if isinstance(node, Scalar):
+    if isinstance(node, ScalarNode):
         word = node.text.partition(" ")[0] if node.plain else ""
         if not is_step(word, place.words):
             return None
-        return Repair(told(node.span), (_cannot_do(place.key.text, Scalar(word, node.span)),))
-    steps = [name for name in node.entries if is_step(name, place.words)] if isinstance(node, Tree) else []
-    if not steps or not isinstance(node, Tree):
+        return Repair(told(node.span), (_cannot_do(place.key.text, ScalarNode(word, node.span)),))
+    steps = [name for name in node.entries if is_step(name, place.words)] if isinstance(node, MappingNode) else []
+    if not steps or not isinstance(node, MappingNode):
         return None
     findings = tuple(_cannot_do(place.key.text, node.entries[name].key) for name in steps)
     left = {name: entry for name, entry in node.entries.items() if not is_step(name, place.words)}
-    return Repair(Tree(left, node.span) if left else told(node.span), findings)
+    return Repair(MappingNode(left, node.span) if left else told(node.span), findings)
 
 
 def is_step(word: str, words: Words) -> bool:
@@ -47,6 +46,6 @@ def is_step(word: str, words: Words) -> bool:
     return words.is_step(word) if words.skills else word in words.kinds or not nearest(word, _KEYS)
 
 
-def _cannot_do(hook: str, word: Scalar) -> Finding:
+def _cannot_do(hook: str, word: ScalarNode) -> Finding:
     message = f"'{hook}' cannot do steps such as '{word.text}'"
     return codes.UNKNOWN_KEY.at(word.span, message, help=_CURES.get(hook, "{}").format(word.text))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 
 from rbxcompose.findings import Edit, Fix
-from rbxcompose.manifest.tree import Mapping, Node, Scalar
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, without_word
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, without_word
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 
@@ -16,11 +16,11 @@ _INDENT = "  "
 
 
 @slip(Takes.STEP)
-def tight_dashes(place: Place, node: Node) -> Repair[Node] | None:
+def tight_dashes(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise keys that begin with a dash."""
-    entries = node.entries if isinstance(node, Mapping) else {}
+    entries = node.entries if isinstance(node, MappingNode) else {}
     tight = [entry.key for key, entry in entries.items() if _TIGHT.match(key)]
-    if not tight or not isinstance(node, Mapping):
+    if not tight or not isinstance(node, MappingNode):
         return None
     is_list = len(tight) == len(entries)  # else something stands there that is no item of a list
     message = "a space is missing behind this dash"
@@ -31,7 +31,7 @@ def tight_dashes(place: Place, node: Node) -> Repair[Node] | None:
     return Repair(without_word(node, place.words), tuple(findings))
 
 
-def _spaced(key: Scalar) -> Fix:
+def _spaced(key: ScalarNode) -> Fix:
     """Return the fix that puts a space behind a dash; it applies to a line of its own only."""
     span = key.span
     before = span._replace(column=span.column - len(_INDENT), end_line=span.line, end_column=span.column)

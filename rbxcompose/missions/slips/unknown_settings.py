@@ -6,10 +6,9 @@ from collections.abc import Iterable, Mapping
 
 from rbxcompose.findings import Finding, nearest
 from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import Mapping as Tree
-from rbxcompose.manifest.tree import Node, Scalar
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, Words, without_word
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, without_word
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 from rbxcompose.units import UnitError, parse_quantity
@@ -33,18 +32,18 @@ STEPS = ("wait",)  # of our words, those that are a step
 
 
 @slip(Takes.STEP)
-def unknown_settings(place: Place, node: Node) -> Repair[Node] | None:
+def unknown_settings(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise keys that are no settings of this step, and look less like a second step than like a setting."""
-    unknown = unknown_in(node, place.words) if isinstance(node, Tree) else set()
-    if not unknown or not isinstance(node, Tree):
+    unknown = unknown_in(node, place.words) if isinstance(node, MappingNode) else set()
+    if not unknown or not isinstance(node, MappingNode):
         return None
     kind = place.words.kind_of(node)
     findings = tuple(_finding(node, kind, key, place.words) for key in node.entries if key in unknown)
-    left = Tree({key: entry for key, entry in node.entries.items() if key not in unknown}, node.span)
+    left = MappingNode({key: entry for key, entry in node.entries.items() if key not in unknown}, node.span)
     return Repair(left if place.words.own(left) else without_word(left, place.words), findings)
 
 
-def unknown_in(step: Tree, words: Words) -> set[str]:
+def unknown_in(step: MappingNode, words: Words) -> set[str]:
     """Return the keys of a step that are neither its word, nor its settings, nor a second step."""
     own, kind = words.own(step), words.kind_of(step)
     if kind:
@@ -58,7 +57,7 @@ def unknown_in(step: Tree, words: Words) -> set[str]:
     return {*options, *strays[len(strays) == len(skills) :]}  # one of them must be the skill
 
 
-def _is_stray(step: Tree, key: str, settings: Iterable[str], words: Words) -> bool:
+def _is_stray(step: MappingNode, key: str, settings: Iterable[str], words: Words) -> bool:
     """Tell whether a key beside a step is a setting that there is not, rather than a second step."""
     if key in words.skills or (key in words.kinds and key not in FOREIGN):
         return False
@@ -69,7 +68,7 @@ def _is_only_option(key: str, words: Words) -> bool:
     return words.is_option(key) and key not in words.kinds
 
 
-def _finding(step: Tree, kind: str, key: str, words: Words) -> Finding:
+def _finding(step: MappingNode, kind: str, key: str, words: Words) -> Finding:
     """Return the finding about a key that is no setting, with the one that was meant."""
     beside = f"'{kind}'" if kind else "a skill"
     span, message = step.entries[key].key.span, f"unknown key '{key}' beside {beside}"
@@ -79,7 +78,7 @@ def _finding(step: Tree, kind: str, key: str, words: Words) -> Finding:
     ours = FOREIGN.get(key, "")
     if ours in STEPS:
         value = step.entries[key].value
-        shown = value.text if isinstance(value, Scalar) and value.text else "..."
+        shown = value.text if isinstance(value, ScalarNode) and value.text else "..."
         return codes.UNKNOWN_KEY.at(span, message, help=f"a pause is a step of its own: '- {ours}: {shown}'")
     if ours in settings:
         return codes.UNKNOWN_KEY.at(span, message, help=f"did you mean '{ours}'?")
@@ -87,9 +86,9 @@ def _finding(step: Tree, kind: str, key: str, words: Words) -> Finding:
     return codes.UNKNOWN_KEY.misspelt(span, message, key, settings, what, taken=step.entries)
 
 
-def is_setting(node: Node) -> bool:
+def is_setting(node: TreeNode) -> bool:
     """Tell whether a value looks like that of a setting: a number, a flag, a quantity or something with `$`."""
-    if not isinstance(node, Scalar) or not node.plain or not node.text:
+    if not isinstance(node, ScalarNode) or not node.plain or not node.text:
         return False
     if not isinstance(plain_value(node), str) or "$" in node.text:
         return True

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 
 from rbxcompose.findings import Finding, replacement
-from rbxcompose.manifest.tree import Mapping, Node, Scalar
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import Place, Takes, without_word
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, without_word
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.unknown_settings import unknown_settings
 from rbxcompose.slips import Repair
@@ -16,16 +16,16 @@ _TIGHT_COLON = re.compile(r"[a-z][a-z0-9_]*:[^\s:/].*")
 
 
 @slip(Takes.STEP, after=(unknown_settings,))
-def words_run_together(place: Place, node: Node) -> Repair[Node] | None:
+def words_run_together(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise a word of a step that is several."""
-    own = place.words.own(node) if isinstance(node, Mapping) else []
-    if not own or not isinstance(node, Mapping):
+    own = place.words.own(node) if isinstance(node, MappingNode) else []
+    if not own or not isinstance(node, MappingNode):
         return None
     finding = _told(node.entries[place.words.kind_of(node) or own[0]].key)
     return Repair(without_word(node, place.words), (finding,)) if finding else None
 
 
-def _told(key: Scalar) -> Finding | None:
+def _told(key: ScalarNode) -> Finding | None:
     words = key.text.split()
     if _TIGHT_COLON.fullmatch(key.text):
         name, _, value = key.text.partition(":")

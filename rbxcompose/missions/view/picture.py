@@ -8,7 +8,7 @@ from typing import Any
 
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.look import Form
-from rbxcompose.missions.program.program import Interrupt, Node, Program, RobotNames
+from rbxcompose.missions.program.program import Interrupt, MissionNode, Program, RobotNames
 
 LONGEST = 60  # characters of what stands in a node
 
@@ -54,7 +54,7 @@ class Drawn:
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class MissionPicture:
     """A mission: its main node and its interrupts."""
 
     name: str
@@ -69,15 +69,15 @@ class Picture:
         return (self.main, *self.interrupts)
 
 
-def picture_to_data(picture: Picture) -> dict[str, Any]:
+def picture_to_data(picture: MissionPicture) -> dict[str, Any]:
     """Return a picture as data for JSON."""
     return asdict(picture)
 
 
-def picture_from_data(data: Mapping[str, Any]) -> Picture:
+def picture_from_data(data: Mapping[str, Any]) -> MissionPicture:
     """Return the picture that `picture_to_data` made data of."""
     interrupts = tuple(map(_drawn_from, data["interrupts"]))
-    return Picture(data["name"], data["about"], _drawn_from(data["main"]), interrupts, data["count"])
+    return MissionPicture(data["name"], data["about"], _drawn_from(data["main"]), interrupts, data["count"])
 
 
 def _drawn_from(data: Mapping[str, Any]) -> Drawn:
@@ -89,11 +89,11 @@ def _drawn_from(data: Mapping[str, Any]) -> Drawn:
     return Drawn(**{**data, **more})
 
 
-def picture_of(program: Program, robot: RobotNames) -> Picture:
+def picture_of(program: Program, robot: RobotNames) -> MissionPicture:
     """Return the picture of a mission with all that it uses."""
     linked = link(program, robot.missions)
     interrupts = tuple(_interrupt(linked, one) for one in linked.interrupts)
-    return Picture(linked.name, linked.about, _drawn(linked, linked.main), interrupts, len(linked.nodes))
+    return MissionPicture(linked.name, linked.about, _drawn(linked, linked.main), interrupts, len(linked.nodes))
 
 
 def _interrupt(linked: Program, one: Interrupt) -> Drawn:
@@ -121,13 +121,13 @@ def _drawn(linked: Program, number: int, role: str = "", is_start: bool = False)
     return Drawn(number, step.word, text, name, role, notes, arrows, is_start, children, look.sign, look.form)
 
 
-def _roles(linked: Program, node: Node) -> Sequence[str]:
+def _roles(linked: Program, node: MissionNode) -> Sequence[str]:
     """Return what each child is to its node: the key under which it was written, where that says something."""
     written = [linked.nodes[child].path.removeprefix(node.path).strip(".").partition(".")[0] for child in node.children]
     return [one if node.step.look.has_roles and not one.isdecimal() else "" for one in written]
 
 
-def _notes(node: Node) -> Iterator[str]:
+def _notes(node: MissionNode) -> Iterator[str]:
     """Yield the modifiers of a node, from the outside in, in words."""
     for key, modifier in node.modifiers.items():
         yield _short(f"{key} {modifier.said}".strip().replace("_", " "))

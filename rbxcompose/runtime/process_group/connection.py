@@ -14,7 +14,7 @@ from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import Clock
 from rbxcompose.plan.model import Plan
-from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.lifeline import Lifeline
 from rbxcompose.scheduler import Scheduler
 
@@ -36,7 +36,7 @@ def open_bus(
     router: str,
     scheduler: Scheduler,
     clock: Clock,
-    inbox: Inbox,
+    inbox: CallbackInbox,
     log: Callable[[str, str], None],
     tape: Tape | None = None,
 ) -> Connection:

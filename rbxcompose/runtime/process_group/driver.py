@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from rbxcompose.clock import Clock, ExternalClock, MonotonicClock, SteppedClock, Turn
-from rbxcompose.runtime.channel import Channel, Message
-from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.channel import Channel, ChannelMessage
+from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.scheduler import Scheduler
 
 BEAT = 0.25  # [s] of real time between signs of life
@@ -21,7 +21,7 @@ SLICE = 0.05  # [s] of real time for catching up with outside time, before messa
 class Driven(Protocol):
     """What a driver drives: it hears messages and is asked after each round whether it goes on."""
 
-    def handle(self, message: Message) -> None:
+    def handle(self, message: ChannelMessage) -> None:
         """Carry out a message from the supervisor."""
         ...
 
@@ -46,7 +46,7 @@ class Driven(Protocol):
 class Driver:
     """Waits for channel and inbox, and lets what is driven hear them; subclasses say how time goes."""
 
-    def __init__(self, scheduler: Scheduler, inbox: Inbox, channel: Channel, driven: Driven) -> None:
+    def __init__(self, scheduler: Scheduler, inbox: CallbackInbox, channel: Channel, driven: Driven) -> None:
         self._scheduler, self._inbox, self._channel, self._driven = scheduler, inbox, channel, driven
         self._selector = selectors.SelectSelector()  # microseconds, where epoll rounds up to milliseconds
         self._selector.register(inbox, selectors.EVENT_READ)
@@ -84,7 +84,7 @@ class Driver:
         if any(key.fileobj is self._channel for key, _ in ready):
             self._hear(self._channel.receive())
 
-    def _hear(self, messages: Sequence[Message]) -> None:
+    def _hear(self, messages: Sequence[ChannelMessage]) -> None:
         for message in messages:
             self._driven.handle(message)
             self._run_present()  # one message after the other, however they were bundled on their way
@@ -97,7 +97,7 @@ class RealTimeDriver(Driver):
     """Robot time is the monotonic clock; deadlines are absolute, so that lateness does not add up."""
 
     def __init__(
-        self, scheduler: Scheduler, clock: MonotonicClock, inbox: Inbox, channel: Channel, driven: Driven
+        self, scheduler: Scheduler, clock: MonotonicClock, inbox: CallbackInbox, channel: Channel, driven: Driven
     ) -> None:
         super().__init__(scheduler, inbox, channel, driven)
         self._clock = clock
@@ -124,7 +124,7 @@ class SteppedDriver(Driver):
         self,
         scheduler: Scheduler,
         clock: SteppedClock,
-        inbox: Inbox,
+        inbox: CallbackInbox,
         channel: Channel,
         driven: Driven,
         *,
@@ -184,7 +184,7 @@ class ExternalDriver(Driver):
         self,
         scheduler: Scheduler,
         clock: ExternalClock,
-        inbox: Inbox,
+        inbox: CallbackInbox,
         channel: Channel,
         driven: Driven,
         turned: Callable[[Turn], None],

@@ -29,7 +29,7 @@ from rbxcompose.runtime.process_group.capture import Capture, take_printed
 from rbxcompose.runtime.process_group.connection import open_bus
 from rbxcompose.runtime.process_group.driver import Driver, ExternalDriver, RealTimeDriver, SteppedDriver
 from rbxcompose.runtime.process_group.host import Host, Notice
-from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.lifeline import Lifeline
 from rbxcompose.runtime.process_group.stop_line import open_stop_line
 from rbxcompose.runtime.process_group.watchdog import HANG, Watchdog
@@ -58,7 +58,7 @@ _TOLD = {
 }
 
 
-class Group:
+class ProcessGroup:
     """One process group, from `Configure` to `Shutdown`. It stops by itself when the supervisor has gone."""
 
     def __init__(
@@ -79,7 +79,7 @@ class Group:
         self._is_restart, self._is_stopped = is_restart, is_stopped
         self._clock = self._made_clock(start)
         self._scheduler = Scheduler()
-        self._inbox = Inbox()
+        self._inbox = CallbackInbox()
         self._watchdog = Watchdog()
         self._bus: Bus | None = None
         self._lifeline: Lifeline | None = None
@@ -107,7 +107,7 @@ class Group:
 
     # What the driver asks
 
-    def handle(self, message: say.Message) -> None:
+    def handle(self, message: say.ChannelMessage) -> None:
         """Carry out a message from the supervisor."""
         if isinstance(message, say.Stop | say.Release):
             self._mind_outside(type(message).__name__.lower())

@@ -21,7 +21,7 @@ from rbxcompose.runtime.process_group.parameters import Parameters
 from rbxcompose.runtime.process_group.rosout import Rosout
 from rbxcompose.runtime.process_group.statuses import Statuses
 from rbxcompose.runtime.process_group.worker import Post, Worker
-from rbxcompose.runtime.records import Log, Record
+from rbxcompose.runtime.records import Record, WriteRecord
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Looks
@@ -50,7 +50,7 @@ class Host:
         scheduler: Scheduler,
         clock: Clock,
         bus: Bus,
-        log: Log,
+        log: WriteRecord,
         notify: Callable[[Notice], None],
         *,
         is_stopped: bool = False,

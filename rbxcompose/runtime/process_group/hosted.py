@@ -49,7 +49,7 @@ class ServesParameters(Protocol):
         ...
 
 
-class Home(Protocol):
+class InstanceHome(Protocol):
     """The host of an instance, as the instance sees it."""
 
     plan: Plan
@@ -98,7 +98,7 @@ class Home(Protocol):
 class Hosted:
     """An instance and, while it lives, its component. It is the component's context, too."""
 
-    def __init__(self, host: Home, instance: Instance) -> None:
+    def __init__(self, host: InstanceHome, instance: Instance) -> None:
         self.host, self.instance = host, instance
         self.clock: Clock = host.clock
         self.state = Lifecycle.UNCONFIGURED

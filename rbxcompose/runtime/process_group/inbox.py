@@ -9,7 +9,7 @@ from collections.abc import Callable
 from rbxcompose.scheduler import Scheduler
 
 
-class Inbox:
+class CallbackInbox:
     """Takes callbacks from any thread or signal handler and wakes who waits for its descriptor."""
 
     def __init__(self) -> None:

@@ -14,9 +14,9 @@ from threading import Thread
 
 import zenoh
 
-from rbxcompose.bus.probe import Heard, Probe, probe_key
+from rbxcompose.bus.probe import Probe, ProbeResult, probe_key
 from rbxcompose.bus.renewal import RenewableTransport
-from rbxcompose.bus.transport import Answer, Question, Transport
+from rbxcompose.bus.transport import Question, Transport, TransportReply
 from rbxcompose.runtime.process_group.driver import BEAT
 
 BEATS = 3  # of the process between two probes: three that are missed, and the change, take less than 4 s
@@ -74,16 +74,16 @@ class Lifeline:
             return
         if self._sent is not None:
             heard = self._sent.close()
-            is_router_up = heard is Heard.NOBODY and self._router_is_up()
+            is_router_up = heard is ProbeResult.NOBODY and self._router_is_up()
             if self._probe.judge(heard, is_router_up=is_router_up):
                 self._renew()
                 return
         self._sent = _Sent(self._transport, self._key, of_all=self._probe.is_in_doubt)
 
     @property
-    def heard(self) -> Heard:
+    def heard(self) -> ProbeResult:
         """Return what has come back so far to the probe that is on its way."""
-        return self._sent.heard if self._sent is not None else Heard.NOTHING
+        return self._sent.heard if self._sent is not None else ProbeResult.NOTHING
 
     def _router_is_up(self) -> bool:
         host, _, port = self._router.rpartition("/")[2].rpartition(":")
@@ -140,18 +140,18 @@ class _Sent:
     """A probe on its way."""
 
     def __init__(self, transport: Transport, key: str, *, of_all: bool) -> None:
-        self.heard = Heard.NOTHING
+        self.heard = ProbeResult.NOTHING
         self._asked = transport.ask(key, b"", b"", self._answered, of_all=of_all, within=LONGEST_PROBE)
 
-    def close(self) -> Heard:
+    def close(self) -> ProbeResult:
         """Wait no longer; return what has come."""
         heard = self.heard
         self._asked.close()
         return heard
 
-    def _answered(self, given: Answer) -> None:
+    def _answered(self, given: TransportReply) -> None:
         # In a thread of the transport, so that a loop which is busy for a while does not miss it.
         if not given.error:
-            self.heard = Heard.ANSWER
-        elif self.heard is not Heard.ANSWER:  # each query ends with an error, also after its answers
-            self.heard = Heard.NOBODY
+            self.heard = ProbeResult.ANSWER
+        elif self.heard is not ProbeResult.ANSWER:  # each query ends with an error, also after its answers
+            self.heard = ProbeResult.NOBODY

@@ -9,7 +9,7 @@ from typing import Any, Protocol, cast
 from rbxcompose.bus.action_server import ActionServer
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.classes import queue_depth
-from rbxcompose.bus.services import Request
+from rbxcompose.bus.services import ServedRequest
 from rbxcompose.levels import Level
 from rbxcompose.missions.program.sources import PAUSE
 from rbxcompose.msgs.std_srvs import SetBool
@@ -137,10 +137,10 @@ def _on_message(component: Component[Any], name: str, port: In[Any], handling: H
 
 def _on_request(
     component: Component[Any], name: str, port: Port[Any], handling: Handling
-) -> Callable[[Request[Any, Any]], None]:
+) -> Callable[[ServedRequest[Any, Any]], None]:
     answer = getattr(component, f"on_{name}")
 
-    def serve(request: Request[Any, Any]) -> None:
+    def serve(request: ServedRequest[Any, Any]) -> None:
         if reason := handling.refusal(port):
             raise Refused(reason)
         worker = handling.worker
@@ -150,7 +150,7 @@ def _on_request(
     return serve
 
 
-def _answer(request: Request[Any, Any], answer: Callable[[Any], Any], send: Callable[[Call], None]) -> None:
+def _answer(request: ServedRequest[Any, Any], answer: Callable[[Any], Any], send: Callable[[Call], None]) -> None:
     try:
         response = answer(request.message)
     except Refused as refusal:

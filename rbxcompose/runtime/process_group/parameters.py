@@ -59,7 +59,7 @@ class _Served:
         self._parameters, self._hosted = parameters, hosted
 
     @property
-    def _settings(self) -> dict[str, core.Setting]:
+    def _settings(self) -> dict[str, core.ParameterField]:
         return core.settings(self._hosted.config)
 
     def list(self, request: rcl.ListParameters.Request) -> rcl.ListParameters.Response:

@@ -13,7 +13,7 @@ from rbxcompose.clock import MonotonicClock
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.process_group.driver import RealTimeDriver
-from rbxcompose.runtime.process_group.inbox import Inbox
+from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.lifeline import answer
 from rbxcompose.runtime.process_group.watchdog import Watchdog
 from rbxcompose.scheduler import Scheduler
@@ -27,7 +27,7 @@ class Router:
     def __init__(self, plan: Plan, clock: MonotonicClock, channel: say.Channel) -> None:
         self.is_over = False
         self._plan, self._clock, self._channel = plan, clock, channel
-        self._inbox = Inbox()
+        self._inbox = CallbackInbox()
         self._watchdog = Watchdog()
         self._transport: ZenohTransport | None = None
 
@@ -39,7 +39,7 @@ class Router:
         if self._transport is not None:
             self._transport.close()
 
-    def handle(self, message: say.Message) -> None:
+    def handle(self, message: say.ChannelMessage) -> None:
         """Open the router, or end."""
         match message:
             case say.Configure(endpoint):

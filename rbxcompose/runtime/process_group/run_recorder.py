@@ -11,7 +11,7 @@ from rbxcompose.plan.model import Plan
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.recorder import Recorder
 from rbxcompose.recording.tape import PLAN, Tape
-from rbxcompose.recording.topics import Topic
+from rbxcompose.recording.topics import RecordedTopic
 
 
 class Taping:
@@ -42,7 +42,7 @@ class Taping:
         self._recorder = Recorder(self._path, self._real.now())
         self._recorder.attach(PLAN, dump(plan, keeps_order=True).encode())
 
-    def _declare(self, topic: Topic) -> None:
+    def _declare(self, topic: RecordedTopic) -> None:
         recorder = self._recorder
         if recorder is not None:
             self._try(lambda: recorder.declare(topic))

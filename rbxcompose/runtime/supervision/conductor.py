@@ -1,6 +1,7 @@
 """What the supervisor decides, pure: which process is started, told or ended when, and how the robot ends.
 
-The shell around it (`supervisor.py`) carries out the `Effects` and tells what happened; time comes from a scheduler.
+The shell around it (`supervisor.py`) carries out the `ConductorEffects` and tells what happened; time comes from a
+scheduler.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.supervision.changes import WORLD, Changes
 from rbxcompose.runtime.supervision.dependents import blocked_by, blocked_text, is_commanding
-from rbxcompose.runtime.supervision.members import Effects, Member, Phase
-from rbxcompose.runtime.supervision.plan_change import LONGEST, Changing, Done, text_of
+from rbxcompose.runtime.supervision.members import ConductorEffects, Member, Phase
+from rbxcompose.runtime.supervision.plan_change import LONGEST, Changing, WhenDone, text_of
 from rbxcompose.runtime.supervision.shutdown import DOWN_BOUND, REST_BOUND, Closing
 from rbxcompose.runtime.supervision.silence import LOOK, Silence
 from rbxcompose.scheduler import Scheduler
@@ -32,7 +33,7 @@ class Conductor:
     """Leads the processes of a robot from the first fork to the last exit."""
 
     def __init__(
-        self, plan: Plan, options: RunOptions, scheduler: Scheduler, effects: Effects, *, router: str | None
+        self, plan: Plan, options: RunOptions, scheduler: Scheduler, effects: ConductorEffects, *, router: str | None
     ) -> None:
         """Take `router`: the name of the router's process, or None if an existing router serves."""
         self.is_stopped = False
@@ -123,7 +124,7 @@ class Conductor:
 
     # What processes say
 
-    def heard(self, name: str, message: say.Word) -> None:
+    def heard(self, name: str, message: say.ChannelWord) -> None:
         """Take a message of a process."""
         member = self.members[name]
         member.last_word = self._scheduler.now
@@ -323,7 +324,7 @@ class Conductor:
         member.is_stopped = self.is_stopped
         self._effects.send(member.name, say.Stop() if self.is_stopped else say.Release())
 
-    def _to_configured(self, message: say.Order) -> None:
+    def _to_configured(self, message: say.ChannelOrder) -> None:
         for group in self.plan.groups:
             if self.members[group].is_configured:
                 self._effects.send(group, message)
@@ -344,7 +345,7 @@ class Conductor:
         runs = {name: text for member in self.members.values() for name, text in member.runs.items()}
         return changes.unsafe(moves, runs)
 
-    def change(self, changes: Changes, done: Done) -> None:
+    def change(self, changes: Changes, done: WhenDone) -> None:
         """Carry out changes that nothing speaks against; `done` is told how it went."""
 
         def end(text: str, is_refused: bool) -> None:

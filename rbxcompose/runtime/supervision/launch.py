@@ -72,8 +72,8 @@ class RunEnded:
     facts: dict[str, dict[str, str]] = field(default_factory=dict)
 
 
-Report = Begun | Up | AlreadyUp | Unsafe | RunEnded
-_REPORTS: Family[Report] = Family(get_args(Report))
+LaunchReport = Begun | Up | AlreadyUp | Unsafe | RunEnded
+_REPORTS: Family[LaunchReport] = Family(get_args(LaunchReport))
 
 
 class Started:
@@ -85,7 +85,7 @@ class Started:
         self._received = b""
         self._previous = {number: signal.signal(number, self._pass_on) for number in _ENDINGS}
 
-    def wait_for_report(self, seconds: float | None) -> Report | None:
+    def wait_for_report(self, seconds: float | None) -> LaunchReport | None:
         """Return its next report, or None if there is none within `seconds` [s].
 
         Raises:
@@ -220,6 +220,6 @@ def _run(launch: Launch, folder: RobotFolder, lock: int, reports: TextIO) -> Run
     return RunEnded(conductor.exit_code, conductor.reason, time, conductor.facts)
 
 
-def _report(reports: TextIO, report: Report) -> None:
+def _report(reports: TextIO, report: LaunchReport) -> None:
     with contextlib.suppress(BrokenPipeError):  # a detached robot outlives who started it
         reports.write(_REPORTS.to_line(report).decode())

@@ -12,14 +12,14 @@ from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.faults import RestartPolicy
 
 
-class Effects(Protocol):
+class ConductorEffects(Protocol):
     """What the conductor can do to the world."""
 
     def fork(self, process: str, *, is_restart: bool, is_stopped: bool) -> None:
         """Start a process."""
         ...
 
-    def send(self, process: str, message: say.Order) -> None:
+    def send(self, process: str, message: say.ChannelOrder) -> None:
         """Send a message to a process."""
         ...
 

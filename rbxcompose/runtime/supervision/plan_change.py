@@ -14,11 +14,11 @@ from rbxcompose.plan.dump import dump
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.supervision.changes import Changes, Fate
-from rbxcompose.runtime.supervision.members import Effects, Member
+from rbxcompose.runtime.supervision.members import ConductorEffects, Member
 
 LONGEST = 20.0  # [s] until all that is new must be active
 
-Done = Callable[[str, bool], None]  # a text, and whether it was refused, all of it or in part
+WhenDone = Callable[[str, bool], None]  # a text, and whether it was refused, all of it or in part
 
 
 def text_of(plan: Plan, instances: Iterable[Instance]) -> str:
@@ -33,10 +33,10 @@ class Changing:
         self,
         changes: Changes,
         members: dict[str, Member],
-        effects: Effects,
+        effects: ConductorEffects,
         switch: Callable[[Changes], None],
         fork: Callable[[str], None],
-        done: Done,
+        done: WhenDone,
     ) -> None:
         self.changes = changes
         self.is_over = False
@@ -69,7 +69,7 @@ class Changing:
                 self._prepare()
                 self._set_live()
 
-    def _send(self, process: str, order: say.Order) -> None:
+    def _send(self, process: str, order: say.ChannelOrder) -> None:
         if self._members[process].is_there:
             self._waited_for = process
             self._effects.send(process, order)

@@ -222,9 +222,9 @@ def run_process(launch: Launch, order: Fork, channel: Channel) -> None:
 
         Router(launch.plan, launch.clock, channel).run()
         return
-    from rbxcompose.runtime.process_group.group import Group
+    from rbxcompose.runtime.process_group.group import ProcessGroup
 
-    Group(
+    ProcessGroup(
         launch.plan,
         order.group,
         launch.options,

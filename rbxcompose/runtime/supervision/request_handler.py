@@ -29,7 +29,7 @@ class Supervised(Protocol):
         """Return what is known from outside."""
         ...
 
-    def send(self, process: str, message: say.Order) -> None:
+    def send(self, process: str, message: say.ChannelOrder) -> None:
         """Send a message to a process."""
         ...
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.supervision.members import Effects, Member, Phase
+from rbxcompose.runtime.supervision.members import ConductorEffects, Member, Phase
 
 REST_BOUND = 1.0  # [s] to come to rest
 DOWN_BOUND = 1.9  # [s] for all of going down; what is left then is killed
@@ -14,7 +14,7 @@ DOWN_BOUND = 1.9  # [s] for all of going down; what is left then is killed
 class Closing:
     """Brings processes to rest and ends them one by one; `phase` tells how far it is."""
 
-    def __init__(self, members: Mapping[str, Member], effects: Effects, router: str | None) -> None:
+    def __init__(self, members: Mapping[str, Member], effects: ConductorEffects, router: str | None) -> None:
         self.phase = Phase.BRAKING
         self._members, self._effects, self._router = members, effects, router
         self._left: list[str] = []  # processes still to be shut down, the next one last

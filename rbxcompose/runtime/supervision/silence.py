@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from rbxcompose.runtime.supervision.members import Effects, Member
+from rbxcompose.runtime.supervision.members import ConductorEffects, Member
 
 SILENT = 1.0  # [s] without a sign of life after which the others are told
 DEAD = 2.0  # [s] without a sign of life after which a process is killed
@@ -14,7 +14,7 @@ LOOK = 0.25  # [s] between looks for signs of life
 class Silence:
     """Looks for processes that are suspended, or do not answer."""
 
-    def __init__(self, effects: Effects, tell_lost: Callable[[Member, str], None], now: float) -> None:
+    def __init__(self, effects: ConductorEffects, tell_lost: Callable[[Member, str], None], now: float) -> None:
         """Take `tell_lost`, which is told of a process that cannot be counted on any more, and why; `now` [s]."""
         self._effects, self._tell_lost = effects, tell_lost
         self._looked = now

@@ -133,7 +133,7 @@ class Supervisor:
         self._children[process] = _Child(channel)
         self._selector.register(channel, selectors.EVENT_READ, lambda: self._hear(process, channel))
 
-    def send(self, process: str, message: say.Order) -> None:
+    def send(self, process: str, message: say.ChannelOrder) -> None:
         """Send a message to a process."""
         if process in self._children:
             channel = self._children[process].channel

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.findings import Report
-from rbxcompose.manifest.tree import Node
-from rbxcompose.missions.language.grammar import Place, Takes
+from rbxcompose.manifest.tree import TreeNode
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.slips import slip
 from rbxcompose.rendering.text import render_text
@@ -40,7 +40,7 @@ def test_what_is_said_of_a_slip(name: str, golden: Golden) -> None:
 def test_all_that_is_said_of_an_example_is_said_by_its_slip(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     said: set[str] = set()
 
-    def noting(place: Place, node: Node) -> Repair[Node] | None:
+    def noting(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
         repair = SLIPS[name](place, node)
         said.update(finding.message for finding in (repair.findings if repair else ()))
         return repair

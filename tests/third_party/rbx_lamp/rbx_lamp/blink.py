@@ -31,8 +31,8 @@ def blink(robot: Robot) -> Iterator[Finding]:
       lamp: {type: lamp, period: 500 ms}
     ```
     """
-    for part in robot.parts.values():
-        period = setting(part, "period") if part.type_name == TYPE else None
+    for component in robot.components.values():
+        period = setting(component, "period") if component.type_name == TYPE else None
         if period is not None and period < SHORTEST:
-            message = f"'{part.name}' blinks every {format_quantity(period, TIME)}, which nobody sees"
-            yield blink.at(setting_span(robot, (part, "period")), message, help="take 100 ms or more")
+            message = f"'{component.name}' blinks every {format_quantity(period, TIME)}, which nobody sees"
+            yield blink.at(setting_span(robot, (component, "period")), message, help="take 100 ms or more")

@@ -1,0 +1,56 @@
+"""One public name stands for one thing, and modules are nouns."""
+
+from __future__ import annotations
+
+import ast
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[2] / "rbxcompose"
+
+TWO_SIDES = {  # what a component sees, as a protocol of the SDK, and the bus's implementation of just that
+    "ActionServer",
+    "SentGoal",
+    "ServedGoal",
+    "Window",
+}
+NAMED_BY_ROS = {  # the messages have the names that ROS gave them
+    "Clock",  # ours tells the time of which this one is the message
+    "Empty",  # a message and a service
+    "Quaternion",  # ours is the plain tuple of its numbers
+    "Time",  # ours is the unit of a setting
+    "Vector3",  # ours is the plain tuple of its numbers
+}
+NOUNS: set[str] = set()  # modules with a noun in `ing` as their name
+
+
+def defined(path: Path) -> Iterator[tuple[str, bool]]:
+    """Yield the public names of classes and of aliases of types, and whether each is a class."""
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        match node:
+            case ast.ClassDef(name=name):
+                yield name, True
+            case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
+                if name[0].isupper() and not name.isupper():
+                    yield name, False
+
+
+def test_each_public_name_of_a_class_stands_for_nothing_else() -> None:
+    places: dict[str, list[str]] = defaultdict(list)
+    classes: set[str] = set()
+    for path in PACKAGE.rglob("*.py"):
+        for name, is_class in defined(path):
+            places[name].append(str(path.relative_to(PACKAGE)))
+            classes |= {name} if is_class and not name.startswith("_") else set()
+    shared = {name: places[name] for name in classes if len(places[name]) > 1}
+    assert {name: found for name, found in shared.items() if name not in TWO_SIDES | NAMED_BY_ROS} == {}
+    assert shared.keys() == TWO_SIDES | NAMED_BY_ROS  # no exception outlives its reason
+
+
+def test_nothing_is_called_a_node_only() -> None:
+    assert [path for path in PACKAGE.rglob("*.py") for name, _ in defined(path) if name == "Node"] == []
+
+
+def test_no_module_is_named_by_a_verb() -> None:
+    assert {path.stem for path in PACKAGE.rglob("*ing.py")} == NOUNS
