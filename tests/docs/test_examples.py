@@ -78,7 +78,7 @@ def test_the_component_of_the_contributing_page_runs(tmp_path: Path, monkeypatch
 
 
 def test_the_kind_of_node_of_the_contributing_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run_block("Beep", tmp_path, monkeypatch)
+    run_block("BeepStep", tmp_path, monkeypatch)
     try:
         simulated = simulate("do: [{beep: loud}, {beep: soft}]")
         assert simulated.advance(1) == "success"
