@@ -66,7 +66,7 @@ class Place:
 
 
 class Secret:
-    """A text that nobody is shown: it is `***` wherever it is printed or dumped. `reveal()` gives it.
+    """A text that is never shown: it is `***` wherever it is printed or dumped. `reveal()` gives it.
 
     `name` is what the manifest calls it: `${secret.NAME}`.
     """
@@ -107,7 +107,7 @@ HIDDEN = "***"
 def _secret(value: object) -> Secret:
     if not isinstance(value, Secret):
         help_text = "write '${secret.NAME}', and put it into the file 'secrets/NAME'"
-        raise PydanticCustomError("secret", "a secret does not stand in a manifest", {"help": help_text})
+        raise PydanticCustomError("secret", "a secret does not belong in a manifest", {"help": help_text})
     return value
 
 

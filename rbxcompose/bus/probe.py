@@ -7,7 +7,7 @@ from enum import Enum, auto
 from rbxcompose.bus.names import admin_key
 
 MISSES = 3  # probes in a row without an answer that make a session stuck
-MOST_MISSES = 96  # for one that was opened anew again and again without success
+MOST_MISSES = 96  # for one that was opened again and again without success
 
 
 def probe_key(robot: str) -> str:
@@ -41,7 +41,7 @@ class Probe:
         return self._misses > 0
 
     def judge(self, heard: Heard, *, is_router_up: bool) -> bool:
-        """Take what became of a probe; return whether the session is stuck, to be opened anew.
+        """Take what became of a probe; return whether the session is stuck, to be opened again.
 
         After a renewal that did not help, twice as many misses are waited for.
         """

@@ -8,7 +8,7 @@ from typing import TypeVar
 from rbxcompose.bus.transport import LONGEST_WAIT, Answer, Arrival, Closable, Question, RemotePublisher, Transport
 from rbxcompose.qos import Qos
 
-RENEWED = "the session on the bus was opened anew"
+RENEWED = "the session on the bus was opened again"
 
 Declare = Callable[[Transport], Closable]
 E = TypeVar("E", bound="_Entry")

@@ -27,7 +27,7 @@ Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 
 LONGEST_QUEUE = 100  # requests that wait for a server
-LOST = "the server went away"
+LOST = "the server is gone"
 
 
 Answered = Callable[[Reply[R]], None]
@@ -62,7 +62,7 @@ class Request(Generic[Q, R]):
         self._end(Reply(response))
 
     def fail(self, error: str) -> None:
-        """Tell that there will be no answer, and why."""
+        """Report that there will be no answer, and why."""
         self._end(Reply(None, error))
 
     def _end(self, reply: Reply[R]) -> None:

@@ -59,7 +59,7 @@ class Publisher(Generic[M]):
 
     @property
     def has_match(self) -> bool:
-        """Tell whether somebody in another process would receive it, now or (if latched) later."""
+        """Return whether anything in another process would receive it, now or (if latched) later."""
         return self._remote.has_match
 
     def __call__(self, message: M) -> None:

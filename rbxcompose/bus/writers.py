@@ -71,7 +71,7 @@ class Writers:
         if reader.arrived >= since or now - since <= SILENCE:
             return ""
         names = " and ".join(dict.fromkeys(f"'{_name(writer)}'" for writer in writers))
-        return f"'{reader.owner}' has heard nothing on {topic} for {now - since:.0f} s, though {names} publishes it"
+        return f"'{reader.owner}' has received nothing on {topic} for {now - since:.0f} s, though {names} publishes it"
 
     def _of(self, topic: str) -> list[Writer]:
         known = self._by_topic.get(topic, {})

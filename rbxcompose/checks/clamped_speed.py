@@ -81,7 +81,7 @@ class Excess:
         span, limit = setting_span(robot, (driver, self.wanted.field), there), setting_span(robot, there)
         return kind.at(
             span,
-            f"'{driver.name}' drives with {self.shown(self.wanted)}, but its base '{base.name}' {what}",
+            f"'{driver.name}' drives at {self.shown(self.wanted)}, but its base '{base.name}' {what}",
             help=self.remedy,
             related=[Related(limit, f"'{name}' of the base" if name else "the base")] if limit != span else [],
         )

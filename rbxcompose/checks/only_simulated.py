@@ -31,5 +31,5 @@ def only_simulated(robot: Robot) -> Iterator[Finding]:
             yield only_simulated.at(
                 robot.value(*part.path, "type"),
                 f"'{part.name}' exists only in simulation: '{part.type_name}'",
-                help="run it without '--real', or take a type that drives the real thing",
+                help="run it without '--real', or use a type for the real device",
             )

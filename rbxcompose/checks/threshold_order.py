@@ -44,7 +44,7 @@ def threshold_order(robot: Robot) -> Iterator[Finding]:
             here, there = (part, warn.field), (part, error.field)
             yield threshold_order.at(
                 setting_span(robot, here, there),
-                f"'{part.name}' can never warn: it is in error below {format_quantity(error.value, RATIO)} already, "
+                f"'{part.name}' can never warn: it is already in error below {format_quantity(error.value, RATIO)}, "
                 f"and warns below {format_quantity(warn.value, RATIO)}",
                 help=f"'{warn.field or 'warn'}' must be above '{error.field or 'error'}'",
                 related=[Related(setting_span(robot, there, here), "in error below this")],

@@ -42,7 +42,7 @@ def two_bases(robot: Robot) -> Iterator[Finding]:
                 robot.entry_span(other),
                 f"'{other}' and '{bases[0]}' are both bases that follow '{topic}'",
                 label="this one",
-                help="a robot has one base: leave one of them out",
+                help="a robot has one base: remove one of them",
                 related=[Related(robot.entry_span(bases[0]), "and this one")],
             )
 

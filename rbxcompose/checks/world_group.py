@@ -37,7 +37,7 @@ def world_group(robot: Robot) -> Iterator[Finding]:
         if part.process == part.cls.process or WORLD not in (part.process, part.cls.process):
             continue
         if part.cls.process == WORLD:
-            message = f"'{part.name}' is simulated and belongs into the group 'world', not into '{part.process}'"
+            message = f"'{part.name}' is simulated and belongs in the group 'world', not in '{part.process}'"
         else:
-            message = f"'{part.name}' is no part of the simulated world, but runs in its group"
-        yield world_group.at(robot.value(*part.path, "process"), message, help="leave 'process' out")
+            message = f"'{part.name}' is not part of the simulated world, but runs in its group"
+        yield world_group.at(robot.value(*part.path, "process"), message, help="remove 'process'")

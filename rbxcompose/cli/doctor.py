@@ -96,7 +96,7 @@ def _running(folder: RobotFolder) -> Running:
     except BrokenStateError as error:
         return Running(folder, None, str(error))
     if state is None:
-        return Running(folder, None, "it has gone")
+        return Running(folder, None, "it is gone")
     robot = compile_robot(state.file, environment=os.environ).robot if os.path.exists(state.file) else None
     return Running(folder, state, "", robot, _bus(folder))
 

@@ -35,7 +35,7 @@ NO_TERMINAL = kind(
     "RBX9027",
     """Driving needs a keyboard
 
-`rbxcompose drive` reads keys from a terminal. Where there is none, `rbxcompose topic pub` sends velocities.
+`rbxcompose drive` reads keys from a terminal. Without one, use `rbxcompose topic pub` to send velocities.
 
 Bad: `rbxcompose drive < keys.txt`
 Good: `rbxcompose drive`
@@ -66,7 +66,7 @@ def _drive(guest: Guest, arguments: argparse.Namespace) -> int:
     name = _input(guest.graph().topics, arguments.topic)
     publisher = guest.bus().publisher(NAME, name, Twist, Qos.COMMAND)
     if not guest.run(lambda: publisher.has_match, arguments.timeout):
-        return refuse(NOBODY.at(None, f"nobody takes velocities on '{name}'"))
+        return refuse(NOBODY.at(None, f"nothing takes velocities on '{name}'"))
     wheel = _Wheel(guest, publisher, DeadMan(arguments.speed, arguments.turn))
     with guest.interruptible(), raw(sys.stdin.fileno()):
         wheel.read_early()
@@ -88,7 +88,7 @@ def _input(topics: Iterable[Name], wanted: str | None) -> str:
     if len(fitting) == 1 and fitting[0] in taking:
         return fitting[0]
     words = (
-        f"several topics end in '{_INPUT}'" if len(fitting) > 1 else f"nobody takes velocities on '{wanted or _INPUT}'"
+        f"several topics end in '{_INPUT}'" if len(fitting) > 1 else f"nothing takes velocities on '{wanted or _INPUT}'"
     )
     raise NotDoneError(NO_NAME.misspelt(None, words, wanted or _INPUT, taking, "topics that take velocities"))
 

@@ -68,7 +68,7 @@ def _run(name: str, words: Sequence[str]) -> int:
 def _help() -> str:
     width = max(len(name) for name in verbs())
     lines = [f"  {name:<{width}}  {_about(name)}" for name in verbs()]
-    usage = "usage: rbxcompose COMMAND ...  (COMMAND --help tells more)"
+    usage = "usage: rbxcompose COMMAND ...  (COMMAND --help says more)"
     return "\n".join([usage, "", _ABOUT, "", *lines]) + "\n"
 
 

@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="the file, else ROBOT-DATE-TIME.mcap")
     parser.add_argument("--for", type=seconds, dest="duration", metavar="30s", help="end after this time")
     parser.add_argument(
-        "--split", type=_split, default=Split(), metavar="SIZE|TIME", help="begin a new file after 500MB, or 10min"
+        "--split", type=_split, default=Split(), metavar="SIZE|TIME", help="start a new file after 500MB, or 10min"
     )
 
 
@@ -122,4 +122,4 @@ def _split(text: str) -> Split:
     try:
         return Split(time=seconds(text))
     except argparse.ArgumentTypeError:
-        raise argparse.ArgumentTypeError(f"'{text}' is no size and no time; write '500MB' or '10min'") from None
+        raise argparse.ArgumentTypeError(f"'{text}' is neither a size nor a time; write '500MB' or '10min'") from None

@@ -18,10 +18,10 @@ from rbxcompose.manifest.walk import REMOVE
 
 NOTHING_TO_CHANGE = kind(
     "RBX1302",
-    """A profile, an overlay or `--set` changes what does not exist
+    """A profile, an overlay or `--set` changes something that does not exist
 
-An overlay may add a new entry to a section, such as a component with its `type:`. What it changes or removes must be
-there, or else the name is misspelt.
+An overlay may add a new entry to a section, such as a component with its `type:`. What it changes or removes must
+exist; perhaps the name is misspelt.
 
 Bad:
 ```yaml
@@ -44,10 +44,10 @@ profiles:
 )
 NOT_AN_OVERLAY = kind(
     "RBX1305",
-    """`!remove` where nothing lies below
+    """`!remove` with nothing to remove
 
-`!remove` in a profile or an overlay takes something out of the robot, and in the robot's file something that a part
-brought. Where nothing lies below there is nothing to take it from.
+In a profile or an overlay, `!remove` takes something out of the robot; in the robot's file, something that a part
+brought. Here there is nothing to remove.
 
 Bad:
 ```yaml
@@ -68,8 +68,8 @@ TWO_PARTS = kind(
     "RBX1307",
     """Two parts bring the same thing
 
-What a part brings gets the name of its instance in front, but topics do not: two parts may not bring the same input or
-lock of a mux. `connect:` gives one of them another topic.
+Names from a part get the name of its instance as a prefix, but topics do not: two parts may not bring the same input
+or lock of a mux. `connect:` gives one of them another topic.
 
 Bad:
 ```yaml
@@ -230,7 +230,7 @@ class _Join(_Merge):
         name, *names = map(str, path)
         other, section = self.history.layer(path), section_named(name)
         what = f"'{names[-1]}' of '{name}'" if names else f"'{name}'"
-        help_text = "rename one of the two instances" if names else f"a robot has one '{name}': leave one out"
+        help_text = "rename one of the two instances" if names else f"a robot has one '{name}': remove one"
         if section and (told := section.clash(names)):
             what, help_text = told
         message = f"{self.overlay} and {other} both bring {what}"

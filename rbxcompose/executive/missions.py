@@ -54,7 +54,7 @@ class Missions:
         """
         program = self._program(name)
         if name in self.names:
-            raise Refused(f"mission {name} runs already")
+            raise Refused(f"mission {name} is already running")
         inputs = self._inputs(name, program, given)
         linked = link(program, self._equipment.names.missions)
         if clash := self._clash(linked):

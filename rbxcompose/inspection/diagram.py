@@ -154,7 +154,7 @@ def _boxes(robot: Robot) -> Iterator[Box]:
 
 
 def _wires(robot: Robot) -> Iterator[Wire]:
-    """Yield the wires by what they carry and by name; nothing is drawn that nobody uses."""
+    """Yield the wires by what they carry and by name; unused ones are not drawn."""
     found: dict[tuple[Line, str], _Open] = {}
     for part in robot.parts.values():
         if part.name != MISSION:  # its missions are drawn in its place

@@ -26,7 +26,7 @@ def expand(manifest: RobotManifest, *, has_origins: bool = True) -> str:
 
 
 def expand_below(manifest: RobotManifest, path: Path, root: Mapping, defaults: AnyMapping[str, str]) -> str:
-    """Return what stands below `path`, with origins, and then the defaults of what nobody wrote there.
+    """Return what stands below `path`, with origins, and then the defaults of what is not written there.
 
     `root` is the map at `path`.
     """

@@ -71,5 +71,5 @@ def _others(robot: Robot, end: End) -> tuple[str, str]:
     names = [
         f"{one.instance}.{one.name}" for one in robot.ends if one.topic == end.topic and isinstance(one.port, other)
     ]
-    outside = "whoever is outside" if isinstance(end.port, In) and end.port.is_open else "nobody here"
+    outside = "anything outside" if isinstance(end.port, In) and end.port.is_open else "nothing here"
     return words, ", ".join(names) or outside

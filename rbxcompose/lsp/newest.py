@@ -10,14 +10,14 @@ from pathlib import Path
 from rbxcompose.lsp.project import Found, OutdatedError, Project
 from rbxcompose.schema.documents import MAKERS, installed_schema
 
-PAUSE = 0.1  # [s] without a key stroke before robots are compiled anew
+PAUSE = 0.1  # [s] without a key stroke before robots are compiled again
 
 
 class Newest:
     """The project as it was compiled last, and the texts that have changed since.
 
     A thread works on a copy of the project, which takes the project's place when it is done. A text that comes
-    meanwhile makes that outdated: it ends at the next robot, and the work begins anew with all texts. So what is
+    meanwhile makes that outdated: it ends at the next robot, and the work starts again with all texts. So what is
     `told` is always of the newest texts. All methods belong to the thread of the event loop.
     """
 

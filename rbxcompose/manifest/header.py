@@ -15,6 +15,6 @@ class Header(Config):
     kind: str
     """What this file describes: `Robot`, `Part`, `Overlay`, `Mission` or `Test`."""
     name: Name
-    """Its name: small letters, digits and underscores."""
+    """Its name: lower-case letters, digits and underscores."""
     about: str = ""
     """What it is for, in a sentence."""

@@ -296,7 +296,7 @@ def named_entries(root: Mapping, path: tuple[str, ...], report: Report) -> Itera
     if node is None or is_empty(node):
         return
     if not isinstance(node, Mapping):
-        message = f"'{path[-1]}' must be a map from names to what they are"
+        message = f"'{path[-1]}' must be a map of named entries"
         report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
         return
     for name, entry in node.entries.items():

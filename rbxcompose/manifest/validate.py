@@ -27,7 +27,7 @@ UNKNOWN_KEY = kind(
     "RBX1001",
     """Unknown key
 
-Every map has a fixed set of keys; this one is not among them, so that it would have no effect. Mostly it is misspelt.
+Every map has a fixed set of keys; this one is not among them, so it would have no effect. Usually it is misspelt.
 
 Bad:
 ```yaml
@@ -48,7 +48,7 @@ MISSING_KEY = kind(
     "RBX1002",
     """Missing key
 
-This map needs a key that is not there and has no default.
+This map lacks a key that has no default.
 
 Bad:
 ```yaml
@@ -68,8 +68,7 @@ WRONG_TYPE = kind(
     "RBX1003",
     """Wrong type or unit
 
-The value is not what this key takes: text where a number stands, a time where a speed stands, an angle without its
-unit.
+The value is not what this key takes: text instead of a number, a time instead of a speed, an angle without its unit.
 
 Bad:
 ```yaml
@@ -105,7 +104,7 @@ OUT_OF_RANGE = kind(
     "RBX1005",
     """Out of range
 
-The value has the right type and is too small or too large, or a list has too few or too many items.
+The value has the right type but is too small or too large, or a list has too few or too many items.
 
 Bad:
 ```yaml
@@ -123,8 +122,8 @@ BAD_NAME = kind(
     "RBX1006",
     """A name of the wrong form
 
-Names begin with a small letter and go on with small letters, digits and underscores, at most 60 of them, so that they
-can stand in topics, in paths and in expressions.
+Names start with a lower-case letter and continue with lower-case letters, digits and underscores, at most 60 in all:
+they are used in topics, paths and expressions.
 
 Bad:
 ```yaml
@@ -268,8 +267,8 @@ def _finding(model: Any, node: Node, path: Path, loc: Path, error: ErrorDetails)
     if error["loc"][-1:] == ("[key]",) or error["type"] == "string_pattern_mismatch":
         place = key_span(node, loc) if error["loc"][-1:] == ("[key]",) else span
         text = value.text if isinstance(value, Scalar) and place is span else name
-        help_text = "small letters, digits and underscores, beginning with a letter"
-        return BAD_NAME.at(place, f"'{text}' is no name", help=help_text)
+        help_text = "lower-case letters, digits and underscores, starting with a letter"
+        return BAD_NAME.at(place, f"'{text}' is not a valid name", help=help_text)
     match error["type"]:
         case "missing":
             message = f"{where((*path, *loc[:-1]))} needs the key '{name}'"

@@ -43,7 +43,7 @@ def _deed(context: Context, word: str, node: Node, model: trials.Event) -> Deed 
 
 
 def _published(context: Context, node: Node, sent: trials.Sent) -> Deed | None:
-    """Return a message for a topic that somebody reads or writes."""
+    """Return a message for a topic that has a publisher or subscriber."""
     topics, topic = _topics(context), resolve(sent.topic, context.robot.manifest.bus.namespace or "")
     if topic not in topics:
         message = f"no component has the topic '{sent.topic}'"

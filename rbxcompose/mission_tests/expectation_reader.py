@@ -70,7 +70,7 @@ def _step(context: Context, node: Node) -> Step | None:
         entries = {node.text: Entry(node, Scalar("", node.span))}
     names = [key for key in entries if key not in STEP_KEYS]
     if len(names) != 1 or not names[0]:
-        message = "this is no step" if not names else f"a step has one name, this has {len(names)}"
+        message = "this is not a step" if not names else f"a step has one name, this has {len(names)}"
         context.report.add(codes.NO_STEP.at(node.span, message, help=STEP_HELP))
         return None
     name, steps = names[0], context.facts.steps
@@ -105,7 +105,7 @@ def _arguments(context: Context, name: str, node: Node) -> dict[str, Value]:
         return {}
     skill = context.facts.skills.get(name)
     if skill is None:
-        context.report.add(codes.NO_STEP.at(node.span, f"'{name}' is no skill, so that it has no arguments"))
+        context.report.add(codes.NO_STEP.at(node.span, f"'{name}' is not a skill, so it has no arguments"))
         return {}
     written = {key: one.value for key, one in entries_of(node)} if isinstance(node, Tree) else {skill.main: node}
     found: dict[str, Value] = {}
@@ -127,7 +127,7 @@ def _counts(context: Context, node: Node | None, counts: Mapping[str, int]) -> l
             message = f"the mission '{context.program.name}' has no step '{name}'"
             context.report.add(codes.UNKNOWN.misspelt(entry.key.span, message, name, context.facts.steps, "its steps"))
         elif counts.get(name, -1) < 0:
-            context.report.add(codes.NEVER.at(entry.value.span, "nothing is done less often than never"))
+            context.report.add(codes.NEVER.at(entry.value.span, "a count cannot be below 0"))
         else:
             found.append(Named(name, counts[name], entry.key.span))
     return found

@@ -168,7 +168,7 @@ class Explorer:
         return (skill.outcomes if skill else {}).get(choice.outcome, choice.outcome)
 
     def look(self, script: tuple[str, ...]) -> None:
-        """Tell what is wrong here, and keep the moment if the mission goes on."""
+        """Report what is wrong here, and keep the moment if the mission continues."""
         for text in self.world.reports:
             self.tell(text, script)
         if self.engine.held_until is not None:
@@ -184,7 +184,7 @@ class Explorer:
         moment = Moment(save(self.engine), world.now, dict(world.values), dict(world.calls), held, script)
         waits_for = self.engine.reads() & self.values.keys()
         if not moment.calls and self.engine.next_wake() is None and not waits_for:
-            self.tell("the mission waits for ever: nothing runs, nothing is due, and no value can change that", script)
+            self.tell("the mission waits for ever: nothing runs, nothing is due, and no value can end the wait", script)
         self.keep(moment)
 
     def keep(self, moment: Moment) -> None:
@@ -257,7 +257,7 @@ class ExploredWorld:
         self.calls[leaf] = self.held.pop(leaf)
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
-        """Nobody listens."""
+        """Do nothing: there is no subscriber."""
 
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
         """Let a call run."""
@@ -311,7 +311,7 @@ def _state(task: Task, state: Sequence[Any], now: float, runs: bool) -> list[Any
 
 def text_of(explored: Explored) -> str:
     """Return what came out, for people."""
-    reach = "as far as the limits reach" if explored.is_cut else "all there are"
+    reach = "cut off at the limits" if explored.is_cut else "complete"
     lines = [f"{explored.mission}: {explored.states} states, {explored.deepest} choices deep; {reach}"]
     for end, script in sorted(explored.ends.items()):
         lines.append(f"  can end with {end}: {_script(script)}")

@@ -86,7 +86,7 @@ def _differences(step: Step, done: Done) -> list[str]:
     if step.ended and step.ended not in (done.ended, step.counts_as.get(done.ended)):
         found.append("was still running" if done.ended == RUNS else f"ended {done.ended}")
     if step.at is not None and abs(step.at - done.began) > ON_TIME:
-        found.append(f"began at {at(done.began)}")
+        found.append(f"started at {at(done.began)}")
     return found
 
 
@@ -99,11 +99,11 @@ def _nearest(step: Step, done: Sequence[Done], behind: int) -> str:
     later = [(one, _differences(step, one)) for one in done[behind:] if one.name == step.name]
     near, differences = min(later, key=lambda pair: ("" in pair[1], len(pair[1])), default=(None, []))
     if near and not (earlier and "" in differences):
-        told = [one for one in differences if one and not one.startswith("began")]
+        told = [one for one in differences if one and not one.startswith("started")]
         return f"the nearest is {near.text} at {at(near.began)}" + "".join(f", which {one}" for one in told)
     if earlier:
-        return f"it was done only before, at {at(earlier[-1].began)}"
-    return "it was never begun" if not behind else f"it was not begun after {done[behind - 1].text}"
+        return f"it was done only earlier, at {at(earlier[-1].began)}"
+    return "it never started" if not behind else f"it did not start after {done[behind - 1].text}"
 
 
 def _written(step: Step) -> str:
@@ -115,7 +115,7 @@ def _never(never: Sequence[Step], record: Record) -> Iterator[Problem]:
     for step in never:
         done = next((one for one in record.steps if is_it(step, one)), None)
         if done:
-            yield Problem(f"{_written(step)} must never be done, and was at {at(done.began)}", step.span, done.line)
+            yield Problem(f"{_written(step)} must never be done, but was at {at(done.began)}", step.span, done.line)
 
 
 def _counts(expect: Expect, record: Record) -> Iterator[Problem]:
@@ -154,7 +154,7 @@ def _published(expect: Expect, record: Record) -> Iterator[Problem]:
 def _reports(expect: Expect, record: Record) -> Iterator[Problem]:
     for one in expect.reports:
         if not any(one.name in text for text in record.reports):
-            yield Problem(f"nothing that was logged or reported has '{one.name}' in it", one.span)
+            yield Problem(f"nothing that was logged or reported contains '{one.name}'", one.span)
 
 
 def at(seconds: float) -> str:

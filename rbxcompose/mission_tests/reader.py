@@ -114,7 +114,7 @@ class Reading:
 
 
 def _no_robot(robot: str, which: str) -> str:
-    return f"the robot '{robot}' has mistakes, so that {which} cannot run"
+    return f"the robot '{robot}' has errors, so {which} cannot run"
 
 
 def _without_values(root: Tree) -> Tree:
@@ -233,6 +233,6 @@ def _no_resume(is_stopped: bool, is_paused: bool) -> str:
 
 _REFUSED: Mapping[str, Callable[[bool, bool], str]] = {
     "resume": _no_resume,
-    "pause": lambda stopped, paused: "the mission is paused here already" if paused else "",
+    "pause": lambda stopped, paused: "the mission is already paused here" if paused else "",
     "release": lambda stopped, paused: "" if stopped else "the robot is not stopped here",
 }

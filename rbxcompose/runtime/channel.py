@@ -130,7 +130,7 @@ class AtRest:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """A component, or with no name the process itself, has failed for good; the robot cannot go on as it is."""
+    """A component, or with no name the process itself, has failed for good; the robot cannot continue as it is."""
 
     instance: str
     message: str

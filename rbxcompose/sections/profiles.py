@@ -15,7 +15,7 @@ PROFILE = "profile"
 
 @section("profiles", dict[str, Any], order=120, files=(ROBOT,), names=PROFILE, scope=Scope.NOTHING, is_composed=False)
 def profiles(reading: Reading[dict[str, Any]]) -> dict[str, Entry] | None:
-    """Changes to the robot by name, made when asked for by `--profile NAME`.
+    """Changes to the robot by name, applied with `--profile NAME`.
 
     Example:
         profiles:

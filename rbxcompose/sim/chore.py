@@ -22,7 +22,7 @@ class ChoreSettings:
 
 
 class ChoreCore:
-    """Work that takes a time, in strokes; each begins its count anew."""
+    """Work that takes a time, in strokes; each starts its own count."""
 
     def __init__(self, settings: ChoreSettings) -> None:
         self.settings = settings

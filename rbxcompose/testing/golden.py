@@ -8,7 +8,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class Golden:
-    """A folder of golden files; `update` writes them anew instead of comparing (`pytest --update-golden`)."""
+    """A folder of golden files; `update` writes them instead of comparing (`pytest --update-golden`)."""
 
     folder: Path
     update: bool = False

@@ -248,7 +248,7 @@ def test_without_the_prefork_parent_the_robot_goes_down(robot: Robot) -> None:
     next(iter(titled(f"rbxcompose {robot.name}: parent"))).send_signal(signal.SIGKILL)
     output, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 4
-    assert "the pre-fork parent has gone" in output
+    assert "the pre-fork parent is gone" in output
     assert robot.last_words("first") == ["braking", "deactivated"]
 
 

@@ -103,7 +103,7 @@ def test_a_type_of_ours_stays_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     ("name", "module", "reason"),
     [
         ("odd", "import no_such_module", "No module named 'no_such_module'"),
-        ("odd", CHECK.format(code="RBX3001", body="return []"), "begins with RBX"),
+        ("odd", CHECK.format(code="RBX3001", body="return []"), "starts with RBX"),
         ("odd", CHECK.format(code="odd one", body="return []"), "is no code"),
         ("odd", CHECK.format(code="ODD01", body="return [robot.no_such_name]"), "the check ODD01 of 'odd_module' has"),
         ("absurd_speed", CHECK.format(code="ODD01", body="return []"), "rbxcompose has one of this name"),

@@ -68,7 +68,7 @@ def answered(in_json: bool) -> Iterator[None]:
 
 
 def misused(verb: str, problem: str) -> int:
-    """Tell that a command cannot be meant like this, and return the exit code for it."""
+    """Report that a command cannot be meant like this, and return the exit code for it."""
     output().misuse = problem
     sys.stderr.write(f"rbxcompose {verb}: {problem}\n")
     return USAGE

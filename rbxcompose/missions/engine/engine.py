@@ -1,4 +1,4 @@
-"""The engine runs one mission: single-threaded, pure, told the time, silent while nothing is to be done."""
+"""The engine runs one mission: single-threaded, pure, with time as an argument, idle while there is nothing to do."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Engine(EngineBase):
         self.arrived.append((leaf, result))
 
     def tick(self, now: float) -> int:
-        """Do all that is to be done at `now` [s], and return the mission's status."""
+        """Do everything that is due at `now` [s], and return the mission's status."""
         self.now = now
         if self.status not in (IDLE, RUNNING) or self.is_paused or self._is_held(now):
             return self.status

@@ -40,7 +40,7 @@ class EngineBase:
         self.lost = 0.0  # [s] for which the mission was paused; while it is, less the time at which that began
         self.because = ""  # why leaves are being halted
         self.cut_short: list[int] = []  # leaves that were halted by the latest suspension
-        self.restarting: tuple[Target, ...] = ()  # what begins anew after the suspension that is going on
+        self.restarting: tuple[Target, ...] = ()  # what starts again after the current suspension
         self.is_aborting = False  # the mission as a whole is ended from outside
         self.places = Places()
         self.reasons: dict[int, str] = {}  # why a node failed the last time
@@ -95,5 +95,5 @@ class EngineBase:
         self.arrived = [result for result in self.arrived if result[0] != leaf]
 
     def say(self, event: MissionEvent) -> None:
-        """Tell the world what happens."""
+        """Report to the world what happens."""
         self.world.say(event)

@@ -19,7 +19,7 @@ class World(Values, Protocol):
         ...
 
     def halt(self, leaf: int, /) -> None:
-        """Stop the skill or the call of a leaf; nothing is to be told of it any more."""
+        """Stop the skill or the call of a leaf; it is not reported any more."""
         ...
 
     def pause(self, leaf: int, /) -> None:

@@ -52,7 +52,7 @@ class ChooseTask(Task):
 @kind("choose", ChooseTask, {"cases": "What is done for which value.", "else": "What is done for all other values."})
 @dataclass(frozen=True, slots=True)
 class Choose(Choosing):
-    """Do the case of a value, which is asked once; without a match it is skipped.
+    """Do the case that matches a value, which is read once; skipped without a match.
 
     Example:
         data:

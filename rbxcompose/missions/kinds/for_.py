@@ -149,12 +149,12 @@ class ForTask(Task):
     "for",
     ForTask,
     {
-        "in": "What it goes through: a list, or a map, of which it takes the keys; it is read once, at the start.",
+        "in": "A list, or a map, whose keys it takes; it is read once, at the start.",
         "do": "What is done for each item.",
-        "order": "In which order: as `written`, `random` (drawn anew at each start), or the `nearest` place first.",
-        "if_one_fails": "`stop` fails at once; `next` does the rest and fails at the end.",
-        "succeed_when": "`all` must succeed, or `any`: it goes on after a failure and ends at the first success.",
-        "remove_done": "Whether an item that has succeeded leaves the data that `in` names.",
+        "order": "The order: as `written`, `random` (a new draw at each start), or the `nearest` place first.",
+        "if_one_fails": "`stop` fails at once; `next` does the other items and fails at the end.",
+        "succeed_when": "`all` must succeed, or `any`: it continues after a failure and ends at the first success.",
+        "remove_done": "Whether an item that succeeded is removed from the data that `in` names.",
     },
 )
 @dataclass(frozen=True, slots=True)

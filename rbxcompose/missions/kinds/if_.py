@@ -43,7 +43,7 @@ class IfTask(Task):
 @kind("if", IfTask, {"then": "What is done if the condition holds.", "else": "What is done if it does not."})
 @dataclass(frozen=True, slots=True)
 class If(Choosing):
-    """Ask the condition once, then do `then` or `else`; without a match it is skipped.
+    """Evaluate a condition once, then do `then` or `else`; skipped without a match.
 
     Example:
         do:

@@ -33,7 +33,7 @@ class LogTask(Task):
         return SUCCESS
 
 
-@kind("log", LogTask, {"level": "How bad it is."})
+@kind("log", LogTask, {"level": "Its severity."})
 @dataclass(frozen=True, slots=True)
 class Log(Deed):
     """Write one line; `$name` in it is filled in.

@@ -86,9 +86,9 @@ class MachineTask(WithHistory):
 @kind("machine", MachineTask)
 @dataclass(frozen=True, slots=True)
 class Machine(Loop):
-    """Be in one state after the other; how a state's body ends decides which is next.
+    """Run one state after another; the outcome of a state decides which is next.
 
-    Below it stand `start`, `states`, and perhaps `ends` and `history`. A state has `do` or `machine`, modifiers,
+    It has `start`, `states`, and perhaps `ends` and `history`. A state has `do` or `machine`, modifiers,
     `on_enter`, `on_exit`, and `next`. `finished` and `failed` are ends that always exist.
 
     Example:

@@ -35,7 +35,7 @@ class PublishTask(Task):
 @kind("publish", PublishTask, {"message": "The fields of the message; a single value stands for the only field."})
 @dataclass(frozen=True, slots=True)
 class Publish(Deed):
-    """Publish a message on a topic of the robot; fields that are left out are zero or empty.
+    """Publish a message on a topic of the robot; missing fields are zero or empty.
 
     Example:
         do:

@@ -84,13 +84,13 @@ class RepeatTask(Task):
     RepeatTask,
     {
         "do": "What is done in each round.",
-        "until": "A condition that ends the loop; it is asked after each round and never cuts one.",
+        "until": "A condition that ends the loop; it is evaluated after each round and never cuts one short.",
         "every": "Time from the start of one round to the start of the next.",
     },
 )
 @dataclass(frozen=True, slots=True)
 class Repeat(Loop):
-    """Do the body again and again; a round that fails fails it, a number that is used up succeeds.
+    """Do the body repeatedly. It fails with the first round that fails, and succeeds after the last.
 
     Example:
         do:
@@ -136,7 +136,7 @@ class Repeat(Loop):
 
     @property
     def waits(self) -> bool:
-        """Tell that it waits between its rounds if they have a period."""
+        """Return that it waits between its rounds if they have a period."""
         return takes_time(self.every)
 
     @property

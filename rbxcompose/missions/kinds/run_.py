@@ -51,7 +51,7 @@ class RunTask(Task):
 @kind("run", RunTask)
 @dataclass(frozen=True, slots=True)
 class Run(Straight):
-    """Do a node that stands in the data: a chore of a list, a step that was chosen before.
+    """Do a node that is stored in the data: a chore of a list, a step chosen earlier.
 
     Example:
         data:

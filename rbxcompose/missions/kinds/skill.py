@@ -78,7 +78,7 @@ class SkillTask(Leaf):
         return status, outcome, result.message or outcome
 
     def suspend(self, anew: bool) -> bool:
-        """Hold the skill if it can pause and is to go on, else stop it."""
+        """Hold the skill if it can pause and will continue, else stop it."""
         if self.is_asked and self.skill.pausable and not self._begins_anew():
             if not self.is_held:
                 self.is_held = True

@@ -56,7 +56,7 @@ class UseTask(WithHistory):
             self.forget_places()
             self.outputs = self._outputs()
             if self.inner.ending == FAILURE:
-                self.engine.reasons[self.number] = self.inner.message or "its mission was to end in failure"
+                self.engine.reasons[self.number] = self.inner.message or "its mission ended itself in failure"
         return status
 
     def halt(self) -> None:

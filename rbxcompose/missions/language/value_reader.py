@@ -191,7 +191,7 @@ class ValueReader:
         return scalar.text if scalar else ""
 
 
-_FLOW_HELP = "inside '{}', commas and colons divide: put quotes round the condition, or write it in block style"
+_FLOW_HELP = "inside '{}', commas and colons separate: put quotes around the condition, or write it in block style"
 
 
 def _part_of(scalar: Scalar, slot: Slot) -> Scalar:

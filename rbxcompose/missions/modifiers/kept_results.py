@@ -37,9 +37,9 @@ class SaveTask(Decorator):
 @modifier("save", SaveTask)
 @dataclass(frozen=True, slots=True)
 class Save(Plain):
-    """Keep what a skill or a `call` answered, the outputs of a `use`, or `{done, failed}` of a `for`.
+    """Keep the result of a skill or a `call`, the outputs of a `use`, or `{done, failed}` of a `for`.
 
-    It is kept also after a failure.
+    It is also kept after a failure.
 
     Example:
         do:

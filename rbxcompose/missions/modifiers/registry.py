@@ -26,7 +26,7 @@ class Decorator(Task):
         self.inner = inner
 
     def suspend(self, anew: bool) -> bool:
-        """Begin anew together with a leaf that begins anew."""
+        """Start again together with a leaf that starts again."""
         if self.current is not None and self.inner.suspend(anew):
             self.current = None
             return True

@@ -126,7 +126,7 @@ class OnceTask(CountingTask):
 @modifier("once", OnceTask)
 @dataclass(frozen=True, slots=True)
 class Once(Skipping):
-    """Be done once within a run of the mission, whether it succeeds or fails; then be skipped.
+    """Run once per run of the mission, whether it succeeds or fails; then be skipped.
 
     Example:
         do:
@@ -173,7 +173,7 @@ class CooldownTask(CountingTask):
 @modifier("cooldown", CooldownTask)
 @dataclass(frozen=True, slots=True)
 class Cooldown(Skipping):
-    """Be skipped for a time after it has ended; the time of interrupts counts, that of pauses does not.
+    """Be skipped for a time after it ends; interrupts count towards it, pauses do not.
 
     Example:
         do:

@@ -59,7 +59,7 @@ class Group(Step):
 
     @property
     def only_asks(self) -> bool:
-        """Tell that it decides more than an answer."""
+        """Return that it decides more than an answer."""
         return False
 
     def shows(self, node: Node, scope: StaticScope) -> Mapping[str, Type]:
@@ -68,7 +68,7 @@ class Group(Step):
 
     @property
     def waits(self) -> bool:
-        """Tell that only those inside take time."""
+        """Return that only those inside take time."""
         return False
 
     @property
@@ -78,7 +78,7 @@ class Group(Step):
 
     @property
     def has_result(self) -> bool:
-        """Tell that only those inside have one."""
+        """Return that only those inside have one."""
         return False
 
 
@@ -89,7 +89,7 @@ class Straight(Group):
 
     @property
     def comes_again(self) -> bool:
-        """Tell that it does not."""
+        """Return that it does not."""
         return False
 
     def endless(self, ends: Outcomes) -> None:

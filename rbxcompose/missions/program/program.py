@@ -58,7 +58,7 @@ class RobotNames:
 
     `topics` and `services` have the ROS names of their types; `unread` are missions whose files could not be read;
     `removed` are places that a layer has taken away, each with where it did so.
-    It is not complete if a part of the robot has mistakes: then a skill that is missing may be that part's.
+    It is not complete if a part of the robot has errors: then a skill that is missing may be that part's.
     """
 
     values: Mapping[str, Type] = field(default_factory=dict)

@@ -32,7 +32,7 @@ def count_in_words(place: Place, node: Node) -> Repair[Node] | None:
     if forever in place.choices:
         meant, told = forever, codes.NOT_A_CHOICE.at(node.span, f"'{key}' cannot be '{node.text}'")
     elif meant := _digits(node):
-        told = codes.WRONG_TYPE.at(node.span, f"'{key}' takes a number in digits and nothing else")
+        told = codes.WRONG_TYPE.at(node.span, f"'{key}' takes only a number in digits")
     else:
         return None
     fix = replacement(node.span, node.text, meant)

@@ -37,7 +37,7 @@ def settings_among_branches(place: Place, node: Node) -> Repair[Node] | None:
 
 
 def _among(parallel: Scalar, setting: Entry, *, is_last: bool) -> Finding:
-    message = f"'{setting.key.text}' stands among the branches"
+    message = f"'{setting.key.text}' is among the branches"
     help_text = f"move it left, into the column of '{parallel.text}'"
     fix = _moved_left(setting, parallel) if is_last else None
     return codes.WRONG_SHAPE.at(setting.key.span, message, help=help_text, fix=fix)

@@ -86,7 +86,7 @@ class _Lines(io.TextIOBase):
         return len(text)
 
     def end(self) -> None:
-        """Tell what was begun and will not be ended."""
+        """Log what was started and will not be ended."""
         while self._begun:
             self._say(self._begun.popitem()[1])
 

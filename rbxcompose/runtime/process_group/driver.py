@@ -66,7 +66,7 @@ class Driver:
         raise NotImplementedError
 
     def _advance(self) -> None:
-        """Let time go on and run what is due."""
+        """Advance time and run what is due."""
         raise NotImplementedError
 
     def _run_present(self) -> None:

@@ -14,7 +14,7 @@ import time
 
 HANG = 2.0  # [s] without a turn of the loop after which the process ends itself
 PERIOD = 0.25  # [s] between two wakings
-MARK = "the loop did not turn for "
+MARK = "the loop did not run for "
 """What the process prints before the places where its threads are."""
 
 

@@ -40,7 +40,7 @@ class Effects(Protocol):
         ...
 
     def is_up(self) -> None:
-        """Tell who waits that all is active."""
+        """Tell those who wait that everything is active."""
         ...
 
     def states_changed(self) -> None:

@@ -140,7 +140,7 @@ class Changing:
     def time_is_up(self, states: Mapping[str, tuple[str, int]]) -> None:
         """End it, as far as it has come."""
         late = sorted(name for name in self.changes.starting if states.get(name, ("",))[0] != "active")
-        self.cut_off(f"after {LONGEST:g} s not active: {', '.join(late)}")
+        self.cut_off(f"not active after {LONGEST:g} s: {', '.join(late)}")
 
     def cut_off(self, reason: str) -> None:
         """End it before its time."""
