@@ -57,7 +57,7 @@ class Dimension:
         return f"{'an' if self.name[0] in 'aeiou' else 'a'} {self.name.replace('_', ' ')}"
 
     def is_comparable(self, other: Dimension) -> bool:
-        """Tell whether values of the two may be compared or added."""
+        """Return whether values of the two may be compared or added."""
         return self.exponents == other.exponents and {self, other} != {RATIO, NUMBER}
 
     def __mul__(self, other: Dimension) -> Dimension:

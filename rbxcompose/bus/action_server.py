@@ -42,7 +42,7 @@ class ServedGoal(Generic[G, R, F]):
 
     @property
     def cancel_requested(self) -> bool:
-        """Tell whether the goal should end soon, by `canceled`."""
+        """Return whether the goal should end soon, by `canceled`."""
         return self._goal.state is GoalState.CANCELING
 
     def feedback(self, message: F, /) -> None:

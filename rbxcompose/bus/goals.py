@@ -29,7 +29,7 @@ class GoalState(IntEnum):
 
     @property
     def is_end(self) -> bool:
-        """Tell whether a goal stays in this state."""
+        """Return whether a goal stays in this state."""
         return self >= GoalState.SUCCEEDED
 
 

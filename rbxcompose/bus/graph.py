@@ -52,7 +52,7 @@ class Name:
 
     @property
     def is_hidden(self) -> bool:
-        """Tell whether ROS tools leave it out of lists: a word of it begins with `_`."""
+        """Return whether ROS tools leave it out of lists: a word of it begins with `_`."""
         return "/_" in self.name
 
     @property

@@ -37,7 +37,7 @@ class Probe:
 
     @property
     def is_in_doubt(self) -> bool:
-        """Tell whether the last probe was missed, so that the next one goes to all; else whoever is near will do."""
+        """Return whether the last probe was missed, so that the next one goes to all; else whoever is near will do."""
         return self._misses > 0
 
     def judge(self, heard: Heard, *, is_router_up: bool) -> bool:

@@ -54,7 +54,7 @@ class Request(Generic[Q, R]):
 
     @property
     def is_open(self) -> bool:
-        """Tell whether it was not answered yet."""
+        """Return whether it was not answered yet."""
         return self._answer is not None
 
     def reply(self, response: R) -> None:
@@ -217,7 +217,7 @@ class Client(Generic[Q, R]):
 
     @property
     def is_available(self) -> bool:
-        """Tell whether a server is known."""
+        """Return whether a server is known."""
         return bool(self._services.servers.at(self.route) or self._servers)
 
     def watch(self, changed: Callable[[bool], None]) -> None:

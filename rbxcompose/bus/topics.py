@@ -40,7 +40,7 @@ class Topics:
     subscriptions: Registry[Subscription[Any]] = field(default_factory=Registry)
 
     def published_here(self, subscription: Subscription[Any], source: Attachment) -> bool:
-        """Tell whether a message comes from a publisher of this very process."""
+        """Return whether a message comes from a publisher of this very process."""
         return any(publisher.gid == source.gid for publisher in self.publishers.at(subscription.route))
 
 

@@ -62,7 +62,7 @@ class RemotePublisher(Closable, Protocol):
 
     @property
     def has_match(self) -> bool:
-        """Tell whether anybody would receive it, now or (if latched) later."""
+        """Return whether anybody would receive it, now or (if latched) later."""
         ...
 
     def put(self, payload: bytes, attachment: bytes) -> None:

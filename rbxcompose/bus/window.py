@@ -38,7 +38,7 @@ class Window:
 
     @property
     def is_watched(self) -> bool:
-        """Tell whether anybody would hear news."""
+        """Return whether anybody would hear news."""
         if self._remote.has_match:
             return True
         return self._asked_at is not None and self._clock.now() - self._asked_at <= GRACE

@@ -51,7 +51,7 @@ class Excess:
 
     @property
     def is_absurd(self) -> bool:
-        """Tell whether the base drops such commands instead of cutting them."""
+        """Return whether the base drops such commands instead of cutting them."""
         factor = self.drive.drives.drops_above
         return factor is not None and self.wanted.value > factor.value * self.limit.value
 

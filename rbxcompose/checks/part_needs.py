@@ -63,7 +63,7 @@ def own_instances(part: IncludedPart) -> frozenset[str]:
 
 
 def is_type(end: End, written: str) -> bool:
-    """Tell whether an end has the type that a part writes: `geometry_msgs/Twist`."""
+    """Return whether an end has the type that a part writes: `geometry_msgs/Twist`."""
     return short(end.type_name) == short(written)
 
 

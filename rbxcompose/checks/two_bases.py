@@ -48,5 +48,5 @@ def two_bases(robot: Robot) -> Iterator[Finding]:
 
 
 def _moves(robot: Robot, end: End) -> bool:
-    """Tell whether the robot moves by what comes in at this end."""
+    """Return whether the robot moves by what comes in at this end."""
     return any(end.name == one.commands for one in robot.parts[end.instance].declared(Drives))

@@ -68,7 +68,7 @@ class _Frames:
 
     @property
     def is_whole(self) -> bool:
-        """Tell whether all who publish have been heard."""
+        """Return whether all who publish have been heard."""
         return not self._waiting
 
     def _listen(self, topic: Name) -> None:

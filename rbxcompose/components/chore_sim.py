@@ -68,7 +68,7 @@ class ChoreSim(Component[ChoreSimConfig]):
         self.moving = False
 
     def reconfigure(self, old: ChoreSimConfig) -> None:
-        """Go on with the same chore as it is set now."""
+        """Continue with the same chore as it is set now."""
         self.core.settings = settings_of(self.config)
 
     def accept_chore(self, goal: Wait.Goal) -> str:

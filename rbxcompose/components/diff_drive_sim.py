@@ -92,7 +92,7 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
 
     @property
     def is_at_rest(self) -> bool:
-        """Tell whether the wheels stand still."""
+        """Return whether the wheels stand still."""
         return self.core.at_rest
 
     def on_cmd_vel(self, message: geometry.Twist) -> None:

@@ -73,7 +73,7 @@ class GoTo(Component[GoToConfig]):
         self.driving: object = None  # the goal that the core drives to
 
     def reconfigure(self, old: GoToConfig) -> None:
-        """Go on to the same goal as it is set now."""
+        """Continue to the same goal as it is set now."""
         self.core.settings = settings_of(self.config)
 
     def accept_go_to(self, goal: NavigateToPose.Goal) -> str:

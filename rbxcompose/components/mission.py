@@ -250,7 +250,7 @@ class Mission(Component[MissionConfig]):
 
     @property
     def claims(self) -> bool:
-        """Tell whether a mission uses a skill that claims a part of the robot."""
+        """Return whether a mission uses a skill that claims a part of the robot."""
         return any(one.claims for one in self.missions)
 
     def take_over(self, old: Mission) -> None:

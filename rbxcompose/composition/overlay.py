@@ -177,11 +177,11 @@ class _Merge:
             self._enter(entries, entry, path)
 
     def may_merge(self, path: Path) -> bool:
-        """Tell whether this layer may add to the map at `path`."""
+        """Return whether this layer may add to the map at `path`."""
         return True
 
     def may_change(self, path: Path) -> bool:
-        """Tell whether this layer may replace or remove what is at `path`."""
+        """Return whether this layer may replace or remove what is at `path`."""
         return True
 
     def _enter(self, entries: dict[str, Entry], entry: Entry, path: Path) -> None:
@@ -239,7 +239,7 @@ class _Join(_Merge):
 
 
 def _is_shared(path: Path) -> bool:
-    """Tell whether several parts may add to the map at `path`."""
+    """Return whether several parts may add to the map at `path`."""
     section = section_named(path[0])
     return section is not None and section.is_shared(path[1:])
 
@@ -260,7 +260,7 @@ def _settled(node: Node, report: Report) -> Node:
 
 
 def is_removal(node: Node) -> bool:
-    """Tell whether a layer takes away what lies below it."""
+    """Return whether a layer takes away what lies below it."""
     return isinstance(node, Mapping) and node.tag == REMOVE
 
 

@@ -58,5 +58,5 @@ def examine_all(facts: Facts) -> list[Answer]:
 
 
 def has_errors(answers: Sequence[Answer]) -> bool:
-    """Tell whether anything keeps a robot from running."""
+    """Return whether anything keeps a robot from running."""
     return any(one.level == Severity.ERROR.value for one in answers)

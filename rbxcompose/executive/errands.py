@@ -41,7 +41,7 @@ class Errand:
         """Hold it as it is."""
 
     def resume(self) -> None:
-        """Go on."""
+        """Continue."""
 
     def next_look(self) -> float | None:
         """Return when it wants to be looked after [s]; None: it is told what happens."""
@@ -59,7 +59,7 @@ class Errand:
 
     @property
     def is_over(self) -> bool:
-        """Tell whether it has ended or was halted."""
+        """Return whether it has ended or was halted."""
         return self._done is None
 
 

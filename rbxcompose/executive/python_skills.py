@@ -53,7 +53,7 @@ class PythonErrand(Errand):
             self._safely(lambda: activity.pause(self._shell.now))
 
     def resume(self) -> None:
-        """Let the activity go on."""
+        """Let the activity continue."""
         self._is_paused, self._due = False, self._shell.now
         if (activity := self._activity) is not None:
             self._safely(lambda: activity.resume(self._shell.now))

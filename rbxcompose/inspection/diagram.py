@@ -86,7 +86,7 @@ class Wire:
 
     @property
     def is_pair(self) -> bool:
-        """Tell whether it leads from one box to one other."""
+        """Return whether it leads from one box to one other."""
         return len(self.sources) == len(self.targets) == 1
 
 

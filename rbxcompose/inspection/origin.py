@@ -48,7 +48,7 @@ def origin_of(manifest: RobotManifest, path: Path, node: Node) -> Origin:
 
 
 def is_leaf(node: Node) -> bool:
-    """Tell whether nothing stands below a node."""
+    """Return whether nothing stands below a node."""
     match node:
         case Mapping(entries=entries):
             return not entries

@@ -85,5 +85,5 @@ def no_such_path(robot: Robot, path: Path, guide: Guide) -> Finding:
 
 
 def is_known(manifest: RobotManifest, guide: Guide, path: Path) -> bool:
-    """Tell whether a path leads to something, or is a key that could be written where it stands."""
+    """Return whether a path leads to something, or is a key that could be written where it stands."""
     return found_at(manifest, path) is not None or str(path[-1]) in guide.keys(path[:-1])

@@ -123,7 +123,7 @@ def _of_value(spot: Spot, path: tuple[str | int, ...]) -> Iterator[Item]:
 
 
 def _is_expression(value: Value) -> bool:
-    """Tell whether places may be compared here."""
+    """Return whether places may be compared here."""
     return value.dimension is None and not value.words
 
 

@@ -36,11 +36,11 @@ class Newest:
             self._thread.submit(installed_schema, kind)
 
     def has(self, path: Path) -> bool:
-        """Tell whether the editor's text of a file counts in place of the saved one."""
+        """Return whether the editor's text of a file counts in place of the saved one."""
         return self._waiting.get(path) is not None or (path in self.project.unsaved and path not in self._waiting)
 
     def is_compiled(self, path: Path, text: str) -> bool:
-        """Tell whether the project was compiled with this text of a file."""
+        """Return whether the project was compiled with this text of a file."""
         return not self._waiting and self.project.text(path) == text
 
     def change(self, path: Path, text: str | None, pause: float = 0.0) -> None:

@@ -138,5 +138,5 @@ def behind_dashes(line: str) -> int:
 
 
 def is_written(line: str) -> bool:
-    """Tell whether a line holds more than a comment."""
+    """Return whether a line holds more than a comment."""
     return bool(line.strip()) and not line.lstrip().startswith("#")

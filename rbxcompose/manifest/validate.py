@@ -167,7 +167,7 @@ def _adapter(model: Any) -> TypeAdapter[Any]:
 
 
 def is_valid(model: Any, data: object) -> bool:
-    """Tell whether plain data are what `model` takes, without words on why not."""
+    """Return whether plain data are what `model` takes, without words on why not."""
     try:
         _adapter(model).validate_python(data, strict=True)
     except ValidationError:
@@ -319,7 +319,7 @@ def _called(path: Path) -> str:
 
 
 def is_broken(node: Node | None) -> bool:
-    """Tell whether a value could not be filled in, or is no number that can be taken, which was said."""
+    """Return whether a value could not be filled in, or is no number that can be taken, which was said."""
     return isinstance(node, Scalar) and (node.filled is BROKEN or (node.filled is None and bool(number_trouble(node))))
 
 
@@ -356,7 +356,7 @@ def _with(data: object, path: Path, value: object) -> object:
 
 
 def _takes(model: Any, data: object, loc: Path) -> bool:
-    """Tell whether a model has nothing against what stands at `loc`."""
+    """Return whether a model has nothing against what stands at `loc`."""
     try:
         _adapter(model).validate_python(data)
     except ValidationError as error:

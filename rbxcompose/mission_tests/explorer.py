@@ -103,7 +103,7 @@ class Explorer:
         self.fresh = save(self.engine)
 
     def explore(self) -> Explored:
-        """Go on until there is nothing new, or the limits are reached."""
+        """Continue until there is nothing new, or the limits are reached."""
         while self.waiting:
             moment = self.waiting.popleft()
             self.out.deepest = max(self.out.deepest, len(moment.script))
@@ -188,7 +188,7 @@ class Explorer:
         self.keep(moment)
 
     def keep(self, moment: Moment) -> None:
-        """Go on from a moment later, if it is new."""
+        """Continue from a moment later, if it is new."""
         mark = fingerprint(moment, self.engine.tasks)
         if mark not in self.met:
             self.met.add(mark)
@@ -253,7 +253,7 @@ class ExploredWorld:
         self.held[leaf] = self.calls.pop(leaf)
 
     def resume(self, leaf: int, /) -> None:
-        """Let a call go on."""
+        """Let a call continue."""
         self.calls[leaf] = self.held.pop(leaf)
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:

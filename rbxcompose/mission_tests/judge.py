@@ -73,7 +73,7 @@ def _steps(expected: Sequence[Step], record: Record) -> Iterator[Problem]:
 
 
 def is_it(step: Step, done: Done) -> bool:
-    """Tell whether a step that was done is the one that is looked for."""
+    """Return whether a step that was done is the one that is looked for."""
     return done.name == step.name and not _differences(step, done)
 
 

@@ -177,7 +177,7 @@ def _read(root: Tree, robot: Robot, plan: Plan, report: Report) -> Trial | None:
 
 
 def _is_complete(facts: Facts, mocks: Mapping[str, Mock], events: tuple[Event, ...]) -> bool:
-    """Tell whether the mission asks for nothing but what the test gives, and nothing goes over the bus."""
+    """Return whether the mission asks for nothing but what the test gives, and nothing goes over the bus."""
     deeds = [deed for event in events for deed in event.deeds]
     values = {name for deed in deeds for name in deed.settings} | {name for one in mocks.values() for name in one.sets}
     is_answered = {*facts.skills, *facts.services} <= mocks.keys()

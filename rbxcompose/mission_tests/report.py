@@ -32,7 +32,7 @@ class Outcome:
 
     @property
     def passed(self) -> bool:
-        """Tell whether the test ran, and all was as expected."""
+        """Return whether the test ran, and all was as expected."""
         return self.verdict is not None and self.verdict.passed
 
     @property

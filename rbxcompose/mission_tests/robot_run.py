@@ -173,7 +173,7 @@ class TrialWorld:
             self._robot.pause(leaf)
 
     def resume(self, leaf: int, /) -> None:
-        """Let a call go on."""
+        """Let a call continue."""
         if self._run.mocked.resume(leaf, self._run.now):
             self._run.await_calls()
         else:

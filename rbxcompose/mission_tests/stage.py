@@ -61,7 +61,7 @@ class Stage:
         self.mocked.pause(leaf, self.now)
 
     def resume(self, leaf: int, /) -> None:
-        """Let a call go on."""
+        """Let a call continue."""
         self.mocked.resume(leaf, self.now)
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:

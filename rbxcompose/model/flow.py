@@ -88,5 +88,5 @@ def setting_span(robot: Robot, *settings: tuple[Part, str]) -> Span:
 
 
 def is_written(robot: Robot, part: Part, name: str) -> bool:
-    """Tell whether a field of the configuration is written down in the manifest."""
+    """Return whether a field of the configuration is written down in the manifest."""
     return bool(name) and at(robot.manifest.root, (*part.path, *name.split("."))) is not None

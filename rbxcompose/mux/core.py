@@ -68,7 +68,7 @@ class MuxCore(Generic[M]):
 
     @property
     def stopped(self) -> bool:
-        """Tell whether the lock `stop` is latched."""
+        """Return whether the lock `stop` is latched."""
         return self._stopped
 
     def receive(self, name: str, message: M, now: float) -> M | None:

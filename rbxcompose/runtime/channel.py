@@ -254,7 +254,7 @@ class Channel:
 
     @property
     def is_behind(self) -> bool:
-        """Tell whether the other side has not taken all; what can be left out may be left out."""
+        """Return whether the other side has not taken all; what can be left out may be left out."""
         return bool(self._unsent)
 
     def flush(self) -> None:

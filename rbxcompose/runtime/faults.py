@@ -19,7 +19,7 @@ class RestartPolicy:
 
     @property
     def is_allowed(self) -> bool:
-        """Tell whether there is any further try, however few failures there were."""
+        """Return whether there is any further try, however few failures there were."""
         return self._restart.when != "never"
 
     def after_failure(self, now: float) -> float | None:

@@ -106,7 +106,7 @@ class RobotState:
 
     @property
     def is_supervised(self) -> bool:
-        """Tell whether the supervisor still runs."""
+        """Return whether the supervisor still runs."""
         return self._is_ours(self.supervisor)
 
     def _is_ours(self, process: Process) -> bool:
@@ -183,7 +183,7 @@ class RobotFolder:
 
     @property
     def is_known(self) -> bool:
-        """Tell whether a robot is up here or has left its state behind."""
+        """Return whether a robot is up here or has left its state behind."""
         return (self.path / STATE).exists() or self.is_held
 
     @property
@@ -202,11 +202,11 @@ class RobotFolder:
         return False
 
     def has_lost(self, lock: int) -> bool:
-        """Tell whether somebody has removed files of a robot that runs and holds `lock`."""
+        """Return whether somebody has removed files of a robot that runs and holds `lock`."""
         return self.has_lost_lock(lock) or not all((self.path / name).exists() for name in (STATE, SOCKET))
 
     def has_lost_lock(self, lock: int) -> bool:
-        """Tell whether the lock that is held is no longer the one that others would try to hold."""
+        """Return whether the lock that is held is no longer the one that others would try to hold."""
         return not self._is_current(lock)
 
     def lock(self) -> int | None:

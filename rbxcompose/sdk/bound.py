@@ -69,7 +69,7 @@ class Caller(Protocol[Q_contra, R]):
 
     @property
     def is_available(self) -> bool:
-        """Tell whether a server is known."""
+        """Return whether a server is known."""
         ...
 
     def __call__(self, request: Q_contra, then: Callable[[Reply[R]], None], /, *, timeout: float = 5.0) -> None:
@@ -106,7 +106,7 @@ class ServedGoal(Protocol[G_co, R_contra, F_contra]):
 
     @property
     def cancel_requested(self) -> bool:
-        """Tell whether the goal should end soon, by `canceled`."""
+        """Return whether the goal should end soon, by `canceled`."""
         ...
 
     @property
@@ -153,7 +153,7 @@ class ActionCaller(Protocol[G_contra, R, F_co]):
 
     @property
     def is_available(self) -> bool:
-        """Tell whether a server is known."""
+        """Return whether a server is known."""
         ...
 
     def __call__(

@@ -27,7 +27,7 @@ class Context(Protocol):
 
     @property
     def is_stopped(self) -> bool:
-        """Tell whether the robot is held by a stop."""
+        """Return whether the robot is held by a stop."""
         ...
 
     def log(self, level: Level, text: str) -> None:
@@ -110,7 +110,7 @@ class Component(Generic[C]):
 
     @property
     def is_at_rest(self) -> bool:
-        """Tell whether nothing that this component moves is moving."""
+        """Return whether nothing that this component moves is moving."""
         return True
 
     @property
@@ -120,7 +120,7 @@ class Component(Generic[C]):
 
     @property
     def claims(self) -> bool:
-        """Tell whether its occupation claims what moves the robot."""
+        """Return whether its occupation claims what moves the robot."""
         return False
 
     def info(self, text: str) -> None:

@@ -42,7 +42,7 @@ class Activity:
     rate: ClassVar[float] = 20.0  # [Hz] of `step`
 
     def step(self, now: float) -> Told | None:
-        """Go on; return None while it is not done."""
+        """Continue; return None while it is not done."""
         raise NotImplementedError
 
     def halt(self) -> None:
@@ -52,7 +52,7 @@ class Activity:
         """Hold, at robot time `now` [s]; no steps come until `resume`."""
 
     def resume(self, now: float) -> None:
-        """Go on, at robot time `now` [s]."""
+        """Continue, at robot time `now` [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class SkillType:
 
     @property
     def is_activity(self) -> bool:
-        """Tell whether it may take time."""
+        """Return whether it may take time."""
         return inspect.isclass(self.make)
 
 

@@ -35,7 +35,7 @@ class ChoreCore:
 
     @property
     def is_done(self) -> bool:
-        """Tell whether nothing is left to do."""
+        """Return whether nothing is left to do."""
         return self.left <= NOTHING_LEFT
 
     def step(self, dt: float) -> Velocity2:

@@ -149,7 +149,7 @@ class Guest:
         self._selector.register(descriptor, selectors.EVENT_READ, ready)
 
     def run(self, until: Callable[[], bool], timeout: float = math.inf) -> bool:
-        """Let things happen until something holds, or for `timeout` [s], and tell whether it does."""
+        """Let things happen until something holds, or for `timeout` [s], and return whether it does."""
         deadline = self.clock.now() + timeout
         while True:
             self.scheduler.advance(self.clock.now())

@@ -54,7 +54,7 @@ class _Echo:
 
     @property
     def is_over(self) -> bool:
-        """Tell whether enough has been printed."""
+        """Return whether enough has been printed."""
         return self._arguments.count is not None and self._count >= self._arguments.count
 
     def heard(self, heard: Heard) -> None:

@@ -39,7 +39,7 @@ class MissionsSeen:
 
     @property
     def is_complete(self) -> bool:
-        """Tell whether all answers have come."""
+        """Return whether all answers have come."""
         return self._is_listed and not self._asked
 
     def look(self) -> None:

@@ -75,7 +75,7 @@ def misused(verb: str, problem: str) -> int:
 
 
 def has_colour(stream: TextIO) -> bool:
-    """Tell whether colours help: on a terminal, unless `NO_COLOR` is set."""
+    """Return whether colours help: on a terminal, unless `NO_COLOR` is set."""
     return stream.isatty() and not os.environ.get("NO_COLOR")
 
 

@@ -94,7 +94,7 @@ class Engine(EngineBase):
             self.main.stack[-1].suspend(now, anew=False)
 
     def resume(self, now: float) -> None:
-        """Go on; the skills that were halted are asked again at the next tick."""
+        """Continue; the skills that were halted are asked again at the next tick."""
         if self.is_paused:
             self.is_paused = False
             self.lost += now

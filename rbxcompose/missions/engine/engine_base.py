@@ -60,11 +60,11 @@ class EngineBase:
         self.wants_again = by
 
     def is_past(self, time: float) -> bool:
-        """Tell whether a time of this course [s] has come."""
+        """Return whether a time of this course [s] has come."""
         return time - self.time <= ROUNDING
 
     def has_gone_by(self, seconds: float, since: float) -> bool:
-        """Tell whether so much time has gone by since a time without the pauses of the mission."""
+        """Return whether so much time has gone by since a time without the pauses of the mission."""
         return seconds - (self.unpaused - since) <= ROUNDING
 
     def chance(self) -> Random:
@@ -73,7 +73,7 @@ class EngineBase:
         return Random(f"{self.settings.seed}/{self.draws}")  # noqa: S311 - no secret, and to be drawn again
 
     def is_due(self, deadline: float) -> bool:
-        """Tell whether a time of this course [s] has come; if not, the engine wakes then."""
+        """Return whether a time of this course [s] has come; if not, the engine wakes then."""
         if self.is_past(deadline):
             return True
         self.wake_at(deadline + (self.now - self.time))

@@ -30,7 +30,7 @@ class Places:
             self.kept.add(task)
 
     def take_up(self, task: Placed) -> bool:
-        """Tell whether a task that starts has a place to start at; it is told once."""
+        """Return whether a task that starts has a place to start at; it is told once."""
         if task in self.kept:
             self.kept.remove(task)
             return True

@@ -54,7 +54,7 @@ class Run(RunBase):
             reaction.scope.mark()
 
     def tick(self, now: float) -> int:
-        """Look at the interrupts, then go on with the course on top; return the status of the mission."""
+        """Look at the interrupts, then continue with the course on top; return the status of the mission."""
         self._look(now)
         course, outer = self.stack[-1], self.engine.time
         self.engine.time = course.time(now)

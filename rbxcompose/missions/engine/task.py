@@ -70,7 +70,7 @@ class Task(ABC):
         return status
 
     def tick(self) -> int:
-        """Go on, and return the status; only for a task that runs."""
+        """Continue, and return the status; only for a task that runs."""
         try:
             status = self.proceed()
         except Exception as error:
@@ -92,7 +92,7 @@ class Task(ABC):
             child.halt()
 
     def suspend(self, anew: bool) -> bool:
-        """Stop the leaves that run, keep the place, and tell whether this task is to be started again for that.
+        """Stop the leaves that run, keep the place, and return whether this task is to be started again for that.
 
         With `anew`, a leaf and its modifiers begin again from the start, as after an interrupt; without it, as after
         a pause, a leaf repeats only what it asked of the robot.
@@ -129,7 +129,7 @@ class Task(ABC):
         raise NotImplementedError(f"{type(self).__name__} ends with its first tick")
 
     def advance(self, child: Task) -> int:
-        """Start the child or go on with it, and return its status."""
+        """Start the child or continue with it, and return its status."""
         status = child.start() if self.current is None else child.tick()
         self.current = child if status == RUNNING else None
         return status

@@ -27,7 +27,7 @@ class World(Values, Protocol):
         ...
 
     def resume(self, leaf: int, /) -> None:
-        """Let the skill of a leaf go on that was held."""
+        """Let the skill of a leaf continue that was held."""
         ...
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:

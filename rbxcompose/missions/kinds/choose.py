@@ -37,7 +37,7 @@ class ChooseTask(Task):
         return SKIPPED if self.index < 0 else self.proceed()
 
     def proceed(self) -> int:
-        """Go on with what was chosen."""
+        """Continue with what was chosen."""
         return self.advance(self.chosen[self.index])
 
     def _choose(self) -> int:

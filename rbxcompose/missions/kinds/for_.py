@@ -68,7 +68,7 @@ class ForTask(Task):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on with this item; the next one is for another tick."""
+        """Continue with this item; the next one is for another tick."""
         status = self.advance(self.body)
         if status == RUNNING:
             return RUNNING
@@ -99,7 +99,7 @@ class ForTask(Task):
         return {"done": list(self.done), "failed": list(self.failed)}
 
     def _decides(self, status: int) -> bool:
-        """Note the result of an item, and tell whether it is that of the loop."""
+        """Note the result of an item, and return whether it is that of the loop."""
         if status == FAILURE:
             self.failed.append(self.taken)
             self.did = FAILURE
@@ -211,7 +211,7 @@ class For(Loop):
         return Outcomes(fails=endings.of(node.children[0]).plain.fails)
 
     def _is_read(self, program: Program) -> bool:
-        """Tell whether what it goes through is there whatever happens."""
+        """Return whether what it goes through is there whatever happens."""
         if isinstance(self.items, tuple):
             return not any(item.names for item in self.items)
         written = self.items.tree.name if isinstance(self.items.tree, Variable) else ""

@@ -36,7 +36,7 @@ class IfTask(Task):
         return self.proceed() if self.index < len(self.branches) else SKIPPED
 
     def proceed(self) -> int:
-        """Go on with what was chosen."""
+        """Continue with what was chosen."""
         return self.advance(self.branches[self.index])
 
 

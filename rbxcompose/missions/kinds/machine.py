@@ -51,7 +51,7 @@ class MachineTask(WithHistory):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on with the state; the next one is for another tick."""
+        """Continue with the state; the next one is for another tick."""
         self.engine.outcome = ""
         status = self.advance(self.states[self.index])
         if status == RUNNING:
@@ -156,7 +156,7 @@ class StateTask(Task):
         return self.advance(self.body)
 
     def proceed(self) -> int:
-        """Go on with the body."""
+        """Continue with the body."""
         return self.advance(self.body)
 
     def result(self) -> Value:

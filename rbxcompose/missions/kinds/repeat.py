@@ -54,7 +54,7 @@ class RepeatTask(Task):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on with this round; the next one is for another tick."""
+        """Continue with this round; the next one is for another tick."""
         if self.is_between:
             if not self.engine.is_due(self.due):
                 return RUNNING
@@ -124,7 +124,7 @@ class Repeat(Loop):
         return Outcomes(fails=body.fails) if self._is_counted(node) else ANY
 
     def _is_counted(self, node: Node) -> bool:
-        """Tell whether the number of rounds and the time of one are written out, and `until` can always be asked."""
+        """Return whether the number of rounds and the time of one are written out, and `until` can always be asked."""
         if not any(asked.expression.names for asked in node.asked):
             return True
         return is_simple(node) and all(one is None or isinstance(one.tree, Number) for one in (self.rounds, self.every))

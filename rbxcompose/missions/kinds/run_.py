@@ -44,7 +44,7 @@ class RunTask(Task):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on with it."""
+        """Continue with it."""
         return self.advance(self.children[self.index])
 
 

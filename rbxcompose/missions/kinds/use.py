@@ -50,7 +50,7 @@ class UseTask(WithHistory):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on with the mission."""
+        """Continue with the mission."""
         status = self.inner.tick(self.engine.time)
         if status != RUNNING:
             self.forget_places()

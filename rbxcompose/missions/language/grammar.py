@@ -72,11 +72,11 @@ class Words:
     skills: Collection[str] = ()
 
     def is_step(self, word: str) -> bool:
-        """Tell whether a word is that of a kind, or a skill of the robot."""
+        """Return whether a word is that of a kind, or a skill of the robot."""
         return word in self.kinds or word in self.skills
 
     def is_option(self, key: str) -> bool:
-        """Tell whether some kind has a key of this name beside its word."""
+        """Return whether some kind has a key of this name beside its word."""
         return bool(self.owners(key))
 
     def owners(self, key: str) -> str:
@@ -116,7 +116,7 @@ def long_form(step: Node) -> Tree:
 
 
 def is_empty(node: Node) -> bool:
-    """Tell whether nothing was written: `do:` with no value."""
+    """Return whether nothing was written: `do:` with no value."""
     return isinstance(node, Scalar) and node.plain and not node.text
 
 
@@ -132,7 +132,7 @@ def without_word(step: Tree, words: Words) -> Tree:
 
 
 def is_told(node: Node | None) -> bool:
-    """Tell whether all was said of a value, or of the word of a step."""
+    """Return whether all was said of a value, or of the word of a step."""
     if isinstance(node, Tree) and "" in node:
         node = node.entries[""].key
     return isinstance(node, Scalar) and node.filled is BROKEN

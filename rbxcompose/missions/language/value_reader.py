@@ -73,7 +73,7 @@ class ValueReader:
         return self.key_span(self.key)
 
     def has(self, key: str) -> bool:
-        """Tell whether an option was written."""
+        """Return whether an option was written."""
         return key in self.mapping
 
     def key_span(self, key: str) -> Span:
@@ -169,7 +169,7 @@ class ValueReader:
         return scalar if scalar and self.check_name(scalar) else Scalar("", self.key_span(key))
 
     def check_name(self, scalar: Scalar) -> bool:
-        """Tell whether a word may be a name; a finding says it if not."""
+        """Return whether a word may be a name; a finding says it if not."""
         if not NAME.fullmatch(scalar.text):
             self.add(no_name(scalar))
             return False

@@ -33,7 +33,7 @@ class HooksTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on, and do what belongs to the end."""
+        """Continue, and do what belongs to the end."""
         status = self.advance(self.inner)
         if status in _ON:
             act(self.moments, _ON[status], self)

@@ -27,7 +27,7 @@ class SaveTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on, and keep the result at the end."""
+        """Continue, and keep the result at the end."""
         status = self.advance(self.inner)
         if status != RUNNING and self.name:
             self.run.data[self.name] = self.inner.result()

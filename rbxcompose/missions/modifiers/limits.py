@@ -49,7 +49,7 @@ class AsLongAsTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Ask, then go on."""
+        """Evaluate it, then continue."""
         if not holds(self.watched.condition, self.scope):
             self.cut(f"not as long as {self.watched.condition.text}")
             return FAILURE
@@ -98,7 +98,7 @@ class TimeoutTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on, unless the deadline has come."""
+        """Continue, unless the deadline has come."""
         status = self.advance(self.inner)
         if status != RUNNING or not self.engine.is_due(self.deadline):
             return status
@@ -156,7 +156,7 @@ class AttemptsTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on with this attempt, or begin the next one."""
+        """Continue with this attempt, or begin the next one."""
         if self.is_between:
             if not self.engine.is_due(self.deadline):
                 return RUNNING

@@ -33,7 +33,7 @@ class Decorator(Task):
         return False
 
     def proceed(self) -> int:
-        """Go on with the task inside."""
+        """Continue with the task inside."""
         return self.advance(self.inner)
 
 

@@ -28,7 +28,7 @@ class TurningTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on, and turn the result."""
+        """Continue, and turn the result."""
         status = self.advance(self.inner)
         turned = self.turned.get(status, status)
         if turned != status:

@@ -31,7 +31,7 @@ class EnteringTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on, and do what belongs to leaving."""
+        """Continue, and do what belongs to leaving."""
         status = self.advance(self.inner)
         if status != RUNNING:
             act(self.moments, ON_EXIT, self)

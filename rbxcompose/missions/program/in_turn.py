@@ -101,7 +101,7 @@ class InTurnTask(WithHistory):
             self.children = tuple(self.all[index] for index in self.order)
 
     def proceed(self) -> int:
-        """Go on with the child that runs, and with those behind it as far as they end at once."""
+        """Continue with the child that runs, and with those behind it as far as they end at once."""
         if self.conditions and self.index:
             self.ask_again()
         children, index, child, decides = self.children, self.index, self.current, self.decides

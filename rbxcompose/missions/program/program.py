@@ -149,17 +149,17 @@ class Step(ABC):
     @property
     @abstractmethod
     def only_asks(self) -> bool:
-        """Tell whether all that it does by itself is to ask conditions, which may be done again at any time."""
+        """Return whether all that it does by itself is to ask conditions, which may be done again at any time."""
 
     @property
     @abstractmethod
     def waits(self) -> bool:
-        """Tell whether it takes time by itself."""
+        """Return whether it takes time by itself."""
 
     @property
     @abstractmethod
     def comes_again(self) -> bool:
-        """Tell whether what is inside may be done more than once."""
+        """Return whether what is inside may be done more than once."""
 
     @property
     @abstractmethod
@@ -169,7 +169,7 @@ class Step(ABC):
     @property
     @abstractmethod
     def has_result(self) -> bool:
-        """Tell whether it has something that `save` keeps."""
+        """Return whether it has something that `save` keeps."""
 
     @property
     @abstractmethod
@@ -305,12 +305,12 @@ class Node:
 
     @property
     def may_be_left_out(self) -> bool:
-        """Tell whether a modifier may keep it from starting."""
+        """Return whether a modifier may keep it from starting."""
         return any(one.may_skip for one in self.modifiers.values())
 
     @property
     def is_forgiven(self) -> bool:
-        """Tell whether its failure may count as success."""
+        """Return whether its failure may count as success."""
         return any(one.forgives for one in self.modifiers.values())
 
 

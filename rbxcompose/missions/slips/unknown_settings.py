@@ -59,7 +59,7 @@ def unknown_in(step: Tree, words: Words) -> set[str]:
 
 
 def _is_stray(step: Tree, key: str, settings: Iterable[str], words: Words) -> bool:
-    """Tell whether a key beside a step is a setting that there is not, rather than a second step."""
+    """Return whether a key beside a step is a setting that there is not, rather than a second step."""
     if key in words.skills or (key in words.kinds and key not in FOREIGN):
         return False
     return key in FOREIGN or bool(nearest(key, settings)) or is_setting(step.entries[key].value)
@@ -88,7 +88,7 @@ def _finding(step: Tree, kind: str, key: str, words: Words) -> Finding:
 
 
 def is_setting(node: Node) -> bool:
-    """Tell whether a value looks like that of a setting: a number, a flag, a quantity or something with `$`."""
+    """Return whether a value looks like that of a setting: a number, a flag, a quantity or something with `$`."""
     if not isinstance(node, Scalar) or not node.plain or not node.text:
         return False
     if not isinstance(plain_value(node), str) or "$" in node.text:

@@ -39,7 +39,7 @@ class Driven(Protocol):
 
     @property
     def is_over(self) -> bool:
-        """Tell whether the process is to end."""
+        """Return whether the process is to end."""
         ...
 
 

@@ -145,7 +145,7 @@ class HandedOver:
 
     @property
     def is_stopped(self) -> bool:
-        """Tell whether the robot is held by a stop."""
+        """Return whether the robot is held by a stop."""
         return self._context.is_stopped
 
     def log(self, level: Level, text: str) -> None:

@@ -263,7 +263,7 @@ class Host:
 
     @property
     def is_at_rest(self) -> bool:
-        """Tell whether nothing moves that a component of this process moves."""
+        """Return whether nothing moves that a component of this process moves."""
         return all(one.component.is_at_rest for one in self.hosted.values() if one.component)
 
     def summary(self) -> dict[str, dict[str, str]]:

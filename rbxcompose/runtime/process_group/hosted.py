@@ -228,7 +228,7 @@ class Hosted:
 
     @property
     def is_busy(self) -> bool:
-        """Tell whether the component is in a call in its own thread, so that no other may use it."""
+        """Return whether the component is in a call in its own thread, so that no other may use it."""
         return self.worker is not None and self.worker.is_busy
 
     @property
@@ -274,7 +274,7 @@ class Hosted:
 
     @property
     def is_stopped(self) -> bool:
-        """Tell whether the robot is held by a stop."""
+        """Return whether the robot is held by a stop."""
         return self.host.is_stopped
 
     def log(self, level: Level, text: str) -> None:

@@ -38,12 +38,12 @@ class Fated:
 
     @property
     def stops(self) -> bool:
-        """Tell whether it is stopped."""
+        """Return whether it is stopped."""
         return self.fate in (Fate.RESTARTED, Fate.REMOVED)
 
     @property
     def starts(self) -> bool:
-        """Tell whether it is started."""
+        """Return whether it is started."""
         return self.fate in (Fate.RESTARTED, Fate.ADDED)
 
 
@@ -58,7 +58,7 @@ class Changes:
 
     @property
     def is_empty(self) -> bool:
-        """Tell whether the plans do the same."""
+        """Return whether the plans do the same."""
         return not self.impossible and all(one.fate is Fate.KEPT for one in self.fated)
 
     def names(self, fate: Fate) -> list[str]:

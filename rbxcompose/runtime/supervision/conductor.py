@@ -367,7 +367,7 @@ class Conductor:
 
     @property
     def is_going_down(self) -> bool:
-        """Tell whether the end has begun."""
+        """Return whether the end has begun."""
         return self._closing is not None
 
     def go_down(self, exit_code: int, reason: str, level: Level = Level.OK, detail: str = "") -> None:

@@ -32,7 +32,7 @@ class Effects(Protocol):
         ...
 
     def is_suspended(self, process: str) -> bool:
-        """Tell whether a signal keeps a process from running."""
+        """Return whether a signal keeps a process from running."""
         ...
 
     def log(self, level: Level, text: str, detail: str = "") -> None:

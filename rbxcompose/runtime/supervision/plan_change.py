@@ -106,13 +106,13 @@ class Changing:
     # What comes back
 
     def retired(self, process: str) -> None:
-        """Go on: a process has retired what it was to, or has gone."""
+        """Continue: a process has retired what it was to, or has gone."""
         if self._waited_for == process:
             self._waited_for = ""
             self.proceed()
 
     def exited(self, process: str) -> None:
-        """Go on without a process."""
+        """Continue without a process."""
         self._setting.discard(process)
         self.retired(process)
 

@@ -164,7 +164,7 @@ class Supervisor:
             signal_descriptor(child.descriptor, number)
 
     def is_suspended(self, process: str) -> bool:
-        """Tell whether a signal keeps a process from running."""
+        """Return whether a signal keeps a process from running."""
         child = self._children.get(process)
         return child is not None and child.process is not None and child.process.is_stopped
 
@@ -283,7 +283,7 @@ class Supervisor:
             self._parent.process.send_signal(signal.SIGKILL)
 
     def _lose_parent(self) -> None:
-        """Go on without the pre-fork parent: its processes are ours now, and have been asked to stop."""
+        """Continue without the pre-fork parent: its processes are ours now, and have been asked to stop."""
         if self._parent is None:
             return
         self._selector.unregister(self._parent)
