@@ -1,4 +1,4 @@
-"""What every configuration is made of: a closed pydantic model, quantities with units, names, places.
+"""The base of every configuration: a closed pydantic model, quantities with units, names, places.
 
 Inside, all is SI and ratios are 0 to 1. A field's docstring becomes its description for editors and the reference.
 """

@@ -1,4 +1,4 @@
-"""Opening files of users: regular files only, so that a pipe holds nobody up and a device does not go on for ever."""
+"""Opening files of users: regular files only, so that no pipe blocks and no device is read for ever."""
 
 from __future__ import annotations
 

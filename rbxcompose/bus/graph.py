@@ -1,4 +1,4 @@
-"""Pure core: who is on the bus and what they offer, read from liveliness tokens. ROS participants look like ours."""
+"""Pure core: which nodes are on the bus and what they offer, read from liveliness tokens. ROS nodes look like ours."""
 
 from __future__ import annotations
 

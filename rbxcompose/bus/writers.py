@@ -1,4 +1,4 @@
-"""Who publishes elsewhere, read from tokens, and why nothing comes from there. Pure: time is an argument."""
+"""Publishers in other processes, read from tokens, and why nothing arrives from them. Pure: time is an argument."""
 
 from __future__ import annotations
 

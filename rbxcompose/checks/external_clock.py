@@ -1,4 +1,4 @@
-"""Real drivers under a time that is told from outside."""
+"""Real drivers under a time from outside."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One frame whose pose two components write."""
+"""One frame whose pose is written by two components."""
 
 from __future__ import annotations
 

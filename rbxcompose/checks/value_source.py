@@ -1,4 +1,4 @@
-"""A value whose source is not there."""
+"""A value whose source does not exist."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Change a running robot to what its files say now; restart only what has changed.
 
-First the difference is shown, component by component with the reason; on a terminal it is asked for. A manifest with
-findings changes nothing. What is unsafe while the robot moves, or a mission runs, is refused with the reason.
+First it shows the difference, component by component with the reason; on a terminal it asks for confirmation. A
+manifest with errors changes nothing. What is unsafe while the robot moves or a mission runs is refused with the reason.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Report every error of a robot before a motor moves.
 
-PATH is a robot's file or folder, a folder with robots or tests below it, a test, or a mission or part: then the robots
-of its project that use it are checked. An overlay is checked on a robot: check ROBOT -f FILE. Exit codes: 0 fine, 1
+PATH is a robot's file or folder, a folder with robots or tests below it, a test, or a mission or part: it checks
+the robots of the project that use it. Check an overlay on a robot: check ROBOT -f FILE. Exit codes: 0 fine, 1
 errors found (with --strict also warnings), 2 wrong usage.
 """
 

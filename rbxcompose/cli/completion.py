@@ -1,4 +1,4 @@
-"""Print the script with which a shell completes commands, options, files, robots and topics.
+"""Print a script that makes a shell complete commands, options, files, robots and topics.
 
 For bash: `rbxcompose completion bash > ~/.local/share/bash-completion/completions/rbxcompose`. For zsh: the same as
 `_rbxcompose` in a folder of `$fpath`. For fish: `~/.config/fish/completions/rbxcompose.fish`.

@@ -1,6 +1,6 @@
 """Print the composed robot: parts, profiles and overlays put together, with the origin of each value.
 
-What it writes is a manifest itself, for the folder of the robot's file.
+The output is a manifest itself, for the folder of the robot's file.
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 

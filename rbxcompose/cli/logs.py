@@ -1,6 +1,6 @@
 """Show the log of a robot, also of its last run, or what some of its components wrote.
 
-A file that has grown large is set aside as `log.jsonl.1`, and so on; the log of the run before is `log.1.jsonl`.
+A large log file is renamed to `log.jsonl.1`, and so on; the log of the previous run is `log.1.jsonl`.
 """
 
 from __future__ import annotations

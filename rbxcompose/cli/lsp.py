@@ -1,6 +1,6 @@
 """Speak the Language Server Protocol with an editor, over stdin and stdout.
 
-It tells mistakes as you type, completes, jumps to definitions and explains. An editor starts it.
+It reports errors as you type, completes, jumps to definitions and explains. An editor starts it.
 """
 
 from __future__ import annotations

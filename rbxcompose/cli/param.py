@@ -1,7 +1,7 @@
 """List, get or set the parameters of components while the robot runs, and of ROS 2 nodes.
 
-Numbers are SI. `set` takes text with a unit as well (`param set battery runtime "30 s"`). What it changes lasts until
-the process ends; what is to stay belongs into the manifest.
+Numbers are SI. `set` takes text with a unit as well (`param set battery runtime "30 s"`). A change lasts until
+the process ends; write it in the manifest to keep it.
 """
 
 from __future__ import annotations

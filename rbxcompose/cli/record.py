@@ -1,7 +1,7 @@
 """Record the topics of a robot to an MCAP file, until Ctrl-C.
 
-Payloads are kept as they are on the bus, with the definitions of their types, so that Foxglove, Lichtblick and ROS 2
-read them. A recorder that is killed loses at most half a second: its file is recovered at the next start in its folder.
+Payloads stay as they are on the bus, with the definitions of their types, so Foxglove, Lichtblick and ROS 2 can read
+them. A recorder that is killed loses at most half a second: the next one in its folder recovers its file.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Publish a recording again on a robot's bus, or show what is in it.
 
-Messages come at the intervals in which they were recorded. Topics of the class `command` make a robot move: they are
+Messages come at the recorded intervals. Topics of the class `command` make a robot move: they are
 left out unless `--topics` names them. Topics that are being published now are refused without `--over`.
 
-With --into, nothing is published: a component of a run that `up --rate max --record` has kept is run again, with its
-recorded inputs, and what it sends is compared with the recording. It has the settings that it had, or those of
+With --into, nothing is published: it runs one component of a run that `up --rate max --record` has recorded again, with
+its recorded inputs, and compares its outputs with the recording. The settings are those of the run, or those of
 --robot PATH. Exit codes: 0 the same, 1 a difference or findings.
 """
 

@@ -1,7 +1,7 @@
 """Run the tests of missions, in virtual time.
 
 PATH is a test or a folder with tests below it; without one it is `missions/`. Exit codes: 0 all passed, 1 a test failed
-or has mistakes, 2 wrong usage.
+or has errors, 2 wrong usage.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Show the tree of frames on the bus, or where one frame is in another.
 
-A frame is where it was last told to be; a static one never grows old.
+A frame is at its last published pose; a static one never becomes outdated.
 """
 
 from __future__ import annotations

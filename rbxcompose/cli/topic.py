@@ -1,6 +1,6 @@
 """List the topics on the bus, show their messages, measure their rate, publish.
 
-It sees ROS 2 participants as well as components. It needs no robot of this machine: `--router` names any other bus.
+It sees ROS 2 nodes as well as components. It needs no robot on this machine: `--router` names another bus.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The sections of a composed robot, one by one: a mistake in one entry hides nothing of the others."""
+"""The sections of a composed robot, one by one: an error in one entry hides nothing in the others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All missions of a robot: which run, whether another one may begin beside them, what people want of them."""
+"""All missions of a robot: which run, whether another one may start beside them, what users want of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Skills that are topics: an order is a message, and another message may tell how it ended."""
+"""Skills that are topics: an order is a message, and another message may report how it ended."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What kind of value an expression gives, known without its values; and what may stand for what."""
+"""What type of value an expression gives, known without its values; and which type fits where."""
 
 from __future__ import annotations
 

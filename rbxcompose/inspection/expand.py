@@ -1,4 +1,4 @@
-"""The composed robot as one manifest, with the origin of each value behind it."""
+"""The composed robot as one manifest, with the origin of each value after it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why a port of a component stands at its topic, and who is at the other end."""
+"""Why a port of a component has its topic, and what is at the other end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why a value of the robot is what it is: who wrote it, whom it took the place of, what it means."""
+"""Why a value of the robot is what it is: where it is written, what it replaced, what it means."""
 
 from __future__ import annotations
 

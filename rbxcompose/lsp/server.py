@@ -1,4 +1,4 @@
-"""The language server: hands what an editor asks to the core, over stdin and stdout."""
+"""The language server: passes requests of an editor to the core, over stdin and stdout."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The keys of each kind of manifest that is made of sections."""
+"""The keys of each kind of manifest that consists of sections."""
 
 from __future__ import annotations
 

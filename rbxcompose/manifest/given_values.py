@@ -1,4 +1,4 @@
-"""Values that an argument was given: a mistake in one is told where it was given, not where the argument is used."""
+"""Values given to an argument: an error in one is reported where it was given, not where the argument is used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The keys that every manifest begins with."""
+"""The keys at the start of every manifest."""
 
 from __future__ import annotations
 

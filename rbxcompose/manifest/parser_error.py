@@ -1,4 +1,4 @@
-"""One error of the YAML parser with the text around it: what those who explain it look at."""
+"""One error of the YAML parser with the text around it, for those that explain it."""
 
 from __future__ import annotations
 

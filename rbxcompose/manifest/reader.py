@@ -1,4 +1,4 @@
-"""Reading a manifest: bytes -> text -> located tree, with every mistake as a finding."""
+"""Reading a manifest: bytes -> text -> located tree, with every error as a finding."""
 
 from __future__ import annotations
 

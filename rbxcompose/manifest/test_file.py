@@ -1,4 +1,4 @@
-"""The file of a test as types: the shape of what stands in it; what the names mean is told by the robot."""
+"""The file of a test as types: the shape of its contents; what the names mean depends on the robot."""
 
 from __future__ import annotations
 

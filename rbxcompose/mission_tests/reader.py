@@ -1,4 +1,4 @@
-"""From the file of a test to the test, with a finding for each mistake."""
+"""From the file of a test to the test, with a finding for each error."""
 
 from __future__ import annotations
 

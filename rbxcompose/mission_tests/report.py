@@ -1,4 +1,4 @@
-"""How tests are told: one line each, a trace of what went wrong, a summary, what no test has tried; text and JSON."""
+"""The report of tests: one line each, a trace of what went wrong, a summary, the paths not covered; text and JSON."""
 
 from __future__ import annotations
 

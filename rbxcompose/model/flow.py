@@ -1,4 +1,4 @@
-"""How messages flow through a robot: who speaks and listens on a topic, which commands reach which base, how often."""
+"""How messages flow: publishers and subscribers of a topic, which commands reach which base, how often."""
 
 from __future__ import annotations
 

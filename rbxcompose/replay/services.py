@@ -1,4 +1,4 @@
-"""The services of one component, its own and those that it asks: their keys, and the topics of their events."""
+"""The services of one component, those that it serves and calls: their keys, and the topics of their events."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What follows a fault: how it is told, and when the component that made it may try again."""
+"""What follows a fault: how it is reported, and when the component that raised it may retry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ports: what a component says and hears, declared in its class so that `check` can prove the wiring.
+"""Ports: what a component publishes and subscribes to, declared in its class so that `check` can prove the wiring.
 
 On a class, a port is its declaration; on a component, it is the live thing that the runtime has bound to it.
 """

@@ -1,4 +1,4 @@
-"""The section `body`: the file that describes what the robot is made of."""
+"""The section `body`: the file that describes the robot's body."""
 
 from __future__ import annotations
 

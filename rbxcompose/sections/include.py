@@ -1,4 +1,4 @@
-"""The section `include`: parts of which a robot is made."""
+"""The section `include`: the parts of a robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The section `muxes`: who may command."""
+"""The section `muxes`: which source may command."""
 
 from __future__ import annotations
 

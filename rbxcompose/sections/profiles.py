@@ -1,4 +1,4 @@
-"""The section `profiles`: changes to the robot that are made when asked for."""
+"""The section `profiles`: changes to the robot that are applied on request."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Golden files: what a person reads, kept as text beside the tests and compared to the letter."""
+"""Golden files: output for users, kept as text beside the tests and compared to the letter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What may stand at the end of a command line: verbs, options and choices from the parsers, the rest from `Values`."""
+"""What may come at the end of a command line: verbs, options and choices from the parsers, the rest from `Values`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`mission replay`: runs missions again from their log, and tells where they do something else than they did then."""
+"""`mission replay`: runs missions again from their log, and reports where they differ from the log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The missions of a robot as a visitor on its bus sees them: wholes that were asked for, and news since."""
+"""The missions of a robot as a visitor on its bus sees them: whole states from queries, and updates since."""
 
 from __future__ import annotations
 

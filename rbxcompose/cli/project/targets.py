@@ -1,4 +1,4 @@
-"""Which robots `check` is asked about: by file, by folder, or because they use a file."""
+"""Which robots `check` looks at: by file, by folder, or because they use a file."""
 
 from __future__ import annotations
 

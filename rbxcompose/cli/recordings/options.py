@@ -1,4 +1,4 @@
-"""What `record` and `replay` share beside the bus: options, findings, tables."""
+"""What `record` and `replay` share besides the bus: options, findings, tables."""
 
 from __future__ import annotations
 

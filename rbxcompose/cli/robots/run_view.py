@@ -1,4 +1,4 @@
-"""Running a plan and telling it as it goes: the log is followed as `logs -f` does, the rest the supervisor reports."""
+"""Running a plan and showing the run: follows the log as `logs -f` does; the supervisor reports the rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether clocks tell the same time."""
+"""Whether clocks agree."""
 
 from __future__ import annotations
 

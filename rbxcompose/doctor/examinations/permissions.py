@@ -1,4 +1,4 @@
-"""Who may open what is this user's alone."""
+"""Whether others may open what is private to this user."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who listens at the ports of routers."""
+"""What listens at the ports of routers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A colon without a space behind it: `name:one`."""
+"""A colon without a space after it: `name:one`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dashes without a space behind them: `-name: one`."""
+"""Dashes without a space after them: `-name: one`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A line that stands further left than its neighbours."""
+"""A line that is further left than its neighbours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a mission will do, as far as its text alone tells: constants, steps that cannot fail, steps that never end."""
+"""What a mission will do, as far as its text shows: constants, steps that cannot fail, steps that never end."""
 
 from __future__ import annotations
 

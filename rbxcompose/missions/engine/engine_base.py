@@ -1,4 +1,4 @@
-"""The engine as its tasks see it: time, statuses, what wakes it, who is told."""
+"""The engine as its tasks see it: time, statuses, what wakes it, who observes it."""
 
 from __future__ import annotations
 

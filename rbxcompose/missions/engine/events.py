@@ -1,4 +1,4 @@
-"""What an engine says while a mission runs: typed events, of which a shell makes the robot's story."""
+"""What an engine reports while a mission runs: typed events, from which a shell writes the log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tasks around a node that change nothing: they count messages from its start, tell its name, let others look."""
+"""Tasks around a node that change nothing: they count messages from its start, report its name, let others look."""
 
 from __future__ import annotations
 

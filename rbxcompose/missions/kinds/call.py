@@ -1,4 +1,4 @@
-"""`call`: ask a service and wait for its answer."""
+"""`call`: request a service and wait for its response."""
 
 from __future__ import annotations
 

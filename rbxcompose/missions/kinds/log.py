@@ -1,4 +1,4 @@
-"""`log`: say something in the robot's story."""
+"""`log`: write a line to the robot's log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A skill of the robot: its arguments are computed, the world is asked, and the result comes later."""
+"""A skill of the robot: computes its arguments, sends a request to the world, and gets the result later."""
 
 from __future__ import annotations
 

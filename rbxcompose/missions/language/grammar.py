@@ -1,4 +1,4 @@
-"""The places of a mission's grammar: what may stand at each, for the slips that are recognised there."""
+"""The places of a mission's grammar: what may be at each, for the slips that are recognised there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reads the values and options of one mission node; each kind asks for what belongs to it."""
+"""Reads the values and options of one mission node; each kind reads what belongs to it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the located tree of a mission file to its program; every mistake becomes a finding with its place."""
+"""From the located tree of a mission file to its program; every error becomes a finding with its place."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a modifier is declared, and in which order modifiers stand around a node."""
+"""How a modifier is declared, and in which order modifiers surround a node."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A mission that was read: a flat, frozen tuple of nodes, and what stands beside them in its file."""
+"""A mission that was read: a flat, frozen tuple of nodes, and the rest of its file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A number in words, one with a word behind it, and another word for `forever`."""
+"""A number in words, a number followed by a word, and another word for `forever`."""
 
 from __future__ import annotations
 

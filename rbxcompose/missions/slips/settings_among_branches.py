@@ -1,4 +1,4 @@
-"""Settings of a `parallel` that stand among its branches."""
+"""Settings of a `parallel` among its branches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dashes without a space behind them: `-go_to: dock`."""
+"""Dashes without a space after them: `-go_to: dock`."""
 
 from __future__ import annotations
 

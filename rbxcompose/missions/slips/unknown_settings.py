@@ -1,4 +1,4 @@
-"""Keys beside a step that are none of its settings: words of another language, and settings of other steps."""
+"""Keys beside a step that are not among its settings: words of another language, and settings of other steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What code prints, or tells Python's `logging`, becomes lines of the robot's log."""
+"""What code prints, or sends to Python's `logging`, becomes lines of the robot's log."""
 
 from __future__ import annotations
 

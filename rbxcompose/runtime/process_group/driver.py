@@ -1,4 +1,4 @@
-"""What turns the scheduler of a process: a driver for each way in which time goes, one thread each."""
+"""What runs the scheduler of a process: a driver for each kind of time, one thread each."""
 
 from __future__ import annotations
 

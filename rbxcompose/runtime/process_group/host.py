@@ -1,4 +1,4 @@
-"""The host of a process: carries its components through their lifecycle and keeps their mistakes apart."""
+"""The host of a process: carries its components through their lifecycle and isolates their faults."""
 
 from __future__ import annotations
 

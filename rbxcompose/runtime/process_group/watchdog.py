@@ -1,4 +1,4 @@
-"""A watchdog within a process: it ends the process if its loop does not turn, and tells where it hung.
+"""A watchdog within a process: it ends the process if its loop does not run, and reports where it hung.
 
 It counts its own wakings, not time: a process that was suspended, or a machine that slept, has hung nowhere.
 """

@@ -1,4 +1,4 @@
-"""What the supervisor decides, pure: which process is started, told or ended when, and how the robot ends.
+"""What the supervisor decides, pure: when each process is started, informed or ended, and how the robot ends.
 
 The shell around it (`supervisor.py`) carries out the `Effects` and tells what happened; time comes from a scheduler.
 """

@@ -1,4 +1,4 @@
-"""Who cannot do its work without whom, from the wires of a plan; and who is on the path of commands."""
+"""Which components cannot work without which, from the wires of a plan; and which are on the path of commands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A change of a running robot, carried out step by step. Pure: the conductor leads it and hears how it went.
+"""A change of a running robot, carried out step by step. Pure: the conductor leads it and learns how it went.
 
 What stops is retired in reverse start order; processes that hold nothing any more end; then the new plan holds: new
 processes are forked, new components configured and, as at the start of the robot, activated in start order.
