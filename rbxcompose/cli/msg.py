@@ -1,6 +1,6 @@
 """Show the definition of a message, service or action, or write our own as a ROS 2 package.
 
-ROS 2 knows all types that a robot uses except those of the package `rbxcompose_msgs`: `msg export ros2_ws/src` writes it.
+ROS 2 knows all types of a robot except those of the package `rbxcompose_msgs`: `msg export ros2_ws/src` writes it.
 """
 
 from __future__ import annotations

@@ -205,7 +205,7 @@ def test_an_argument_that_a_value_is_filled_in_from_shows_what_it_took_the_place
     assert shown == [
         "from           args.speed = 0.4 m/s  --set",
         "instead of 0.2 m/s  /over.yaml:4, overlay",
-        "in the place of 0.1 m/s  /robot.yaml:8, profile 'slow'",
-        "in the place of 0.3 m/s  /robot.yaml:5",
+        "instead of 0.1 m/s  /robot.yaml:8, profile 'slow'",
+        "instead of 0.3 m/s  /robot.yaml:5",
     ]
     assert answer.data()["filled_in_from"][0]["below"][0]["line"] == 5

@@ -81,7 +81,7 @@ def test_a_mistake_of_a_robot_is_told_once_for_all_of_its_tests(
     told = captured.err + captured.out
     assert told.count("a type that does not exist: 'bass'") == 1
     assert told.count("RBX4203") == 1
-    assert "has mistakes, so that 3 tests cannot run" in told
+    assert "has errors, so 3 tests cannot run" in told
     assert command(["test", str(folder), "--json"]) == 1
     tests = json.loads(capsys.readouterr().out)["tests"]
     assert [len(one["problems"]) for one in tests] == [1, 1, 1]  # each test has its own reason

@@ -1,4 +1,4 @@
-"""`call`: request a service and wait for its response."""
+"""`call`: call a service and wait for its response."""
 
 from __future__ import annotations
 
