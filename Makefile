@@ -35,7 +35,7 @@ docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the p
 	$(BIN)/python docs/draw_patrol.py
 	$(BIN)/python -m rbxcompose.schema.documents schemas
 
-messages: $(VENV)/.test  ## Write rbxcompose/msgs/ anew from the interface texts
+messages: $(VENV)/.test  ## Write rbxcompose/msgs/ from the interface texts
 	$(BIN)/python -m rbxcompose.msgs.generate
 
 lock: $(VENV)/.test  ## Choose newest versions for the lock files

@@ -1,7 +1,7 @@
 """Figures of the corpus of misconfigured robots: how much of it `check` catches, and how many false alarms it gives.
 
 Run it from the repository's root: `python -m benchmarks.misconfig`, with `--json` for a program, with `--write` to
-write `docs/misconfig.md` anew.
+write `docs/misconfig.md`.
 """
 
 from __future__ import annotations

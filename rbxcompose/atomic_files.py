@@ -12,7 +12,7 @@ TEMPORARY = ".new"  # ends the name of a file that has not taken its place yet
 
 
 def replace_file(path: Path, data: bytes, *, mode: int | None = None) -> None:
-    """Write a file anew, or for the first time. Its mode stays; a new one has `mode`, else what new files have.
+    """Write a file again, or for the first time. Its mode stays; a new one has `mode`, else what new files have.
 
     Raises:
         OSError: if it cannot be written; it is as before then.
@@ -49,5 +49,5 @@ def _mode_of(path: Path) -> int:
         os.umask(umask := os.umask(0o077))
         return 0o666 & ~umask
     if not os.access(path, os.W_OK):
-        raise PermissionError(13, "it may not be written")
+        raise PermissionError(13, "it is not writable")
     return mode

@@ -26,7 +26,7 @@ CHECKS: dict[str, Check] = {}  # every check that has been imported, by code
 def check(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False) -> Callable[[Find], Check]:
     """Declare a rule under its code.
 
-    Codes that begin with `RBX` are those of this project; somebody else's begin with a word of their own (`LAMP01`).
+    Codes that begin with `RBX` are those of this project; others start with their own word (`LAMP01`).
 
     Raises:
         ValueError: if it has no docstring, or its code is taken, malformed or not for others.
@@ -34,9 +34,9 @@ def check(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = 
 
     def declare(find: Find) -> Check:
         if not _CODE.fullmatch(code):
-            raise ValueError(f"'{code}' is no code: those are capital letters with digits behind them")
+            raise ValueError(f"'{code}' is not a code: a code is capital letters followed by digits")
         if _is_foreign(find) and code.startswith(OWN):
-            raise ValueError(f"the code {code} begins with {OWN}, as only those of this project do")
+            raise ValueError(f"the code {code} starts with {OWN}, which is reserved for this project")
         CHECKS[code] = declared(find, code, severity, is_fixable)
         return CHECKS[code]
 

@@ -1,4 +1,4 @@
-"""Robot time: the one clock that everything else is given: real, stepped, or told from outside.
+"""Robot time: the one clock that everything else uses: real, stepped, or external.
 
 Robot time counts seconds from the start of the robot, on every host process alike. Motion deadlines use it and
 nothing else; wall-clock stamps are data for people and other programs, never a deadline.

@@ -1,4 +1,4 @@
-"""What every configuration is made of: a closed pydantic model, quantities with units, names, places.
+"""The base of every configuration: a closed pydantic model, quantities with units, names, places.
 
 Inside, all is SI and ratios are 0 to 1. A field's docstring becomes its description for editors and the reference.
 """
@@ -66,7 +66,7 @@ class Place:
 
 
 class Secret:
-    """A text that nobody is shown: it is `***` wherever it is printed or dumped. `reveal()` gives it.
+    """A text that is never shown: it is `***` wherever it is printed or dumped. `reveal()` gives it.
 
     `name` is what the manifest calls it: `${secret.NAME}`.
     """
@@ -107,7 +107,7 @@ HIDDEN = "***"
 def _secret(value: object) -> Secret:
     if not isinstance(value, Secret):
         help_text = "write '${secret.NAME}', and put it into the file 'secrets/NAME'"
-        raise PydanticCustomError("secret", "a secret does not stand in a manifest", {"help": help_text})
+        raise PydanticCustomError("secret", "a secret does not belong in a manifest", {"help": help_text})
     return value
 
 

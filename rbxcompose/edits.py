@@ -23,7 +23,7 @@ class EditPlace:
     is_guard: bool = False
 
     def meets(self, other: EditPlace) -> bool:
-        """Tell whether both touch the same text, at least one of them changing it."""
+        """Return whether both touch the same text, at least one of them changing it."""
         if self.file != other.file or (self.is_guard and other.is_guard):
             return False
         return self.start == other.start or (self.start < other.end and other.start < self.end)

@@ -45,7 +45,7 @@ class Span(NamedTuple):
         return f"{self.file}:{self.line}:{self.column}"
 
     def contains(self, other: Span) -> bool:
-        """Tell whether another place lies inside this one."""
+        """Return whether another place lies inside this one."""
         starts = (self.line, self.column) <= (other.line, other.column)
         ends = (other.end_line, other.end_column) <= (self.end_line, self.end_column)
         return self.file == other.file and starts and ends
@@ -176,7 +176,7 @@ class Report:
 
     @property
     def has_errors(self) -> bool:
-        """Tell whether anything found keeps the robot from starting."""
+        """Return whether anything found keeps the robot from starting."""
         return any(finding.severity is Severity.ERROR for finding in self.findings)
 
     def __iter__(self) -> Iterator[Finding]:
@@ -263,13 +263,13 @@ def _similarity(one: str, other: str) -> float:
 
 
 def _is_swap(name: str, meant: str) -> bool:
-    """Tell whether two neighbouring characters have changed places."""
+    """Return whether two neighbouring characters have changed places."""
     swaps = (name[:at] + name[at + 1] + name[at] + name[at + 2 :] for at in range(len(name) - 1))
     return meant in swaps
 
 
 def _is_slip(name: str, meant: str) -> bool:
-    """Tell whether two names differ within words: `corner_2` for `corner_1` or `min_speed` for `max_speed` do not."""
+    """Return whether two names differ within words: `corner_2` for `corner_1` or `min_speed` for `max_speed` do not."""
     if re.findall(r"\d+", name) != re.findall(r"\d+", meant):
         return False
     words, others = re.split(r"[\W_]+", name), re.split(r"[\W_]+", meant)

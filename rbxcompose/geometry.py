@@ -31,7 +31,7 @@ class Velocity2:
 
     @property
     def is_finite(self) -> bool:
-        """Tell whether both parts are numbers that can be driven."""
+        """Return whether both parts are numbers that can be driven."""
         return math.isfinite(self.linear) and math.isfinite(self.angular)
 
 

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 
 class Level(IntEnum):
-    """How well something is; STALE means that nothing is known about it any more."""
+    """The health of something; STALE means that nothing is known about it any more."""
 
     OK = 0
     WARN = 1

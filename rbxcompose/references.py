@@ -1,4 +1,4 @@
-"""Fields that name something of the robot: which kind of name stands in them, and whether there is such a thing.
+"""Fields that name something of the robot: which kind of name they take, and whether it exists.
 
 A section of the manifest tells which names of a kind there are. A field says that it takes one by its type:
 `joint: Annotated[Name, Refers("joint")]`. Renaming of parts, completion, definitions and schemas follow from that.

@@ -1,4 +1,4 @@
-"""Opening files of users: regular files only, so that a pipe holds nobody up and a device does not go on for ever."""
+"""Opening files of users: regular files only, so that no pipe blocks and no device is read for ever."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def open_regular(path: Path, *, follow: bool = True) -> BinaryIO:
     """Open a file of a user for reading; with `follow=False` no link is followed at its end.
 
     Raises:
-        NotRegularError: if it is no regular file.
+        NotRegularError: if it is not a regular file.
         OSError: if it is not there or may not be read.
     """
     # O_NONBLOCK: a pipe without a writer would hold us up before we know what it is.
@@ -28,7 +28,7 @@ def open_regular(path: Path, *, follow: bool = True) -> BinaryIO:
     descriptor = os.open(path, flags)
     try:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise NotRegularError(0, "it is no regular file")
+            raise NotRegularError(0, "it is not a regular file")
         return open(descriptor, "rb")
     except BaseException:
         os.close(descriptor)
@@ -40,7 +40,7 @@ def read_regular(path: Path, most: int) -> bytes:
 
     Raises:
         TooLargeError: if that is more than `most` [B].
-        NotRegularError: if it is no regular file.
+        NotRegularError: if it is not a regular file.
         OSError: if it is not there or may not be read.
     """
     with open_regular(path) as file:

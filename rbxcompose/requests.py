@@ -47,7 +47,7 @@ class Request(Generic[A]):
 
 
 class Command(Request[str]):
-    """Something that is to be done; the answer is a sentence for people."""
+    """Something to do; the answer is a sentence for people."""
 
 
 class Query(Request[A]):
@@ -58,7 +58,7 @@ Requests = Family[Request[Any]]
 
 
 def requests(*types: type[Request[Any]]) -> Requests:
-    """Return the requests that somebody takes."""
+    """Return the requests that something accepts."""
     return Family(types, lambda one: one.name())
 
 

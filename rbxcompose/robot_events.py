@@ -1,4 +1,4 @@
-"""What a component tells its supervisor, since it concerns the whole robot."""
+"""What a component reports to its supervisor because it concerns the whole robot."""
 
 from __future__ import annotations
 

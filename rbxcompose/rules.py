@@ -1,4 +1,4 @@
-"""Rules: functions that find one kind of mistake, declared by a decorator; the docstring is the docs page of the code.
+"""Rules: functions that find one kind of error, declared by a decorator; the docstring is the docs page of the code.
 
 What a rule looks at depends on its family: the checks of `checks/` look at a robot, those of `missions/checks` at a
 mission.

@@ -1,4 +1,4 @@
-"""Slips: beginners' mistakes that are recognised, told with their cure, and read as what was meant.
+"""Slips: beginners' mistakes that are recognised, reported with their correction, and read as they were meant.
 
 What compilers call error productions: each is one file, beside the grammar instead of in it. A slip of a tree sees a
 node at a place of its grammar and returns a `Repair`: what there is to say, and the node to go on with. So the reader

@@ -55,10 +55,10 @@ def from_data(wanted: Any, data: Any) -> Any:
         return _members(wanted, data) if issubclass(wanted, Enum) else _fields(wanted, data)
     if issubclass(origin, Mapping):
         return {key: _at(key, arguments[1], one) for key, one in _checked(data, *_OBJECT).items()}
-    items = _checked(data, (list, tuple), "is no list")
+    items = _checked(data, (list, tuple), "is not a list")
     if origin is tuple and arguments[-1] is not Ellipsis:
         if len(items) != len(arguments):
-            raise UnreadableError(f"is no list of {len(arguments)}")
+            raise UnreadableError(f"is not a list of {len(arguments)}")
         return tuple(_at(str(index), *one) for index, one in enumerate(zip(arguments, items, strict=True)))
     made = list if origin is list else tuple
     return made(_at(str(index), arguments[0], one) for index, one in enumerate(items))
@@ -102,12 +102,12 @@ def name_in(data: object) -> str:
     return name if isinstance(name, str) else ""
 
 
-_OBJECT = (dict,), "is no object"
+_OBJECT = (dict,), "is not an object"
 _SCALARS: Mapping[Any, tuple[tuple[type, ...], str]] = {
-    str: ((str,), "is no text"),
+    str: ((str,), "is not text"),
     bool: ((bool,), "is neither true nor false"),
-    int: ((int,), "is no whole number"),
-    float: ((float, int), "is no number"),
+    int: ((int,), "is not a whole number"),
+    float: ((float, int), "is not a number"),
     NoneType: ((NoneType,), "is not null"),
 }
 
@@ -139,7 +139,7 @@ def _members(wanted: type[Enum], data: Any) -> Enum:
     try:
         return wanted(data)
     except ValueError:
-        raise UnreadableError(f"is none of {', '.join(str(one.value) for one in wanted)}") from None
+        raise UnreadableError(f"is not one of {', '.join(str(one.value) for one in wanted)}") from None
 
 
 def _fields(wanted: Any, data: Any) -> Any:

@@ -57,7 +57,7 @@ class Dimension:
         return f"{'an' if self.name[0] in 'aeiou' else 'a'} {self.name.replace('_', ' ')}"
 
     def is_comparable(self, other: Dimension) -> bool:
-        """Tell whether values of the two may be compared or added."""
+        """Return whether values of the two may be compared or added."""
         return self.exponents == other.exponents and {self, other} != {RATIO, NUMBER}
 
     def __mul__(self, other: Dimension) -> Dimension:
@@ -251,7 +251,7 @@ def parse_quantity(text: str) -> Quantity:
         raise UnitError("not a number with a unit, such as '0.3 m/s'")
     number, unit = match.groups()
     if re.match(r",\d", unit):
-        raise UnitError("a number has a decimal point, no comma", help=f"write '{text.strip().replace(',', '.', 1)}'")
+        raise UnitError("write a decimal point, not a comma", help=f"write '{text.strip().replace(',', '.', 1)}'")
     if unit and unit not in UNITS:
         raise UnitError(f"unknown unit '{_shortened(unit)}'", help=unit_help(unit))
     return quantity(number, UNITS.get(unit))
@@ -312,7 +312,7 @@ def format_quantity(value: float, dimension: Dimension, unit: str | None = None)
     """
     shown = _SHOWN_IN.get(dimension) if unit is None else UNITS.get(unit)
     if unit is not None and (shown is None or shown.dimension != dimension):
-        raise UnitError(f"'{unit}' is no unit of {dimension.phrase}")
+        raise UnitError(f"'{unit}' is not a unit of {dimension.phrase}")
     if shown is None:
         return format_number(value)
     return f"{format_number(shown.from_si(value))} {shown.name}"

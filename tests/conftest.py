@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--update-golden", action="store_true", help="write golden files anew")
+    parser.addoption("--update-golden", action="store_true", help="write golden files")
     parser.addoption("--soak", action="store_true", help="try many more random examples, and keep the figures")
 
 

@@ -82,11 +82,11 @@ class TransformTree:
         if not parent or not child:
             return "a frame needs a name"
         if not all(map(math.isfinite, (*transform.translation, *transform.rotation))):
-            return f"the transform of '{child}' has a part that is not a finite number"
+            return f"the transform of '{child}' contains a number that is not finite"
         if abs(math.hypot(*transform.rotation) - 1.0) > UNIT_TOLERANCE:
             return f"the rotation of '{child}' is not a unit quaternion"
         if child in self._ancestry(parent):
-            return f"'{child}' cannot be placed in '{parent}': that is '{child}' itself or hangs on it"
+            return f"'{child}' cannot be placed in '{parent}': that is '{child}' itself or is below it"
         if child not in self._links and len(self._links) >= MOST_FRAMES:
             return f"'{child}' is one frame more than the {MOST_FRAMES} that a tree may have"
         return ""

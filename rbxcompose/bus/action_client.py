@@ -96,7 +96,7 @@ class ActionClient(Generic[G, R, F]):
 
     @property
     def is_available(self) -> bool:
-        """Tell whether a server is known."""
+        """Return whether a server is known."""
         return self._send.is_available and self._cancel.is_available and self._result.is_available
 
     def watch(self, changed: Callable[[bool], None]) -> None:

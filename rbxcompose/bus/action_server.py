@@ -42,11 +42,11 @@ class ServedGoal(Generic[G, R, F]):
 
     @property
     def cancel_requested(self) -> bool:
-        """Tell whether the goal should end soon, by `canceled`."""
+        """Return whether the goal should end soon, by `canceled`."""
         return self._goal.state is GoalState.CANCELING
 
     def feedback(self, message: F, /) -> None:
-        """Tell the client how far it got."""
+        """Send the client feedback."""
         self._server.tell(self._goal, message)
 
     def succeeded(self, result: R | None = None, /) -> None:
@@ -126,7 +126,7 @@ class ActionServer(Generic[G, R, F]):
             self._reply_result(request, goal)
 
     def close(self) -> None:
-        """Withdraw the server; its goal ends as aborted, its clients hear that the server went away."""
+        """Withdraw the server; its goal ends as aborted, its clients hear that the server is gone."""
         if self._goals.current is not None:
             # Its client must not take this for the goal's own failure, so the result is not sent.
             self._goals.end(self._goals.current, GoalState.ABORTED, self._action.Result(), self._now)
@@ -154,7 +154,7 @@ class ActionServer(Generic[G, R, F]):
             self._will_log = self._process.scheduler.at(due, self._owner, self._log_rest)
 
     def _log_rest(self) -> None:
-        """Tell how much of a flood was not logged."""
+        """Report how much of a flood was not logged."""
         self._process.log(self._owner, f"{self._name}: {self._unlogged} more goals were refused, aborted or replaced")
         self._unlogged, self._will_log = 0, None
 
@@ -198,7 +198,7 @@ class ActionServer(Generic[G, R, F]):
 
     def _on_client_left(self, client: bytes) -> None:
         if self._goals.cancel_from(client):
-            self._log("its goal is cancelled: the client went away")
+            self._log("its goal is cancelled: the client is gone")
             self._tell_status()
 
     def _reply_result(self, request: ServedRequest[Any, Any], goal: Goal[G, R]) -> None:

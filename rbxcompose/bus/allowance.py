@@ -19,11 +19,11 @@ class Allowance:
         self._filled = -math.inf
 
     def is_quiet(self, now: float) -> bool:
-        """Tell whether nothing has come for a while."""
+        """Return whether nothing has come for a while."""
         return now - self._filled > QUIET
 
     def takes(self, now: float) -> bool:
-        """Tell whether a message that comes at `now` [s] is taken."""
+        """Return whether a message that comes at `now` [s] is taken."""
         self._left = min(self._most, self._left + max(0.0, now - self._filled) * self.rate)
         self._filled = now
         if self._left < 1.0:
@@ -44,7 +44,7 @@ class Allowances:
         self._own: dict[bytes, Allowance] = {}
 
     def takes(self, source: bytes, now: float) -> bool:
-        """Tell whether a message of a source that comes at `now` [s] is taken."""
+        """Return whether a message of a source that comes at `now` [s] is taken."""
         return (self._own.get(source) or self._of_new(source, now)).takes(now)
 
     def _of_new(self, source: bytes, now: float) -> Allowance:

@@ -1,4 +1,4 @@
-"""The attachment of every message, request and reply: who sent it, when, and as the how manieth."""
+"""The attachment of every message, request and reply: who sent it, when, and its sequence number."""
 
 from __future__ import annotations
 

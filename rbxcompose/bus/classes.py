@@ -51,7 +51,7 @@ def most_per_second(qos: Qos) -> float | None:
 
 
 def expects_speech(qos: Qos) -> bool:
-    """Tell whether a publisher that is there should be heard of before long."""
+    """Return whether a publisher that is there should be heard of before long."""
     return qos in (Qos.STATE, Qos.LATCHED)
 
 

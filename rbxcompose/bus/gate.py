@@ -1,4 +1,4 @@
-"""The gate of what is asked from other processes: so many requests a second of each asker, the rest is refused."""
+"""The gate for requests of other processes: a limited number per second for each client, the rest is refused."""
 
 from __future__ import annotations
 

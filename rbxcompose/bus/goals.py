@@ -29,7 +29,7 @@ class GoalState(IntEnum):
 
     @property
     def is_end(self) -> bool:
-        """Tell whether a goal stays in this state."""
+        """Return whether a goal stays in this state."""
         return self >= GoalState.SUCCEEDED
 
 
@@ -108,7 +108,7 @@ class Goals(Generic[G, R]):
         return True
 
     def forget(self, now: float) -> None:
-        """Drop ended goals that nobody will ask for any more."""
+        """Drop ended goals that no client will query again."""
         ended = [goal for goal in self if goal is not self.current]  # in the order of their ends
         for place, goal in enumerate(reversed(ended)):
             if place >= MOST_KEPT or goal.ended < now - KEPT_FOR:

@@ -1,4 +1,4 @@
-"""Pure core: who is on the bus and what they offer, read from liveliness tokens. ROS participants look like ours."""
+"""Pure core: which nodes are on the bus and what they offer, read from liveliness tokens. ROS nodes look like ours."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class GraphName:
 
     @property
     def is_hidden(self) -> bool:
-        """Tell whether ROS tools leave it out of lists: a word of it begins with `_`."""
+        """Return whether ROS tools leave it out of lists: a word of it begins with `_`."""
         return "/_" in self.name
 
     @property

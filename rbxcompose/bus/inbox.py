@@ -60,7 +60,7 @@ class Inbox(Generic[T]):
         return left
 
     def _take(self) -> None:
-        self._is_posted = False  # before looking: what comes from now on posts anew
+        self._is_posted = False  # before looking: what comes from now on posts again
         if not self._items:
             return
         item = self._items.popleft()

@@ -19,9 +19,7 @@ def name_problem(name: str) -> str:
     if len(name) > LONGEST_NAME:
         return f"a name has at most {LONGEST_NAME} characters, this one {len(name)}"
     if not _NAME.fullmatch(name):
-        return (
-            f"'{name}' is not a ROS name: words of letters, digits and '_', not beginning with a digit, joined by '/'"
-        )
+        return f"'{name}' is not a ROS name: words of letters, digits and '_', not starting with a digit, joined by '/'"
     return ""
 
 

@@ -43,7 +43,7 @@ class OrderPublisher(Publisher[M]):
         return frozenset(here | set(self._elsewhere.values() if self.has_match else ()))
 
     def watch(self, changed: Callable[[], None], /) -> None:
-        """Have `changed` called whenever somebody begins or ceases to listen."""
+        """Have `changed` called whenever a subscriber comes or goes."""
         self._watchers.append(changed)
 
     def look_again(self) -> None:
@@ -51,7 +51,7 @@ class OrderPublisher(Publisher[M]):
         self._inbox.put(self._tell, self._process.scheduler.post)
 
     def close(self) -> None:
-        """Withdraw the publisher, and watch nobody any more."""
+        """Withdraw the publisher, and stop watching."""
         super().close()
         self._tokens.close()
         self._inbox.close()

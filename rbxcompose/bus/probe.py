@@ -7,7 +7,7 @@ from enum import Enum, auto
 from rbxcompose.bus.names import admin_key
 
 MISSES = 3  # probes in a row without an answer that make a session stuck
-MOST_MISSES = 96  # for one that was opened anew again and again without success
+MOST_MISSES = 96  # for one that was opened again and again without success
 
 
 def probe_key(robot: str) -> str:
@@ -37,11 +37,11 @@ class Probe:
 
     @property
     def is_in_doubt(self) -> bool:
-        """Tell whether the last probe was missed, so that the next one goes to all; else whoever is near will do."""
+        """Return whether the last probe was missed, so that the next one goes to all; else whoever is near will do."""
         return self._misses > 0
 
     def judge(self, heard: ProbeResult, *, is_router_up: bool) -> bool:
-        """Take what became of a probe; return whether the session is stuck, to be opened anew.
+        """Take what became of a probe; return whether the session is stuck, to be opened again.
 
         After a renewal that did not help, twice as many misses are waited for.
         """

@@ -10,7 +10,7 @@ class RefusalReason(StrEnum):
     """Why a message is refused; the words complete the sentence `12 messages were refused: ...`."""
 
     TOO_MANY = "too many at once"
-    ATTACHMENT = "without the attachment of ROS"
+    ATTACHMENT = "no ROS attachment"
     LENGTH = "wrong length"
     CONTENT = "unreadable content"
     NOT_FINITE = "a number is not finite"

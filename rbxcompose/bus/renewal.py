@@ -16,7 +16,7 @@ from rbxcompose.bus.transport import (
 )
 from rbxcompose.qos import Qos
 
-RENEWED = "the session on the bus was opened anew"
+RENEWED = "the session on the bus was opened again"
 
 Declare = Callable[[Transport], Closable]
 E = TypeVar("E", bound="_Entry")

@@ -27,7 +27,7 @@ Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 
 LONGEST_QUEUE = 100  # requests that wait for a server
-LOST = "the server went away"
+LOST = "the server is gone"
 
 
 WhenAnswered = Callable[[Reply[R]], None]
@@ -54,7 +54,7 @@ class ServedRequest(Generic[Q, R]):
 
     @property
     def is_open(self) -> bool:
-        """Tell whether it was not answered yet."""
+        """Return whether it was not answered yet."""
         return self._answer is not None
 
     def reply(self, response: R) -> None:
@@ -62,7 +62,7 @@ class ServedRequest(Generic[Q, R]):
         self._end(Reply(response))
 
     def fail(self, error: str) -> None:
-        """Tell that there will be no answer, and why."""
+        """Report that there will be no answer, and why."""
         self._end(Reply(None, error))
 
     def _end(self, reply: Reply[R]) -> None:
@@ -221,7 +221,7 @@ class Client(Generic[Q, R]):
 
     @property
     def is_available(self) -> bool:
-        """Tell whether a server is known."""
+        """Return whether a server is known."""
         return bool(self._services.servers.at(self.route) or self._servers)
 
     def watch(self, changed: Callable[[bool], None]) -> None:

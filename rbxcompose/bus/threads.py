@@ -1,4 +1,4 @@
-"""Threads of Zenoh that call into Python stay known to it: else each call would make and destroy their state anew.
+"""Threads of Zenoh that call into Python stay known to it: else each call would create and destroy their state.
 
 That takes several times as long as the callbacks here do, and Zenoh's receiving threads live as long as the process.
 """

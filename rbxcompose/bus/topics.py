@@ -40,7 +40,7 @@ class Topics:
     subscriptions: Registry[Subscription[Any]] = field(default_factory=Registry)
 
     def published_here(self, subscription: Subscription[Any], source: Attachment) -> bool:
-        """Tell whether a message comes from a publisher of this very process."""
+        """Return whether a message comes from a publisher of this very process."""
         return any(publisher.gid == source.gid for publisher in self.publishers.at(subscription.route))
 
 
@@ -59,7 +59,7 @@ class Publisher(Generic[M]):
 
     @property
     def has_match(self) -> bool:
-        """Tell whether somebody in another process would receive it, now or (if latched) later."""
+        """Return whether anything in another process would receive it, now or (if latched) later."""
         return self._remote.has_match
 
     def __call__(self, message: M) -> None:

@@ -1,4 +1,4 @@
-"""What the bus needs from a transport between processes, and the transport that reaches nobody.
+"""What the bus needs from a transport between processes, and the transport that reaches no other process.
 
 Callbacks given to a transport are called in its own threads: they may only put things into an inbox.
 """
@@ -45,7 +45,7 @@ class Question(Arrival, Protocol):
         ...
 
     def fail(self, error: str) -> None:
-        """Tell that there will be no answer, and why."""
+        """Report that there will be no answer, and why."""
         ...
 
 
@@ -62,7 +62,7 @@ class RemotePublisher(Closable, Protocol):
 
     @property
     def has_match(self) -> bool:
-        """Tell whether anybody would receive it, now or (if latched) later."""
+        """Return whether anybody would receive it, now or (if latched) later."""
         ...
 
     def put(self, payload: bytes, attachment: bytes) -> None:
@@ -121,7 +121,7 @@ class Transport(Protocol):
 
 
 class NoTransport:
-    """The transport of a process that is alone: it reaches nobody and nobody reaches it."""
+    """The transport of a process that is alone: it reaches no other, and no other reaches it."""
 
     session = "0"
     has_match = False
@@ -156,7 +156,7 @@ class NoTransport:
         raise RuntimeError(f"no server of {key} can be reached")
 
     def announce(self, token: str) -> NoTransport:
-        """Show a token to nobody."""
+        """Show a token to no process."""
         return self
 
     def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> NoTransport:
@@ -164,7 +164,7 @@ class NoTransport:
         return self
 
     def put(self, payload: bytes, attachment: bytes) -> None:
-        """Send to nobody."""
+        """Send to no process."""
 
     def close(self) -> None:
         """Withdraw nothing."""

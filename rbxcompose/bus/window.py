@@ -38,13 +38,13 @@ class Window:
 
     @property
     def is_watched(self) -> bool:
-        """Tell whether anybody would hear news."""
+        """Return whether anybody would hear news."""
         if self._remote.has_match:
             return True
         return self._asked_at is not None and self._clock.now() - self._asked_at <= GRACE
 
     def put(self, value: object) -> None:
-        """Tell news, as data for JSON."""
+        """Send an update, as data for JSON."""
         self._sequence += 1
         self._remote.put(self._message(value), b"")
 

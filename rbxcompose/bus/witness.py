@@ -1,4 +1,4 @@
-"""What a witness of a process is told of its services: each request that is sent and each reply that is given."""
+"""What a witness of a process learns about its services: each request that is sent and each reply that is given."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who publishes elsewhere, read from tokens, and why nothing comes from there. Pure: time is an argument."""
+"""Publishers in other processes, read from tokens, and why nothing arrives from them. Pure: time is an argument."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Writers:
         if reader.arrived >= since or now - since <= SILENCE:
             return ""
         names = " and ".join(dict.fromkeys(f"'{_name(writer)}'" for writer in writers))
-        return f"'{reader.owner}' has heard nothing on {topic} for {now - since:.0f} s, though {names} publishes it"
+        return f"'{reader.owner}' has received nothing on {topic} for {now - since:.0f} s, though {names} publishes it"
 
     def _of(self, topic: str) -> list[TopicWriter]:
         known = self._by_topic.get(topic, {})

@@ -17,7 +17,7 @@ from rbxcompose.qos import Qos
 
 HEARTBEAT = 0.5  # [s] after a latched message, its sequence number is told again
 ZENOH_EXPIRED = "Timeout"  # what Zenoh answers in the place of a server
-GONE = "the server went away"
+GONE = "the server is gone"
 
 
 class ZenohTransport:

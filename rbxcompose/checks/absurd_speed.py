@@ -34,5 +34,5 @@ def absurd_speed(robot: Robot) -> Iterator[Finding]:
     """
     for one in excesses(robot):
         if one.is_absurd:
-            drops = f"drops what is above {one.times} its limit of {one.shown(one.limit)}"
+            drops = f"drops commands above {one.times} its limit of {one.shown(one.limit)}"
             yield one.finding(robot, absurd_speed, drops)

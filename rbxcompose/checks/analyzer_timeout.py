@@ -39,7 +39,7 @@ def analyzer_timeout(robot: Robot) -> Iterator[Finding]:
         if analyzer.timeout is not None and analyzer.timeout <= REPORTS:
             yield analyzer_timeout.at(
                 robot.value("diagnostics", "analyzers", name, "timeout"),
-                f"analyzer '{name}' takes its components for stale before they report again",
+                f"analyzer '{name}' considers its components stale before they report again",
                 label=f"they report every {format_quantity(REPORTS, TIME)}",
-                help="make it several seconds, or leave it out for 5 s",
+                help="make it several seconds, or omit it for 5 s",
             )

@@ -47,7 +47,7 @@ def charge_elsewhere(robot: Robot) -> Iterator[Finding]:
             if distance(here, dock) > reach + ways.driving.tolerance:
                 yield charge_elsewhere.at(
                     node.span,
-                    f"'{node.skill}' works at '{dock.name}' only, but here the robot is at '{here.name}'",
+                    f"'{node.skill}' works only at '{dock.name}', but here the robot is at '{here.name}'",
                     help=f"drive to the dock first: '{ways.driving.skill}: {dock.name}'",
                     related=[Related(setting_span(robot, (charger, charges.place.field)), "the dock of the charger")],
                 )

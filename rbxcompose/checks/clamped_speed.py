@@ -51,7 +51,7 @@ class Excess:
 
     @property
     def is_absurd(self) -> bool:
-        """Tell whether the base drops such commands instead of cutting them."""
+        """Return whether the base drops such commands instead of cutting them."""
         factor = self.drive.drives.drops_above
         return factor is not None and self.wanted.value > factor.value * self.limit.value
 
@@ -81,7 +81,7 @@ class Excess:
         span, limit = setting_span(robot, (driver, self.wanted.field), there), setting_span(robot, there)
         return kind.at(
             span,
-            f"'{driver.name}' drives with {self.shown(self.wanted)}, but its base '{base.name}' {what}",
+            f"'{driver.name}' drives at {self.shown(self.wanted)}, but its base '{base.name}' {what}",
             help=self.remedy,
             related=[Related(limit, f"'{name}' of the base" if name else "the base")] if limit != span else [],
         )

@@ -68,7 +68,7 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
                     span,
                     f"{format_quantity(call.level, RATIO)} last for {format_quantity(round(lasts, 1), TIME)}, but the "
                     f"way from '{far.name}' to '{dock.name}' takes {format_quantity(round(needs, 1), TIME)}",
-                    help="break off earlier",
+                    help="interrupt earlier",
                     related=[
                         *related,
                         Related(setting_span(robot, (call.battery, runtime.field)), "how long a full battery lasts"),

@@ -1,4 +1,4 @@
-"""Real drivers under a time that is told from outside."""
+"""Real drivers under a time from outside."""
 
 from __future__ import annotations
 
@@ -32,5 +32,5 @@ def external_clock(robot: Robot) -> Iterator[Finding]:
     yield external_clock.at(
         robot.value("bus", "clock"),
         "the real robot cannot follow the time of a simulator",
-        help="run it without '--real', or leave 'clock' out",
+        help="run it without '--real', or remove 'clock'",
     )

@@ -53,6 +53,6 @@ def idle_lock(robot: Robot) -> Iterator[Finding]:
                 yield idle_lock.at(
                     robot.value("muxes", mux, "locks", name, "priority"),
                     f"lock '{name}' of mux '{mux}' holds back no input: none has a priority below {lock.priority}",
-                    help="give it a larger priority than the inputs that it should hold back",
+                    help="give it a higher priority than the inputs that it should hold back",
                     related=[Related(robot.value("muxes", mux, "inputs", lowest, "priority"), "the lowest input")],
                 )

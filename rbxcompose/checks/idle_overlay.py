@@ -42,8 +42,8 @@ def idle_overlay(robot: Robot) -> Iterator[Finding]:
                 if (old, was_plain) == (new, is_plain):
                     yield idle_overlay.at(
                         after.span,
-                        f"{after.layer} sets '{path}' to what it is already",
-                        help="take it out, or write another value",
+                        f"{after.layer} sets '{path}' to the value that it already has",
+                        help="remove it, or write another value",
                         related=[Related(before.span, f"the same in {before.layer}")],
                     )
 

@@ -1,4 +1,4 @@
-"""Two instances of one part that speak on one topic."""
+"""Two instances of one part that publish on one topic."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def matched_twice(robot: Robot) -> Iterator[Finding]:
                 yield matched_twice.at(
                     robot.value("diagnostics", "analyzers", name, "match", index),
                     f"'{pattern}' is matched twice, by analyzer '{other[0]}' and by analyzer '{name}'",
-                    help="leave one of them out",
+                    help="remove one of them",
                     related=[
                         Related(robot.value("diagnostics", "analyzers", other[0], "match", other[1]), "the first")
                     ],

@@ -51,6 +51,6 @@ def mux_priority(robot: Robot) -> Iterator[Finding]:
                     robot.value("muxes", mux, "inputs", name, "priority"),
                     f"two inputs of mux '{mux}' have the same priority {source.priority}",
                     label=f"input '{name}'",
-                    help="the larger priority wins: give each input its own",
+                    help="the higher priority wins: give each input its own",
                     related=[Related(robot.value("muxes", mux, "inputs", other, "priority"), f"input '{other}'")],
                 )

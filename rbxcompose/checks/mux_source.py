@@ -1,4 +1,4 @@
-"""A mux whose source is not there."""
+"""A mux whose source does not exist."""
 
 from __future__ import annotations
 

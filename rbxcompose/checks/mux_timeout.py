@@ -45,7 +45,7 @@ def mux_timeout(robot: Robot) -> Iterator[Finding]:
             component = robot.components.get((source.source or "").partition(".")[0])
             period = period_of(component) if component else None
             if component and period is not None and source.timeout < 2 * period - 1e-9:
-                when = "before" if source.timeout <= period else "when one message is late before"
+                when = "before" if source.timeout <= period else "if one message is late, before"
                 yield mux_timeout.at(
                     robot.value("muxes", mux, "inputs", name, "timeout"),
                     f"input '{name}' of mux '{mux}' times out {when} '{component.name}' sends its next message",

@@ -1,4 +1,4 @@
-"""What a component needs and nobody gives."""
+"""What a component needs and nothing provides."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SERVED_BY = {Calls: Serves, CallsAction: ServesAction, In: Out}
 
 @check("RBX3010", Severity.WARNING)
 def needed_port(robot: Robot) -> Iterator[Finding]:
-    """A component needs what nobody in the robot gives
+    """A component needs what nothing in the robot provides
 
     An input without a publisher stays silent, and a service without a server never responds. Often the component that
     should provide it is on another topic, or is missing.
@@ -57,7 +57,7 @@ def needed_port(robot: Robot) -> Iterator[Finding]:
 
 
 def is_unheard(robot: Robot, end: PortEnd) -> bool:
-    """Tell whether commands leave at this end and nobody hears them."""
+    """Return whether commands leave at this end and nothing receives them."""
     return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND and end.topic not in robot.readers
 
 
@@ -71,8 +71,8 @@ def _finding(robot: Robot, component: RobotComponent, ends: list[PortEnd]) -> Fi
     fix = ", ".join(f"{end.name}: {other.topic.strip('/')}" for end, other in near)
     return needed_port.at(
         robot.end_span(ends[0]),
-        f"'{component.name}' needs {names}, which nobody in the robot gives",
-        help=f"connect it: 'connect: {{{fix}}}'" if fix else "add the component that gives it",
+        f"'{component.name}' needs {names}, which nothing in the robot provides",
+        help=f"connect it: 'connect: {{{fix}}}'" if fix else "add the component that provides it",
         related=[Related(robot.end_span(other), f"'{other.topic}' is of this type") for _, other in near],
     )
 

@@ -1,4 +1,4 @@
-"""One frame whose pose two components write."""
+"""One frame whose pose is written by two components."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
             yield one_frame_two_writers.at(
                 one.span(robot),
                 f"'{name}' and '{other.component.name}' both write the pose of the frame '{one.frame.child.value}'",
-                help=f"leave one of them out, or take another topic: 'connect: {{{one.end.name}: {name}/tf}}'",
+                help=f"remove one of them, or use another topic: 'connect: {{{one.end.name}: {name}/tf}}'",
                 related=[Related(other.span(robot), "the other one")] if other.component.name in robot.written else [],
             )
 

@@ -31,5 +31,5 @@ def only_simulated(robot: Robot) -> Iterator[Finding]:
             yield only_simulated.at(
                 robot.value(*component.path, "type"),
                 f"'{component.name}' exists only in simulation: '{component.type_name}'",
-                help="run it without '--real', or take a type that drives the real thing",
+                help="run it without '--real', or use a type for the real device",
             )

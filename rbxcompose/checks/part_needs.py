@@ -18,7 +18,7 @@ WIRES: tuple[tuple[type[Port[Any]], type[Port[Any]]], ...] = ((Out, In), (Calls,
 
 @check("RBX3021")
 def part_needs(robot: Robot) -> Iterator[Finding]:
-    """A part needs a topic that nobody else has
+    """A part needs a topic that nothing else has
 
     `needs:` of a part lists topics with their types. Something outside the part must subscribe to what the part
     publishes, publish what it subscribes to, or serve what it calls.
@@ -51,8 +51,8 @@ def part_needs(robot: Robot) -> Iterator[Finding]:
             have = f"; '{wrong.instance}' has it as {short(wrong.type_name)}" if wrong else ""
             yield part_needs.at(
                 part.span,
-                f"part '{part.name}' needs '{need.name}' ({short(need.type)}) outside of it, and nobody has it{have}",
-                help=f"include a part with '{need.name}', or give it the topic that is meant: 'connect:'",
+                f"part '{part.name}' needs '{need.name}' ({short(need.type)}) from outside, and nothing has it{have}",
+                help=f"include a part with '{need.name}', or connect it to the right topic with 'connect:'",
                 related=[Related(need.span, "needed here")],
             )
 
@@ -63,7 +63,7 @@ def own_instances(part: IncludedPart) -> frozenset[str]:
 
 
 def is_type(end: PortEnd, written: str) -> bool:
-    """Tell whether an end has the type that a part writes: `geometry_msgs/Twist`."""
+    """Return whether an end has the type that a part writes: `geometry_msgs/Twist`."""
     return short(end.type_name) == short(written)
 
 

@@ -42,8 +42,8 @@ def past_the_mux(robot: Robot) -> Iterator[Finding]:
                 mux, own = robot.components[inputs[0].instance], inputs[0]
                 yield past_the_mux.at(
                     robot.end_span(end),
-                    f"'{end.instance}' listens to '{topic}', past the mux '{mux.name}'",
-                    help=f"listen to the mux's output: '{end.name}: {_output(robot, own)}'",
+                    f"'{end.instance}' subscribes to '{topic}', bypassing the mux '{mux.name}'",
+                    help=f"subscribe to the mux's output: '{end.name}: {_output(robot, own)}'",
                     related=[Related(robot.key(*mux.path, "inputs", own.name), "this is an input of the mux")],
                 )
 

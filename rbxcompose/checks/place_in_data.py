@@ -53,7 +53,7 @@ def place_in_data(robot: Robot) -> Iterator[Finding]:
                 if text not in places and datum in program.data:
                     yield place_in_data.at(
                         _place_of(program, datum, text),
-                        f"there is no place '{text}', to which '{node.skill}' is sent with '${name}'",
+                        f"there is no place '{text}', which '{node.skill}' gets from '${name}'",
                         help=suggest(text, places, "places of this robot"),
                         related=[Related(node.span, "used here")],
                     )

@@ -35,6 +35,6 @@ def same_place(robot: Robot) -> Iterator[Finding]:
             yield same_place.at(
                 robot.key("places", name),
                 f"the places '{other}' and '{name}' are at the same spot",
-                help="change one of them, or leave it out",
+                help="change or remove one of them",
                 related=[Related(robot.key("places", other), "the other one")],
             )

@@ -45,7 +45,7 @@ def shortened_list(robot: Robot) -> Iterator[Finding]:
             yield shortened_list.at(
                 after.span,
                 f"{after.layer} replaces the list '{path}' and drops {', '.join(map(repr, words))}",
-                help="write the whole list, or '!replace' before it if this is meant",
+                help="write the whole list, or '!replace' before it if you mean it",
                 related=[Related(before.span, f"the list in {before.layer}")],
             )
 

@@ -12,7 +12,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3006", is_fixable=True)
 def start_order(robot: Robot) -> Iterator[Finding]:
-    """`starts_after:` names no component, or goes round in a circle
+    """`starts_after:` names no component, or forms a circle
 
     Each name must be a component of the robot, and the names must not form a circle.
 
@@ -45,6 +45,6 @@ def start_order(robot: Robot) -> Iterator[Finding]:
     if cycle := cycle_of(after):
         yield start_order.at(
             robot.value(*robot.components[cycle[0]].path, "starts_after"),
-            f"the start order goes round in a circle: {' after '.join([*cycle, cycle[0]])}",
-            help="leave one of them out",
+            f"the start order forms a circle: {' after '.join([*cycle, cycle[0]])}",
+            help="remove one of them",
         )

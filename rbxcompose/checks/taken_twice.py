@@ -49,7 +49,7 @@ def taken_twice(robot: Robot) -> Iterator[Finding]:
             if other != (mux, name):
                 yield taken_twice.at(
                     robot.value("muxes", mux, "inputs", name, "from"),
-                    f"input '{name}' of mux '{mux}' takes what another input takes already: '{one.source}'",
-                    help="leave one of the two out",
+                    f"input '{name}' of mux '{mux}' takes the same as another input: '{one.source}'",
+                    help="remove one of the two",
                     related=[Related(robot.value("muxes", other[0], "inputs", other[1], "from"), "taken here")],
                 )

@@ -45,7 +45,7 @@ def threshold_order(robot: Robot) -> Iterator[Finding]:
             yield threshold_order.at(
                 setting_span(robot, here, there),
                 f"'{component.name}' can never warn: "
-                f"it is in error below {format_quantity(error.value, RATIO)} already, "
+                f"it is already in error below {format_quantity(error.value, RATIO)}, "
                 f"and warns below {format_quantity(warn.value, RATIO)}",
                 help=f"'{warn.field or 'warn'}' must be above '{error.field or 'error'}'",
                 related=[Related(setting_span(robot, there, here), "in error below this")],

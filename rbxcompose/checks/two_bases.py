@@ -42,11 +42,11 @@ def two_bases(robot: Robot) -> Iterator[Finding]:
                 robot.entry_span(other),
                 f"'{other}' and '{bases[0]}' are both bases that follow '{topic}'",
                 label="this one",
-                help="a robot has one base: leave one of them out",
+                help="a robot has one base: remove one of them",
                 related=[Related(robot.entry_span(bases[0]), "and this one")],
             )
 
 
 def _moves(robot: Robot, end: PortEnd) -> bool:
-    """Tell whether the robot moves by what comes in at this end."""
+    """Return whether the robot moves by what comes in at this end."""
     return any(end.name == one.commands for one in robot.components[end.instance].declared(Drives))

@@ -57,5 +57,5 @@ def two_servers(robot: Robot) -> Iterator[Finding]:
 
 
 def _answers(end: PortEnd) -> bool:
-    """Tell whether who asks there waits for an answer; an order of which nobody tells the end may go to several."""
+    """Return whether a client there waits for an answer; an order whose end is not reported may go to several."""
     return isinstance(end.port, Serves | ServesAction) or (isinstance(end.port, ServesTopic) and bool(end.port.ends))

@@ -16,7 +16,7 @@ from rbxcompose.sdk.ports import Out
 
 
 def is_command(end: PortEnd) -> bool:
-    """Tell whether commands leave at this end."""
+    """Return whether commands leave at this end."""
     return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND
 
 

@@ -1,4 +1,4 @@
-"""Commands that nobody hears."""
+"""Commands without a subscriber."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3011", Severity.WARNING)
 def unheard_command(robot: Robot) -> Iterator[Finding]:
-    """Commands go to a topic that nobody listens to
+    """Commands go to a topic without a subscriber
 
     The publisher believes that it drives the robot, but nothing moves. A mux is named after the topic that it
     publishes; a base subscribes to `cmd_vel`.
@@ -39,7 +39,7 @@ def unheard_command(robot: Robot) -> Iterator[Finding]:
             topics = [one.topic.strip("/") for one in starving]
             yield unheard_command.at(
                 robot.end_span(end),
-                f"nobody listens to the commands of '{end.instance}' on '{end.topic}'",
+                f"nothing subscribes to the commands of '{end.instance}' on '{end.topic}'",
                 help=suggest(end.topic.strip("/"), topics, "topics that wait for such commands"),
                 related=[Related(robot.end_span(one), f"listens to '{one.topic}'") for one in starving],
             )

@@ -46,7 +46,7 @@ def unread_name(robot: Robot) -> Iterator[Finding]:
             kept = node.saved
             if kept and kept.text not in read:
                 message = f"the mission '{program.name}' never reads what it keeps as '{kept.text}'"
-                help_text = f"take 'save' out, or write '${kept.text}' where it belongs"
+                help_text = f"remove 'save', or write '${kept.text}' where it belongs"
                 yield unread_name.at(kept.span, message, help=help_text)
         for what, names in (("input", program.inputs), ("datum", program.data)):
             for name in names:
@@ -54,5 +54,5 @@ def unread_name(robot: Robot) -> Iterator[Finding]:
                     yield unread_name.at(
                         names[name].span,
                         f"the mission '{program.name}' never reads its {what} '{name}'",
-                        help=f"take it out, or write '${name}' where it belongs",
+                        help=f"remove it, or write '${name}' where it belongs",
                     )

@@ -35,5 +35,5 @@ def unread_value(robot: Robot) -> Iterator[Finding]:
             yield unread_value.at(
                 robot.key("values", name),
                 f"no mission reads the value '{name}'",
-                help=f"take it out, or read it in a mission as '${name}'",
+                help=f"remove it, or read it in a mission as '${name}'",
             )

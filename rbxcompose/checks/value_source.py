@@ -1,4 +1,4 @@
-"""A value whose source is not there."""
+"""A value whose source does not exist."""
 
 from __future__ import annotations
 
@@ -55,6 +55,6 @@ def _missing(robot: Robot, name: str, source: str) -> Wrong | None:
         message = f"comes from an output that '{component}' does not have: '{port}'"
         return Wrong(message, suggest(port, outputs, "its outputs"), port, outputs)
     if name not in robot.values:
-        message = "is a whole message, of which a mission cannot read anything"
+        message = "is a whole message; a mission can read only single values"
         return Wrong(message, "write a map with 'topic', 'field', 'type'")
     return None

@@ -37,9 +37,7 @@ def world_group(robot: Robot) -> Iterator[Finding]:
         if component.process == component.cls.process or WORLD not in (component.process, component.cls.process):
             continue
         if component.cls.process == WORLD:
-            message = (
-                f"'{component.name}' is simulated and belongs into the group 'world', not into '{component.process}'"
-            )
+            message = f"'{component.name}' is simulated and belongs in the group 'world', not in '{component.process}'"
         else:
-            message = f"'{component.name}' is no part of the simulated world, but runs in its group"
-        yield world_group.at(robot.value(*component.path, "process"), message, help="leave 'process' out")
+            message = f"'{component.name}' is not component of the simulated world, but runs in its group"
+        yield world_group.at(robot.value(*component.path, "process"), message, help="remove 'process'")

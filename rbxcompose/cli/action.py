@@ -1,7 +1,7 @@
 """List the actions on the bus, or send a goal to one.
 
-Sending prints the feedback as it comes, then the result. An interrupt cancels the goal and waits for its end; a second
-one waits for nothing.
+`send` prints feedback as it arrives, then the result. An interrupt cancels the goal and waits for its end; a second one
+does not wait.
 """
 
 from __future__ import annotations

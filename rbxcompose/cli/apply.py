@@ -1,7 +1,7 @@
-"""Change a running robot to what its files say now: only what has changed restarts.
+"""Change a running robot to what its files say now; restart only what has changed.
 
-First the difference is shown, component by component with the reason; on a terminal it is asked for. A manifest with
-findings changes nothing. What is unsafe while the robot moves, or a mission runs, is refused with the reason.
+First it shows the difference, component by component with the reason; on a terminal it asks for confirmation. A
+manifest with errors changes nothing. What is unsafe while the robot moves or a mission runs is refused with the reason.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
     add_layer_options(parser)
     parser.add_argument("-y", "--yes", action="store_true", help="do not ask")
-    parser.add_argument("--dry-run", action="store_true", help="show the difference and what speaks against it")
+    parser.add_argument("--dry-run", action="store_true", help="show the difference and what prevents it")
     parser.add_argument("--json", action="store_true", help="write the difference as JSON")
 
 
@@ -47,7 +47,7 @@ def _carry_out(proposal: Proposal, arguments: argparse.Namespace) -> int:
         return 0
     if not arguments.yes:
         if arguments.json or not sys.stdin.isatty():
-            return misused("apply", "nobody can be asked here: give --yes, or --dry-run to look only")
+            return misused("apply", "there is no terminal to ask: give --yes, or --dry-run to only look")
         if not _is_wanted(name):
             tell("nothing was changed")
             return 0

@@ -1,7 +1,7 @@
-"""Tell every mistake of a robot before a motor moves.
+"""Report every error of a robot before a motor moves.
 
-PATH is a robot's file or folder, a folder with robots or tests below it, a test, or a mission or part: then the robots
-of its project that use it are checked. An overlay is checked on a robot: check ROBOT -f FILE. Exit codes: 0 fine, 1
+PATH is a robot's file or folder, a folder with robots or tests below it, a test, or a mission or part: it checks
+the robots of the project that use it. Check an overlay on a robot: check ROBOT -f FILE. Exit codes: 0 fine, 1
 errors found (with --strict also warnings), 2 wrong usage.
 """
 
@@ -30,9 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("paths", nargs="*", default=["."], metavar="PATH", help="what to check; else the robots here")
     add_layer_options(parser)
-    parser.add_argument("--format", choices=format_names(), default=TEXT, help="how findings are written")
-    parser.add_argument("--strict", action="store_true", help="let warnings count as errors")
-    parser.add_argument("--fix", action="store_true", help="write what can safely be fixed into the files")
+    parser.add_argument("--format", choices=format_names(), default=TEXT, help="output format")
+    parser.add_argument("--strict", action="store_true", help="count warnings as errors")
+    parser.add_argument("--fix", action="store_true", help="fix what is certain, in the files")
 
 
 @dataclass(slots=True)

@@ -1,4 +1,4 @@
-"""Print the script with which a shell completes commands, options, files, robots and topics.
+"""Print a script that makes a shell complete commands, options, files, robots and topics.
 
 For bash: `rbxcompose completion bash > ~/.local/share/bash-completion/completions/rbxcompose`. For zsh: the same as
 `_rbxcompose` in a folder of `$fpath`. For fish: `~/.config/fish/completions/rbxcompose.fish`.
@@ -10,7 +10,7 @@ import argparse
 
 from rbxcompose.cli.output.console import tell
 
-# A script asks for what fits each time, so that it need not be written anew with each version.
+# A script asks for what fits each time, so that it need not change with each version.
 
 _BASH = r"""_rbxcompose() {
     local one
@@ -48,7 +48,7 @@ SCRIPTS = {"bash": _BASH, "zsh": _ZSH, "fish": _FISH}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("shell", choices=list(SCRIPTS), help="the shell that is to read it")
+    parser.add_argument("shell", choices=list(SCRIPTS), help="the shell that will read it")
 
 
 def run(arguments: argparse.Namespace) -> int:

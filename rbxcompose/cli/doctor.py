@@ -1,6 +1,6 @@
 """Examine this machine and the robots that run on it: what is wrong, and what to do about it.
 
-A robot that is named, by its file or its name, is looked at alone; its devices and secrets are, too. Exit codes: 0 no
+With a robot, by file or name, it examines only that robot, including its devices and secrets. Exit codes: 0 no
 error, 1 errors found, 2 wrong usage.
 """
 
@@ -96,7 +96,7 @@ def _running(folder: RobotFolder) -> RunningRobot:
     except BrokenStateError as error:
         return RunningRobot(folder, None, str(error))
     if state is None:
-        return RunningRobot(folder, None, "it has gone")
+        return RunningRobot(folder, None, "it is gone")
     robot = compile_robot(state.file, environment=os.environ).robot if os.path.exists(state.file) else None
     return RunningRobot(folder, state, "", robot, _bus(folder))
 

@@ -1,4 +1,4 @@
-"""Bring a robot to rest and end all of its processes, also what a dead supervisor has left."""
+"""Stop a robot and end all of its processes, also those that a dead supervisor has left."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Drive with the keyboard: arrows or w, a, s, d; space stops, q quits.
 
 It is the input `teleop` of the mux for `cmd_vel`. The robot moves only while a key is pressed: 0.3 s after the last one
-it is told to stand still, and then nothing more, so that the mux lets others through.
+it is told to stop, and then nothing more, so that the mux lets others through.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ NO_TERMINAL = kind(
     "RBX9027",
     """Driving needs a keyboard
 
-`rbxcompose drive` reads keys from a terminal. Where there is none, `rbxcompose topic pub` sends velocities.
+`rbxcompose drive` reads keys from a terminal. Without one, use `rbxcompose topic pub` to send velocities.
 
 Bad: `rbxcompose drive < keys.txt`
 Good: `rbxcompose drive`
@@ -66,7 +66,7 @@ def _drive(guest: Guest, arguments: argparse.Namespace) -> int:
     name = _input(guest.graph().topics, arguments.topic)
     publisher = guest.bus().publisher(NAME, name, Twist, Qos.COMMAND)
     if not guest.run(lambda: publisher.has_match, arguments.timeout):
-        return refuse(NOBODY.at(None, f"nobody takes velocities on '{name}'"))
+        return refuse(NOBODY.at(None, f"nothing takes velocities on '{name}'"))
     wheel = _Wheel(guest, publisher, DeadMan(arguments.speed, arguments.turn))
     with guest.interruptible(), raw(sys.stdin.fileno()):
         wheel.read_early()
@@ -88,7 +88,7 @@ def _input(topics: Iterable[GraphName], wanted: str | None) -> str:
     if len(fitting) == 1 and fitting[0] in taking:
         return fitting[0]
     words = (
-        f"several topics end in '{_INPUT}'" if len(fitting) > 1 else f"nobody takes velocities on '{wanted or _INPUT}'"
+        f"several topics end in '{_INPUT}'" if len(fitting) > 1 else f"nothing takes velocities on '{wanted or _INPUT}'"
     )
     raise NotDoneError(NO_NAME.misspelt(None, words, wanted or _INPUT, taking, "topics that take velocities"))
 

@@ -1,6 +1,6 @@
-"""Write the composed robot, parts, profiles and overlays put together, with the origin of each value.
+"""Print the composed robot: parts, profiles and overlays put together, with the origin of each value.
 
-What it writes is a manifest itself, for the folder of the robot's file.
+The output is a manifest itself, for the folder of the robot's file.
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
     add_layer_options(parser)
-    parser.add_argument("--no-origins", action="store_true", help="leave out where each value comes from")
+    parser.add_argument("--no-origins", action="store_true", help="omit where each value comes from")
     parser.add_argument("--json", action="store_true", help="write values and origins as JSON")
 
 

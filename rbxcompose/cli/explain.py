@@ -1,4 +1,4 @@
-"""Tell what the code of a finding means and how it is right; without a code, list all.
+"""Explain the code of a finding and how to correct it; without a code, list all.
 
 Exit codes: 0 fine, 2 there is no such code.
 """
@@ -17,8 +17,8 @@ _PREFIX = "RBX"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("code", nargs="?", metavar="CODE", help="such as RBX1001; without it all codes are listed")
-    parser.add_argument("--json", action="store_true", help="write what is known as JSON")
+    parser.add_argument("code", nargs="?", metavar="CODE", help="such as RBX1001; without it, list all codes")
+    parser.add_argument("--json", action="store_true", help="answer in JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:

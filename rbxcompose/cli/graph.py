@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
     add_layer_options(parser)
-    parser.add_argument("--format", choices=list(FORMATS), default="mermaid", help="how it is written")
+    parser.add_argument("--format", choices=list(FORMATS), default="mermaid", help="output format")
     parser.add_argument("--out", metavar="FILE", help="write it to this file")
 
 

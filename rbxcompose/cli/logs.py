@@ -1,6 +1,6 @@
 """Show the log of a robot, also of its last run, or what some of its components wrote.
 
-A file that has grown large is set aside as `log.jsonl.1`, and so on; the log of the run before is `log.1.jsonl`.
+A large log file is renamed to `log.jsonl.1`, and so on; the log of the previous run is `log.1.jsonl`.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ _PAUSE = 0.05  # [s] between looks for more
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
-        "names", nargs="*", metavar="ROBOT|PATH|COMPONENT", help="the robot, by name or file, then who is to be shown"
+        "names", nargs="*", metavar="ROBOT|PATH|COMPONENT", help="the robot, by name or file, then components to show"
     )
     add_robot_option(parser)
-    parser.add_argument("--level", choices=LOG_LEVELS, default="info", help="the least level that is shown")
-    parser.add_argument("-f", "--follow", action="store_true", help="go on with what comes, until interrupted")
-    parser.add_argument("-n", "--lines", type=int, metavar="N", help="begin with the last N records")
+    parser.add_argument("--level", choices=LOG_LEVELS, default="info", help="the lowest level to show")
+    parser.add_argument("-f", "--follow", action="store_true", help="follow new records, until interrupted")
+    parser.add_argument("-n", "--lines", type=int, metavar="N", help="start with the last N records")
     parser.add_argument("--json", action="store_true", help="one JSON object per record, as the log file has them")
 
 
@@ -90,7 +90,7 @@ def _know(names: Sequence[str], folder: RobotFolder, sources: Iterable[str]) -> 
     known = {*sources, *(one.name for one in state.components)} if state is not None else set(sources)
     for name in names:
         if name not in known:
-            text = f"'{name}' is no robot that is up, and no component in the log of '{folder.path.name}'"
+            text = f"'{name}' is neither a robot that is up nor a component in the log of '{folder.path.name}'"
             raise NotDoneError(NOT_UP.at(None, text, help=suggest(name, sorted(known), "components")))
 
 

@@ -1,6 +1,6 @@
 """Speak the Language Server Protocol with an editor, over stdin and stdout.
 
-It tells mistakes as you type, completes, jumps to definitions and explains. An editor starts it.
+It reports errors as you type, completes, jumps to definitions and explains. An editor starts it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ NOT_INSTALLED = kind(
     "RBX9010",
     """The language server is not installed
 
-`rbxcompose lsp` needs a package that robots do not need, so that it is an extra of its own:
+`rbxcompose lsp` needs a package that robots do not need; it is an extra:
 `pip install 'rbxcompose[lsp]'`.
 """,
 )
@@ -24,7 +24,7 @@ NOT_INSTALLED = kind(
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("--stdio", action="store_true", help="what it does anyway; many editors say it")
+    parser.add_argument("--stdio", action="store_true", help="the default; many editors pass it")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -1,7 +1,7 @@
 """The command `rbxcompose`: finds the verb's file and hands over. One file in this folder is one verb.
 
 A verb's module has `add_arguments(parser)` and `run(arguments) -> exit code`; the first line of its docstring is its
-help. Only the verb that is asked for is imported, and nothing that help can do without.
+help. Only the verb in use is imported, and nothing that help does not need.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def _run(name: str, words: Sequence[str]) -> int:
 def _help() -> str:
     width = max(len(name) for name in verbs())
     lines = [f"  {name:<{width}}  {_about(name)}" for name in verbs()]
-    usage = "usage: rbxcompose COMMAND ...  (COMMAND --help tells more)"
+    usage = "usage: rbxcompose COMMAND ...  (COMMAND --help says more)"
     return "\n".join([usage, "", _ABOUT, "", *lines]) + "\n"
 
 

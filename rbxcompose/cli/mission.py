@@ -45,31 +45,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         made.set_defaults(do=do)
         return made
 
-    add_asking_options(add("ls", "list the robot's missions, and how they stand", _list))
-    begin = _named(add("run", "begin a mission beside those that run", _run), needed=True)
+    add_asking_options(add("ls", "list the robot's missions with their states", _list))
+    begin = _named(add("run", "start a mission beside those that run", _run), needed=True)
     begin.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
-    begin.add_argument("--from", dest="start", default="", metavar="STATE", help="begin in this state: 'outer.inner'")
+    begin.add_argument("--from", dest="start", default="", metavar="STATE", help="start in this state: 'outer.inner'")
     _named(add("cancel", "end a mission for good", _to(CancelMission)))
     _named(add("pause", "hold a mission; its timers stand still", _to(PauseMission)))
-    _named(add("resume", "go on where a mission was held", _to(ResumeMission)))
-    _named(add("status", "tell where a mission is, with its data", _status))
+    _named(add("resume", "resume a mission where it was held", _to(ResumeMission)))
+    _named(add("status", "show where a mission is, with its data", _status))
     _named(add("watch", "show a mission live", _watch))
-    log = _named(add("log", "tell what missions did, as JSON, one line each", _log))
-    log.add_argument("-f", "--follow", action="store_true", help="go on with what is to come")
-    log.add_argument("--all", action="store_true", help="also what came in, from which it can be run again")
-    again = add("replay", "run missions again from their log, and tell the first difference", _replay)
-    again.add_argument("log", metavar="FILE", help="what 'mission log --all' told")
+    log = _named(add("log", "print what missions did, as JSON, one line each", _log))
+    log.add_argument("-f", "--follow", action="store_true", help="follow new records, until interrupted")
+    log.add_argument("--all", action="store_true", help="also its inputs, so that it can be run again")
+    again = add("replay", "run missions again from their log, and report the first difference", _replay)
+    again.add_argument("log", metavar="FILE", help="the output of 'mission log --all'")
     _on_file(again)
-    show = _on_file(add("show", "draw a mission; one that runs, with how its nodes stand", _show), "name")
-    show.add_argument("--format", choices=_FORMATS, default="text", help="how it is written")
+    show = _on_file(add("show", "draw a mission; a running one with the states of its nodes", _show), "name")
+    show.add_argument("--format", choices=_FORMATS, default="text", help="output format")
     show.add_argument("--out", metavar="FILE", help="write it to this file")
-    _on_file(add("skills", "list what missions may ask of a robot", _skills)).add_argument(
+    _on_file(add("skills", "list the skills that missions may use on a robot", _skills)).add_argument(
         "--json", action="store_true", help="answer in JSON"
     )
-    explore = _on_file(add("explore", "look for dead ends by trying all that may happen", _explore), "name")
+    explore = _on_file(add("explore", "look for dead ends by trying everything that may happen", _explore), "name")
     explore.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
-    explore.add_argument("--states", type=int, default=2000, metavar="N", help="look at so many states at most")
-    explore.add_argument("--depth", type=int, default=30, metavar="N", help="let so many things happen at most")
+    explore.add_argument("--states", type=int, default=2000, metavar="N", help="most states to look at")
+    explore.add_argument("--depth", type=int, default=30, metavar="N", help="most events on a path")
     explore.add_argument("--json", action="store_true", help="answer in JSON")
 
 
@@ -82,7 +82,7 @@ def _named(parser: argparse.ArgumentParser, *, needed: bool = False) -> argparse
 def _on_file(parser: argparse.ArgumentParser, *names: str) -> argparse.ArgumentParser:
     for name in names:
         parser.add_argument(name, metavar="MISSION", help="which one")
-    parser.add_argument("path", nargs="?", metavar="ROBOT", help="the robot's file; without it the one that runs")
+    parser.add_argument("path", nargs="?", metavar="ROBOT", help="the robot's file; without it, the running robot")
     return parser
 
 

@@ -1,6 +1,6 @@
-"""Show the definition of a message, service or action, or write our own ones as a ROS 2 package.
+"""Show the definition of a message, service or action, or write our own as a ROS 2 package.
 
-ROS 2 knows all types that a robot uses but those of the package `rbxcompose_msgs`: `msg export ros2_ws/src` writes it.
+ROS 2 knows all types of a robot except those of the package `rbxcompose_msgs`: `msg export ros2_ws/src` writes it.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ LICENCE = "Apache-2.0"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     actions = parser.add_subparsers(dest="action", metavar="show|export", required=True)
-    show = actions.add_parser("show", help="print a definition with all that it is made of, and its type hash")
+    show = actions.add_parser("show", help="print a definition with all types that it uses, and its type hash")
     show.add_argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
     export = actions.add_parser("export", help=f"write the package {OWN} for a ROS 2 workspace")
-    export.add_argument("folder", metavar="DIR", type=Path, help=f"the folder in which {OWN} is made")
+    export.add_argument("folder", metavar="DIR", type=Path, help=f"the folder in which to create {OWN}")
     for one in (show, export):
         one.add_argument("--json", action="store_true", help="answer in JSON")
 
@@ -44,7 +44,7 @@ def _show(wanted: str, as_json: bool) -> int:
     names = all_names()
     name = next((name for name in names if wanted in (name, short(name))), None)
     if name is None:
-        words = f"'{wanted}' is not a type that is known here"
+        words = f"unknown type '{wanted}'"
         return refuse(NO_TYPE.misspelt(None, words, wanted, [*names, *map(short, names)], "known types"))
     hashed, text = type_hash(name, all_structures()), whole_text(name)
     if as_json:

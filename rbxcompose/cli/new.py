@@ -27,7 +27,7 @@ ABOUT = "What is it for?"
 
 @dataclass(frozen=True, slots=True)
 class New:
-    """What is to be written below a folder, and what a person may want to do then."""
+    """What to write below a folder, and what a user may want to do next."""
 
     folder: Path
     files: Mapping[str, str]
@@ -41,25 +41,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for what, about in (
         ("robot", "a robot that drives, with its mission"),
         ("mission", "one more mission for a robot"),
-        ("part", "something that robots are made of"),
+        ("part", "a part that robots can include"),
         ("component", "a component type in Python, as a package to install"),
     ):
         one = kinds.add_parser(what, help=about, description=f"Write {about}.", allow_abbrev=False)
-        one.add_argument("name", metavar="NAME", help="small letters, digits, underscores")
-        one.add_argument("--yes", action="store_true", help="ask nothing; what no option says has its default")
+        one.add_argument("name", metavar="NAME", help="lower-case letters, digits, underscores")
+        one.add_argument("--yes", action="store_true", help="ask nothing; use the defaults where there is no option")
         if what != "mission":
             one.add_argument(
-                "--into", metavar="DIR", type=Path, default=Path(), help="the project's folder, if not this"
+                "--into", metavar="DIR", type=Path, default=Path(), help="the project's folder (default: this one)"
             )
         if what != "component":
             one.add_argument("--about", metavar="TEXT", help="what it is for, in a sentence")
     new_robot, new_mission = kinds.choices["robot"], kinds.choices["mission"]
     new_robot.add_argument("--base", metavar="TYPE", help=f"the component that drives ({robot.BASE})")
     new_robot.add_argument(
-        "--place", metavar="NAME=X,Y", action="append", help="a place to go to, beside the dock at 0,0"
+        "--place", metavar="NAME=X,Y", action="append", help="a place to go to, besides the dock at 0,0"
     )
     new_mission.add_argument("--robot", metavar="PATH", default="", help="the robot, if there is more than one")
-    new_mission.add_argument("--no-add", action="store_true", help="leave the robot's file alone, and tell what to add")
+    new_mission.add_argument("--no-add", action="store_true", help="do not change the robot's file; show what to add")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -92,7 +92,7 @@ def _robot(arguments: argparse.Namespace, asker: Asker) -> New:
     about = asker.ask(ABOUT, read_text, robot.ABOUT, given=arguments.about)
     base = asker.ask("The type of its base?", robot.read_base, robot.BASE, given=arguments.base)
     if arguments.place is None:
-        question = "A place to go to, as NAME=X,Y in metres from the dock (nothing: go on)"
+        question = "A place to go to, as NAME=X,Y in metres from the dock (empty: continue)"
         places = tuple(asker.ask_several(question, robot.read_next_place)) or robot.PLACES
     else:
         places = robot.read_places(arguments.place)

@@ -1,7 +1,7 @@
 """List, get or set the parameters of components while the robot runs, and of ROS 2 nodes.
 
-Numbers are SI. `set` takes text with a unit as well (`param set battery runtime "30 s"`). What it changes lasts until
-the process ends; what is to stay belongs into the manifest.
+Numbers are SI. `set` takes text with a unit as well (`param set battery runtime "30 s"`). A change lasts until
+the process ends; write it in the manifest to keep it.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class _Nodes:
         if full in self.names or len(near) == 1:
             return full if full in self.names else near[0]
         bare = [name.removeprefix("/") for name in self.names]
-        words = f"there is no component '{wanted}' that has parameters"
+        words = f"no component '{wanted}' has parameters"
         raise NotDoneError(NO_NAME.misspelt(None, words, wanted.removeprefix("/"), bare, "components"))
 
     def ask(self, nodes: Sequence[str], what: str, service: type[Service[Q, R]], requests: Sequence[Q]) -> list[R]:
@@ -167,7 +167,7 @@ def _set(nodes: _Nodes, arguments: argparse.Namespace) -> int:
     parameter = rcl.Parameter(name=arguments.name, value=_value(arguments.value))
     request = rcl.SetParameters.Request(parameters=(parameter,))
     (answer,) = nodes.ask([node], "set_parameters", rcl.SetParameters, [request])
-    result = answer.results[0] if answer.results else rcl.SetParametersResult(reason="it answered nothing")
+    result = answer.results[0] if answer.results else rcl.SetParametersResult(reason="its answer was empty")
     if not result.successful:
         return refuse(SAID_NO.at(None, f"'{node}': {result.reason}"))
     return _get(nodes, arguments)

@@ -22,7 +22,7 @@ from rbxcompose.regular_files import read_regular
 
 NO_PLAN = kind(
     "RBX9012",
-    """A file that is no plan
+    """The file is not a plan
 
 `plan --diff FILE` compares with a plan that was written by `plan --json`, or with the plan of another manifest.
 

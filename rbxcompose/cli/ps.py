@@ -16,10 +16,7 @@ from rbxcompose.runtime.requests import RobotStatus
 
 _COLUMNS = ("name", "type", "state", "process", "pid", "restarts")
 _ANSWER = 0.4  # [s] for a supervisor to answer; what it has written is as new as that, but for what died since
-_NO_SUPERVISOR = (
-    "its supervisor has died, without which it brakes and ends; 'rbxcompose down {}', or the next 'up', clears away "
-    "what it has left"
-)
+_NO_SUPERVISOR = "its supervisor has died, so it brakes and ends; 'rbxcompose down {}', or the next 'up', cleans up"
 _BLOCKED = "blocked"  # the state of what runs and cannot do its work
 
 

@@ -1,7 +1,7 @@
 """Record the topics of a robot to an MCAP file, until Ctrl-C.
 
-Payloads are kept as they are on the bus, with the definitions of their types, so that Foxglove, Lichtblick and ROS 2
-read them. A recorder that is killed loses at most half a second: its file is recovered at the next start in its folder.
+Payloads stay as they are on the bus, with the definitions of their types, so Foxglove, Lichtblick and ROS 2 can read
+them. A recorder that is killed loses at most half a second: the next one in its folder recovers its file.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="the file, else ROBOT-DATE-TIME.mcap")
     parser.add_argument("--for", type=seconds, dest="duration", metavar="30s", help="end after this time")
     parser.add_argument(
-        "--split", type=_split, default=Split(), metavar="SIZE|TIME", help="begin a new file after 500MB, or 10min"
+        "--split", type=_split, default=Split(), metavar="SIZE|TIME", help="start a new file after 500MB, or 10min"
     )
 
 
@@ -122,4 +122,4 @@ def _split(text: str) -> Split:
     try:
         return Split(time=seconds(text))
     except argparse.ArgumentTypeError:
-        raise argparse.ArgumentTypeError(f"'{text}' is no size and no time; write '500MB' or '10min'") from None
+        raise argparse.ArgumentTypeError(f"'{text}' is neither a size nor a time; write '500MB' or '10min'") from None

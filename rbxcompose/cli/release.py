@@ -1,6 +1,6 @@
 """Allow motion again after `stop`; nothing moves by itself.
 
-A mission goes on after `mission resume`.
+A mission continues after `mission resume`.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Publish a recording again on a robot's bus, or show what is in it.
 
-Messages come at the intervals in which they were recorded. Topics of the class `command` make a robot move: they are
-left out unless `--topics` names them. Topics that somebody on the bus sends now are refused without `--over`.
+Messages come at the recorded intervals. Topics of the class `command` make a robot move: they are
+left out unless `--topics` names them. Topics that are being published now are refused without `--over`.
 
-With --into, nothing is published: a component of a run that `up --rate max --record` has kept is run again, with its
-recorded inputs, and what it sends is compared with the recording. It has the settings that it had, or those of
+With --into, nothing is published: it runs one component of a run that `up --rate max --record` has recorded again, with
+its recorded inputs, and compares its outputs with the recording. The settings are those of the run, or those of
 --robot PATH. Exit codes: 0 the same, 1 a difference or findings.
 """
 
@@ -44,7 +44,7 @@ from rbxcompose.recording.summary import RecordingSummary, summary_of
 from rbxcompose.recording.topics import RecordedTopic, Selection, by_name, is_replayable
 from rbxcompose.regular_files import NotRegularError, open_regular
 
-_PAUSE = 0.05  # [s] before a recording begins anew
+_PAUSE = 0.05  # [s] before a recording starts again
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,11 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_bus_options(parser)
     add_selection_options(parser)
     parser.add_argument("--rate", type=_rate, default=1.0, metavar="2x", help="faster or slower than it was")
-    parser.add_argument(
-        "--from", type=seconds, default=0.0, dest="start", metavar="10s", help="leave out what is before"
-    )
-    parser.add_argument("--over", action="store_true", help="also topics that somebody sends now, beside them")
-    parser.add_argument("--loop", action="store_true", help="begin anew at the end, until Ctrl-C")
+    parser.add_argument("--from", type=seconds, default=0.0, dest="start", metavar="10s", help="skip everything before")
+    parser.add_argument("--over", action="store_true", help="also topics that are being published now")
+    parser.add_argument("--loop", action="store_true", help="start again at the end, until Ctrl-C")
     parser.add_argument(
         "--into",
         metavar="COMPONENT",
@@ -95,7 +93,7 @@ def _misused(arguments: argparse.Namespace) -> str:
     """Return what is wrong with options that do not fit together."""
     layers = arguments.profile or arguments.overlays or arguments.sets or arguments.real
     if layers and not (arguments.into and arguments.robot):
-        return "what is laid over a robot's file needs --into and --robot PATH"
+        return "options that change the robot's file need --into and --robot PATH"
     if arguments.json and not (arguments.info or arguments.into):
         return "--json needs --info or --into"
     return "--write needs --into" if arguments.write and not arguments.into else ""
@@ -116,19 +114,19 @@ def _opened(path: Path) -> Iterator[RecordingReader]:
         with open_regular(path) as file:
             yield RecordingReader(file)
     except NotRegularError as error:
-        raise NotDoneError(UNREADABLE.at(None, f"'{plain(str(path))}' is no recording: it is no file")) from error
+        raise NotDoneError(UNREADABLE.at(None, f"'{plain(str(path))}' is not a recording: it is not a file")) from error
     except OSError as error:
         reason = plain(error.strerror or str(error))
         raise NotDoneError(UNREADABLE.at(None, f"'{plain(str(path))}' cannot be read: {reason}")) from error
     except NotARecordingError as error:
-        finding = UNREADABLE.at(None, f"'{plain(str(path))}' is no recording: {error}")
+        finding = UNREADABLE.at(None, f"'{plain(str(path))}' is not a recording: {error}")
         raise NotDoneError(finding) from error
 
 
 def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary) -> int:
     topics = _chosen(summary, selection_of(arguments))
     if not topics or arguments.start > summary.duration:
-        why = "no topic that was chosen can be replayed" if not topics else f"it lasts {summary.duration:.1f} s"
+        why = "none of the chosen topics can be replayed" if not topics else f"it lasts {summary.duration:.1f} s"
         return refuse(NOTHING.at(None, f"nothing of '{plain(str(path))}' is replayed: {why}"))
     place = find_place(arguments)
     if not arguments.over:
@@ -148,14 +146,14 @@ def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary
 
 
 def _sent_already(guest: Guest, topics: list[RecordedTopic]) -> Finding | None:
-    """Return the finding for topics that somebody else sends now, None if there are none."""
+    """Return the finding for topics that are being published now, None if there are none."""
     chosen = {one.name for one in topics}
     names = [one.name for one in guest.graph().topics if one.givers and one.name in chosen]
     if not names:
         return None
     rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    message = f"somebody sends now what is to be replayed: {plain(', '.join(names[:MOST_NAMES]))}{rest}"
-    return SENT_ALREADY.at(None, message, help="choose others with '--topics', or replay beside them with '--over'")
+    message = f"these topics are being published now: {plain(', '.join(names[:MOST_NAMES]))}{rest}"
+    return SENT_ALREADY.at(None, message, help="choose others with '--topics', or replay alongside with '--over'")
 
 
 def _chosen(summary: RecordingSummary, wanted: Selection) -> list[RecordedTopic]:

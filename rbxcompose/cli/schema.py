@@ -1,6 +1,6 @@
 """Print the JSON Schema of a kind of manifest, for editors.
 
-It knows the component types that are installed here, those of other distributions included.
+It knows all installed component types, including those of other distributions.
 """
 
 from __future__ import annotations

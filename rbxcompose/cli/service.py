@@ -1,6 +1,6 @@
 """List the services on the bus, or call one.
 
-The request is YAML with the fields of the service's type; what is left out is zero.
+The request is YAML with the fields of the service's type; missing fields are zero.
 """
 
 from __future__ import annotations

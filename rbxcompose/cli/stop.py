@@ -1,7 +1,7 @@
 """Hold everything that moves, at once, until `release`.
 
-It brakes the base, cancels the actions that claim what moves and pauses the missions. It is a protective stop by
-software and no emergency stop.
+It brakes the base, cancels the actions that claim what moves and pauses the missions. It is a protective stop in
+software, not an emergency stop.
 """
 
 from __future__ import annotations

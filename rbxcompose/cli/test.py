@@ -1,7 +1,7 @@
 """Run the tests of missions, in virtual time.
 
 PATH is a test or a folder with tests below it; without one it is `missions/`. Exit codes: 0 all passed, 1 a test failed
-or has mistakes, 2 wrong usage.
+or has errors, 2 wrong usage.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "paths", nargs="*", type=Path, default=[HERE], metavar="PATH", help="tests, or folders of tests"
     )
     parser.add_argument("--filter", default="", metavar="TEXT", help="only those with this text in their names")
-    parser.add_argument("--coverage", action="store_true", help="tell which ways of the missions no test took")
-    parser.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit's XML")
+    parser.add_argument("--coverage", action="store_true", help="show which parts of the missions no test covered")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
     parser.add_argument("-v", "--verbose", action="store_true", help="show the traces of all tests")
     parser.add_argument("--json", action="store_true", help="write JSON")
 

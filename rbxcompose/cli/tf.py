@@ -1,6 +1,6 @@
 """Show the tree of frames on the bus, or where one frame is in another.
 
-A frame is where it was last told to be; a static one never grows old.
+A frame is at its last published pose; a static one never becomes outdated.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ _DIGITS = 4  # of metres and degrees
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     actions = parser.add_subparsers(dest="action", metavar="tree|echo", required=True)
-    tree = actions.add_parser("tree", help="show which frame is in which")
+    tree = actions.add_parser("tree", help="show the tree of frames")
     tree.set_defaults(do=_tree)
     echo = actions.add_parser("echo", help="print where FRAME is in PARENT")
-    echo.add_argument("parent", metavar="PARENT", help="the frame that is looked from, such as map")
-    echo.add_argument("frame", metavar="FRAME", help="the frame that is looked for, such as base_link")
+    echo.add_argument("parent", metavar="PARENT", help="the frame to look from, such as map")
+    echo.add_argument("frame", metavar="FRAME", help="the frame to find, such as base_link")
     echo.add_argument("--rate", type=hertz, default=1.0, metavar="1Hz", help="how often (default: 1 Hz)")
     add_count_options(echo)
     echo.set_defaults(do=_echo)
@@ -68,7 +68,7 @@ class _Frames:
 
     @property
     def is_whole(self) -> bool:
-        """Tell whether all who publish have been heard."""
+        """Return whether all who publish have been heard."""
         return not self._waiting
 
     def _listen(self, topic: GraphName) -> None:

@@ -1,4 +1,4 @@
-"""Show a running robot live: components, processes, mission, batteries, what went wrong last.
+"""Show a running robot live: components, processes, mission, batteries, the last warnings.
 
 It looks once a second, until q or Ctrl-C. Without a terminal it looks once. The rate of a component is that of its
 messages; the share of a process is that of one processor.
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file")
     add_robot_option(parser)
-    parser.add_argument("--once", action="store_true", help="look for a second, show what was seen, and end")
+    parser.add_argument("--once", action="store_true", help="watch for a second, print the result, and end")
     add_json_option(parser)
 
 
@@ -81,5 +81,5 @@ def _live(guest: Guest, sampler: Sampler) -> int:
 def _sampled(sampler: Sampler) -> RobotPicture:
     picture = sampler.sample()
     if picture is None:
-        raise NotDoneError(NOT_UP.at(None, "the robot has gone down"))
+        raise NotDoneError(NOT_UP.at(None, "the robot is down"))
     return picture

@@ -1,6 +1,6 @@
 """List the topics on the bus, show their messages, measure their rate, publish.
 
-It sees ROS 2 participants as well as components. It needs no robot of this machine: `--router` names any other bus.
+It sees ROS 2 nodes as well as components. It needs no robot on this machine: `--router` names another bus.
 """
 
 from __future__ import annotations
@@ -37,25 +37,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ls = actions.add_parser("ls", help="list the topics with their types")
     add_ls_options(ls)
     ls.set_defaults(do=_ls)
-    show = actions.add_parser("show", help="show who publishes and who subscribes")
+    show = actions.add_parser("show", help="show publishers and subscribers")
     add_json_option(show)
     show.set_defaults(do=_show)
     echo = actions.add_parser("echo", help="print the messages")
     add_count_options(echo)
     add_json_option(echo)
     echo.set_defaults(do=_echo)
-    hz = actions.add_parser("hz", help="measure how often messages come")
-    hz.add_argument("--window", type=count, default=_WINDOW, metavar="N", help=f"of so many messages ({_WINDOW})")
+    hz = actions.add_parser("hz", help="measure how often messages arrive")
+    hz.add_argument("--window", type=count, default=_WINDOW, metavar="N", help=f"over so many messages ({_WINDOW})")
     hz.add_argument("--for", dest="duration", type=seconds, metavar="T", help="end after this time")
     add_json_option(hz)
     hz.set_defaults(do=_hz)
-    pub = actions.add_parser("pub", help="publish a message, once if nothing else is said")
+    pub = actions.add_parser("pub", help="publish a message, by default once")
     for one in (show, echo, hz, pub):
         one.add_argument("topic", metavar="TOPIC", help="its name, such as /odom")
     pub.add_argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
-    pub.add_argument("message", metavar="MESSAGE", nargs="?", default="", help="YAML; what it leaves out is zero")
+    pub.add_argument("message", metavar="MESSAGE", nargs="?", default="", help="YAML; missing fields are zero")
     pub.add_argument("--rate", type=hertz, metavar="10Hz", help="publish again and again, until interrupted")
-    pub.add_argument("-n", "--count", type=count, metavar="N", help="end after so many")
+    pub.add_argument("-n", "--count", type=count, metavar="N", help="end after this many")
     add_timeout_option(pub, "2s")
     add_json_option(pub)
     pub.set_defaults(do=_pub)
@@ -89,7 +89,7 @@ def _qos(end: GraphEnd) -> str:
     if end.qos is None:
         return "unknown quality of service"
     reliability = "reliable" if end.qos.is_reliable else "best effort"
-    durability = ", kept for who comes later" if end.qos.is_transient_local else ""
+    durability = ", kept for late subscribers" if end.qos.is_transient_local else ""
     return f"{reliability}{durability}, {'all' if end.qos.keeps_all else f'newest {end.qos.depth}'}"
 
 

@@ -30,11 +30,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rate", type=_rate, default=RunOptions(), metavar="20x|max|1x", help="robot time per real time, reproducible"
     )
-    parser.add_argument("-d", "--detach", action="store_true", help="return when all is active; the robot stays up")
+    parser.add_argument("-d", "--detach", action="store_true", help="return once everything is active; it stays up")
     parser.add_argument(
-        "--record", type=Path, metavar="FILE", help="with --rate: keep all that happens, to be replayed"
+        "--record", type=Path, metavar="FILE", help="with --rate: record everything that happens, for replay"
     )
-    parser.add_argument("--watch", action="store_true", help="let it take what its files say, as you edit them")
+    parser.add_argument("--watch", action="store_true", help="apply changes to its files as you edit them")
     parser.add_argument("--for", type=_duration, dest="duration", metavar="30s", help="end after this robot time")
 
 
@@ -101,5 +101,5 @@ def _duration(text: str) -> float:
     except UnitError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
     if seconds <= 0:
-        raise argparse.ArgumentTypeError("must be longer than nothing")
+        raise argparse.ArgumentTypeError("must be above zero")
     return seconds

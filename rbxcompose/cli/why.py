@@ -1,4 +1,4 @@
-"""Tell where a value of a robot comes from: its file and line, the layers below it, what it is for.
+"""Show where a value of a robot comes from: its file and line, the layers below it, what it is for.
 
 VALUE is a path as for --set (battery.runtime, missions.patrol.with.rounds), or a port (go_to.cmd_vel).
 Exit codes: 0 fine, 1 the robot cannot be read or has no such path, 2 wrong usage.

@@ -30,7 +30,7 @@ DIGITS = 6  # of a percentage; further ones are rounding, by which 80 % would li
 
 
 class BatterySimConfig(Config):
-    """How fast the battery drains and when it complains."""
+    """How fast the battery drains, and when it warns."""
 
     runtime: Annotated[Time, Live()] = Field(gt=0)
     """Time from full to empty."""
@@ -44,7 +44,7 @@ class BatterySimConfig(Config):
 
 @component("battery_sim")
 class BatterySim(Component[BatterySimConfig]):
-    """A battery that drains evenly from full to empty over `runtime`; its level can be set, as a charger does.
+    """A battery that drains evenly from full to empty over `runtime`; a charger can set its level.
 
     Example:
         battery: {type: battery_sim, runtime: 45 s, warn: 50 %, error: 20 %}
@@ -74,7 +74,7 @@ class BatterySim(Component[BatterySimConfig]):
         self.publish()
 
     def activate(self) -> None:
-        """Tell the first level at once, since others wait for it."""
+        """Publish the first level at once, since others wait for it."""
         self.publish()
 
     def step(self, dt: float) -> None:

@@ -41,7 +41,7 @@ class ChargerConfig(Config):
 
 @component("charger")
 class Charger(Component[ChargerConfig]):
-    """Charges the battery of a robot that stands at the dock; away from it, the goal is refused.
+    """Charges the battery of a robot at the dock; away from the dock, the goal is refused.
 
     Example:
         charger: {type: charger, dock: dock, reach: 20 cm}
@@ -71,7 +71,7 @@ class Charger(Component[ChargerConfig]):
         """Refuse to charge away from the dock."""
         dock, pose = self.config.dock, self.pose.now()
         if pose is None:
-            return "nobody tells where the robot is"
+            return "the robot's position is unknown"
         away = pose.distance(Pose2(dock.x, dock.y))
         if away > self.config.reach:
             return f"the robot is {away:.2f} m away from '{dock.name}'"
@@ -97,7 +97,7 @@ class Charger(Component[ChargerConfig]):
         elif self.is_full and self.battery_level.value is not None:
             goal.succeeded(Recharge.Result(level=self.battery_level.value.data))
         elif self.now >= self.deadline:
-            goal.aborted(f"the battery told no level for {PATIENCE:.0f} s")
+            goal.aborted(f"the battery reported no level for {PATIENCE:.0f} s")
 
     def answered(self, goal: object, reply: Reply[SetBatteryLevel.Response]) -> None:
         """Take the battery's answer, unless it is about a goal that has ended."""

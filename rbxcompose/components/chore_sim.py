@@ -34,16 +34,16 @@ class ChoreSimConfig(Config):
     """How the base moves while the chore is done."""
 
     speed: Annotated[Speed, Live()] = Field(0.05, ge=0)
-    """To and fro: forwards in one stroke, backwards in the next."""
+    """Speed of the strokes: forwards in one, backwards in the next."""
     turn_rate: Annotated[AngularSpeed, Live()] = 0.0
-    """How fast it turns meanwhile, always to the same side."""
+    """How fast it turns meanwhile, always in the same direction."""
     stroke: Annotated[Time, Live()] = Field(1.0, gt=0)
     """Duration of a stroke."""
 
 
 @component("chore_sim")
 class ChoreSim(Component[ChoreSimConfig]):
-    """A chore such as vacuuming, which takes the time that its goal tells and moves the base a little.
+    """A chore such as vacuuming: it takes as long as its goal says and moves the base a little.
 
     Its skill is called `chore` unless `connect` names it. A second goal is refused while it is busy.
 
@@ -62,13 +62,13 @@ class ChoreSim(Component[ChoreSimConfig]):
         return (CommandsMotion("cmd_vel", Setting(config.speed, "speed"), Setting(config.turn_rate, "turn_rate")),)
 
     def configure(self) -> None:
-        """Nothing is to be done."""
+        """Do nothing."""
         self.core = ChoreCore(settings_of(self.config))
         self.doing: object = None  # the goal that the core works on
         self.moving = False
 
     def reconfigure(self, old: ChoreSimConfig) -> None:
-        """Go on with the same chore as it is set now."""
+        """Continue with the same chore as it is set now."""
         self.core.settings = settings_of(self.config)
 
     def accept_chore(self, goal: Wait.Goal) -> str:

@@ -21,7 +21,7 @@ class AnalyzerConfig(Config):
     match: tuple[str, ...] = Field(min_length=1)
     """Names of components, or patterns with `*`."""
     timeout: Time = Field(DEFAULT_TIMEOUT, gt=0)
-    """Silent for longer than this, a part is STALE."""
+    """A component that is silent for longer than this is STALE."""
     expected: tuple[str, ...] = ()
     """Names that must report, whatever matches."""
 
@@ -37,7 +37,7 @@ class DiagnosticsConfig(Config):
 
 @component("diagnostics")
 class Diagnostics(Component[DiagnosticsConfig]):
-    """Sorts the statuses of all components into groups and tells the level of each: OK, WARN, ERROR or STALE.
+    """Sorts the statuses of all components into groups and publishes the level of each: OK, WARN, ERROR or STALE.
 
     Example:
         health: {type: diagnostics, analyzers: {power: {match: [battery, charger]}}}
@@ -80,7 +80,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
         self.step(0.0)
 
     def brake(self) -> None:
-        """Tell nothing that gets better from now on: what falls silent because it ends has not been mended."""
+        """Report no improvement from now on: what falls silent because it ends has not been mended."""
         self.is_going_down = True
 
     def step(self, dt: float) -> None:

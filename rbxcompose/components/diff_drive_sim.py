@@ -47,14 +47,14 @@ class DiffDriveSimConfig(Config):
     acceleration: Annotated[Acceleration, Live()] = Field(1.0, gt=0)
     """Acceleration of speeding up and of braking."""
     turn_acceleration: Annotated[AngularAcceleration, Live()] = Field(3.0, gt=0)
-    """Acceleration of turning faster and slower."""
+    """Acceleration when starting and stopping to turn."""
     command_timeout: Annotated[Time, Live()] = Field(0.5, gt=0)
-    """The base brakes when no command came for this long."""
+    """The base brakes when no command arrives for this long."""
 
 
 @component("diff_drive_sim")
 class DiffDriveSim(Component[DiffDriveSimConfig]):
-    """A base with two driven wheels that follows `cmd_vel` within its limits and tells its odometry.
+    """A base with two driven wheels that follows `cmd_vel` within its limits and publishes its odometry.
 
     Example:
         base: {type: diff_drive_sim, max_speed: 0.5 m/s, max_turn_rate: 90 deg/s}
@@ -92,7 +92,7 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
 
     @property
     def is_at_rest(self) -> bool:
-        """Tell whether the wheels stand still."""
+        """Return whether the wheels stand still."""
         return self.core.at_rest
 
     def on_cmd_vel(self, message: geometry.Twist) -> None:
@@ -148,7 +148,7 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
         self.core.brake()
 
     def summary(self) -> dict[str, str]:
-        """Tell how far it went."""
+        """Report how far it went."""
         return {"distance driven": f"{self.core.distance:.2f} m"}
 
 

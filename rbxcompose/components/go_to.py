@@ -49,7 +49,7 @@ class GoToConfig(Config):
 
 @component("go_to")
 class GoTo(Component[GoToConfig]):
-    """Drive to a pose in `map`: turn to it, drive straight, turn to its heading.
+    """Drives to a pose in `map`: turns to it, drives straight, turns to its heading.
 
     Example:
         go_to: {type: go_to, speed: 0.3 m/s}
@@ -73,7 +73,7 @@ class GoTo(Component[GoToConfig]):
         self.driving: object = None  # the goal that the core drives to
 
     def reconfigure(self, old: GoToConfig) -> None:
-        """Go on to the same goal as it is set now."""
+        """Continue to the same goal as it is set now."""
         self.core.settings = settings_of(self.config)
 
     def accept_go_to(self, goal: NavigateToPose.Goal) -> str:
@@ -97,7 +97,7 @@ class GoTo(Component[GoToConfig]):
             goal.canceled()
         elif pose is None:
             self.drive(AT_REST)
-            goal.aborted(f"nobody tells where the base is in '{MAP}'")
+            goal.aborted(f"the position of the base is unknown in '{MAP}'")
         else:
             self.follow(goal, pose, dt)
 
@@ -117,7 +117,7 @@ class GoTo(Component[GoToConfig]):
             goal.succeeded()
         elif self.core.stuck:
             self.drive(AT_REST)
-            goal.aborted("the base does not come nearer")
+            goal.aborted("the base gets no closer")
         else:
             goal.feedback(NavigateToPose.Feedback(distance_remaining=self.core.distance))
 

@@ -111,7 +111,7 @@ class MissionConfig(Config):
 
 @component("mission")
 class Mission(Component[MissionConfig]):
-    """Runs missions; each action of the robot is a skill. One mission begins by itself, people begin others beside it.
+    """Runs missions; each action of the robot is a skill. One mission starts by itself; people start others beside it.
 
     It is made of the sections `missions`, `start`, `values` and `places`.
 
@@ -229,10 +229,10 @@ class Mission(Component[MissionConfig]):
         return [due] if due is not None else []
 
     def wait(self, one: MissionRun, missing: str) -> list[float]:
-        """Tell what a mission waits for before it begins; return when to look again [s]."""
+        """Report what a mission waits for before it starts; return when to look again [s]."""
         self.show(Level.OK, f"waiting for {missing}")
         if one.loses_patience(self.now):
-            text = f"waits for {missing}, of which nothing has come for {PATIENCE:g} s"
+            text = f"waits for {missing}, which has not arrived for {PATIENCE:g} s"
             self.warn(f"mission {one.name} {text}")
             self.context.notify(MissionWaits(one.name, text))
         return [self.now + LOOK_AGAIN if POSE in missing else one.patient_until or self.now]
@@ -251,7 +251,7 @@ class Mission(Component[MissionConfig]):
 
     @property
     def claims(self) -> bool:
-        """Tell whether a mission uses a skill that claims a part of the robot."""
+        """Return whether a mission uses a skill that claims a part of the robot."""
         return any(one.claims for one in self.missions)
 
     def take_over(self, old: Mission) -> None:
@@ -259,7 +259,7 @@ class Mission(Component[MissionConfig]):
         self.is_held = old.is_held  # as the start mission was
 
     def finish(self, name: str, end: MissionEnded) -> None:
-        """Tell that a mission has ended; with the start mission the robot may go down."""
+        """Report that a mission has ended; with the start mission the robot may go down."""
         self.show(Level.ERROR if end.result == "failure" else Level.OK, f"{name}: {end.result}")
         self.keep()
         if name == self.config.start:
@@ -286,7 +286,7 @@ class Mission(Component[MissionConfig]):
         """Begin a mission, and begin it again after a crash."""
         self.begin(request.mission, request.inputs, request.start)
         self.keep(request)
-        return f"mission {request.mission} begins"
+        return f"mission {request.mission} starts"
 
     @answers(CancelMission)
     def cancel(self, request: CancelMission) -> str:
@@ -303,12 +303,12 @@ class Mission(Component[MissionConfig]):
         """Hold a mission."""
         one = self.missions.running(request.mission, lambda one: not one.is_paused)
         if one.is_paused:
-            raise Refused(f"mission {one.name} is paused already")
+            raise Refused(f"mission {one.name} is already paused")
         return self.hold_running(one, "paused")
 
     @answers(ResumeMission)
     def resume(self, request: ResumeMission) -> str:
-        """Go on with a mission, unless the robot is held by a stop."""
+        """Resume a mission, unless the robot is held by a stop."""
         one = self.missions.running(request.mission, lambda one: one.is_paused, "paused")
         if self.context.is_stopped:
             raise Refused("the robot is stopped: release it first")

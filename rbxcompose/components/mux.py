@@ -21,14 +21,14 @@ class MuxSourceConfig(Config):
     priority: int
     """The larger one wins."""
     timeout: Time = Field(gt=0)
-    """Silent for longer than this, it counts as gone; counted from the last message's arrival."""
+    """After this long without a message it counts as gone."""
 
 
 class MuxInputConfig(MuxSourceConfig):
     """An input."""
 
     max_rate: Frequency | None = Field(None, gt=0)
-    """More is not taken from one publisher elsewhere: it is dropped, and told in diagnostics. 1000 Hz if left out."""
+    """Most messages from one publisher in another process; the rest is dropped and reported. Default: 1000 Hz."""
 
 
 class MuxConfig(Config):
@@ -46,9 +46,9 @@ class MuxConfig(Config):
 
 @component("mux")
 class Mux(Component[MuxConfig]):
-    """Lets the commands of one source through: the live one of the highest priority. It forwards and never repeats.
+    """Forwards the commands of one source: the live one with the highest priority. It never repeats a message.
 
-    Above all inputs stands the lock `stop`, latched by `rbxcompose stop` and opened by `release`.
+    The lock `stop` is above all inputs; `rbxcompose stop` latches it and `release` opens it.
 
     Example:
         cmd_vel: {type: mux, output: cmd_vel, inputs: {teleop: {priority: 100, timeout: 0.5 s}}}
@@ -149,5 +149,5 @@ class Mux(Component[MuxConfig]):
             level = Level.WARN if locked else Level.OK
             self.status(level, self.core.why(self.now), active=active or "none", locked_out=", ".join(locked) or "none")
         if refused and not self.refused:
-            self.warn(f"commands are not let through: {self.core.why(self.now)}")
+            self.warn(f"commands are blocked: {self.core.why(self.now)}")
         self.refused = refused

@@ -15,7 +15,7 @@ class RobotDescriptionConfig(Config):
 
 @component("robot_description")
 class RobotDescription(Component[RobotDescriptionConfig]):
-    """Tells what the robot's body is: its URDF, which viewers and other programs of ROS 2 read from this topic.
+    """Publishes the robot's URDF, which viewers and other ROS 2 programs read from this topic.
 
     Example:
         shape: {type: robot_description, urdf: '<robot name="cart"><link name="base"/></robot>'}

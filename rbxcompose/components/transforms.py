@@ -20,7 +20,7 @@ class TransformsConfig(Config):
 
 @component("transforms")
 class Transforms(Component[TransformsConfig]):
-    """Tells the frames that never move. While nothing localises the robot, `odom` stands where `map` does.
+    """Publishes the frames that never move. While nothing localises the robot, `odom` coincides with `map`.
 
     Example:
         frames: {type: transforms, map: building, odom: map}

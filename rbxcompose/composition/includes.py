@@ -32,7 +32,7 @@ CIRCLE = kind(
     "RBX1308",
     """Parts that include each other in a circle
 
-A part can include other parts, but not itself, not even through others: it would never end.
+A part can include other parts, but not itself, directly or through others: it would never end.
 
 Bad: `arm.yaml` includes `hand.yaml`, which includes `arm.yaml`.
 Good: `arm.yaml` includes `hand.yaml`, and both include `camera.yaml`.
@@ -42,7 +42,7 @@ NO_TOPIC = kind(
     "RBX1309",
     """`connect:` of an instance names a topic that the part does not have
 
-`connect:` gives topics of a part another name: those of its components' ports, of its muxes, and `MUX/INPUT` for an
+`connect:` gives topics of a part other names: those of its components' ports, of its muxes, and `MUX/INPUT` for an
 input or a lock of a mux.
 
 Bad:
@@ -144,7 +144,7 @@ class Parts:
         self._count += 1
         finding = self._limit(span, above)
         if finding is None and "${" in read.part:
-            finding = WRONG_TYPE.at(span, "the file of a part cannot be filled in: parts are read before that")
+            finding = WRONG_TYPE.at(span, "a part's file cannot use '${...}': parts are read before it is filled in")
         file = finding or resolve(read.part, self.documents.writer(span, self.robot), span)
         if isinstance(file, Path):
             if all(one.file != file for one in above):
@@ -192,7 +192,7 @@ class Parts:
             )
         topics = topics_of(instance.root for instance in inside)
         for topic in sorted(connect.keys() - renaming.used):
-            message = f"the part that '{name}' is an instance of has no topic '{topic}'"
+            message = f"the part of the instance '{name}' has no topic '{topic}'"
             span = connect[topic].key_span
             finding = NO_TOPIC.misspelt(span, message, topic, topics, "its topics", taken=connect)
             self.documents.report.add(finding)

@@ -1,4 +1,4 @@
-"""Which file includes which, so that a finding inside an included file tells how the robot came to it."""
+"""Which file includes which, so that a finding inside an included file shows how the robot came to it."""
 
 from __future__ import annotations
 

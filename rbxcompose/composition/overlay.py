@@ -17,10 +17,10 @@ from rbxcompose.manifest.walk import REMOVE
 
 NOTHING_TO_CHANGE = kind(
     "RBX1302",
-    """A profile, an overlay or `--set` changes what does not exist
+    """A profile, an overlay or `--set` changes something that does not exist
 
-An overlay may add a new entry to a section, such as a component with its `type:`. What it changes or removes must be
-there, or else the name is misspelt.
+An overlay may add a new entry to a section, such as a component with its `type:`. What it changes or removes must
+exist; perhaps the name is misspelt.
 
 Bad:
 ```yaml
@@ -43,10 +43,10 @@ profiles:
 )
 NOT_AN_OVERLAY = kind(
     "RBX1305",
-    """`!remove` where nothing lies below
+    """`!remove` with nothing to remove
 
-`!remove` in a profile or an overlay takes something out of the robot, and in the robot's file something that a part
-brought. Where nothing lies below there is nothing to take it from.
+In a profile or an overlay, `!remove` takes something out of the robot; in the robot's file, something that a part
+brought. Here there is nothing to remove.
 
 Bad:
 ```yaml
@@ -67,8 +67,8 @@ TWO_PARTS = kind(
     "RBX1307",
     """Two parts bring the same thing
 
-What a part brings gets the name of its instance in front, but topics do not: two parts may not bring the same input or
-lock of a mux. `connect:` gives one of them another topic.
+Names from a part get the name of its instance as a prefix, but topics do not: two parts may not bring the same input
+or lock of a mux. `connect:` gives one of them another topic.
 
 Bad:
 ```yaml
@@ -176,11 +176,11 @@ class _Merge:
             self._enter(entries, entry, path)
 
     def may_merge(self, path: KeyPath) -> bool:
-        """Tell whether this layer may add to the map at `path`."""
+        """Return whether this layer may add to the map at `path`."""
         return True
 
     def may_change(self, path: KeyPath) -> bool:
-        """Tell whether this layer may replace or remove what is at `path`."""
+        """Return whether this layer may replace or remove what is at `path`."""
         return True
 
     def _enter(self, entries: dict[str, Entry], entry: Entry, path: KeyPath) -> None:
@@ -229,7 +229,7 @@ class _Join(_Merge):
         name, *names = map(str, path)
         other, section = self.history.layer(path), section_named(name)
         what = f"'{names[-1]}' of '{name}'" if names else f"'{name}'"
-        help_text = "rename one of the two instances" if names else f"a robot has one '{name}': leave one out"
+        help_text = "rename one of the two instances" if names else f"a robot has one '{name}': remove one"
         if section and (told := section.clash(names)):
             what, help_text = told
         message = f"{self.overlay} and {other} both bring {what}"
@@ -238,7 +238,7 @@ class _Join(_Merge):
 
 
 def _is_shared(path: KeyPath) -> bool:
-    """Tell whether several parts may add to the map at `path`."""
+    """Return whether several parts may add to the map at `path`."""
     section = section_named(path[0])
     return section is not None and section.is_shared(path[1:])
 
@@ -259,7 +259,7 @@ def _settled(node: TreeNode, report: Report) -> TreeNode:
 
 
 def is_removal(node: TreeNode) -> bool:
-    """Tell whether a layer takes away what lies below it."""
+    """Return whether a layer takes away what lies below it."""
     return isinstance(node, MappingNode) and node.tag == REMOVE
 
 

@@ -1,4 +1,4 @@
-"""The sections of a composed robot, one by one: a mistake in one entry hides nothing of the others."""
+"""The sections of a composed robot, one by one: an error in one entry hides nothing in the others."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from rbxcompose.references import COMPONENT
 
 TAKEN_NAME = kind(
     "RBX1007",
-    """A name that is taken
+    """The name is taken
 
-Everything that runs has a name of its own. The names of sections, of muxes and of the components that every robot
-runs cannot be given to a component.
+Everything that runs has its own name. A component cannot have the name of a section, of a mux, or of a component that
+every robot runs.
 
 Bad:
 ```yaml
@@ -83,7 +83,7 @@ def _own_name(name: str, section: Section[Any, Any]) -> str:
     """Return why nothing that a user writes may have a name, or nothing."""
     if name in reserved_names():
         return f"a {section.entry} cannot be named like the section '{name}'"
-    return f"every robot runs a component '{name}' already" if name in ALWAYS_THERE else ""
+    return f"every robot already runs a component '{name}'" if name in ALWAYS_THERE else ""
 
 
 def _other_owner(
@@ -92,7 +92,7 @@ def _other_owner(
     """Return what else has a name: in words, as a label, and its path."""
     for one in sections(ROBOT):
         if name in one.brings and one.name in root:
-            return f"the {one.name} brings a component '{name}' already", f"the {one.name}", (one.name,)
+            return f"the {one.name} already brings a component '{name}'", f"the {one.name}", (one.name,)
     for one in others:
         if name in one.names_in(root):
             words = f"a {section.entry} and a {one.entry} are both named '{name}'"

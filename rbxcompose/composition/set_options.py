@@ -16,8 +16,8 @@ BAD_SET = kind(
     "RBX1303",
     """A `--set` that cannot be read
 
-`--set` takes a path and a value with `=` between them. The path begins with a component or a section; the value is
-YAML, as it would stand in the file.
+`--set` takes a path and a value with `=` between them. The path starts with a component or a section; the value is
+YAML, as in the file.
 
 Bad: `--set battery.runtime`
 Good: `--set battery.runtime="30 s"`
@@ -49,7 +49,7 @@ def _set_overlay(text: str, line: int, root: MappingNode, report: Report) -> Map
     span = Span(SET, line, 1, line, len(written) + 1)
     names = written.strip().split(".")
     if not equals or not all(names):
-        message = f"'{SET} {text}' is no path and value"
+        message = f"'{SET} {text}' is not a path and a value"
         report.add(BAD_SET.at(span, message, help=f"write {SET} battery.runtime='30 s'"))
         return None
     path = _set_path(names, span, root, report)
@@ -82,7 +82,7 @@ def _set_path(names: list[str], span: Span, root: MappingNode, report: Report) -
     if not rest or rest[0] not in there:
         message = f"'{SET}' changes '{'.'.join(names)}', which the robot does not have"
         choices = there if section.name == names[0] else [*there, *settable()]
-        fix = in_section(names, root) or suggest(rest[0] if rest else "", choices, "a path begins with")
+        fix = in_section(names, root) or suggest(rest[0] if rest else "", choices, "a path starts with")
         report.add(NOTHING_TO_CHANGE.at(span, message, help=fix))
         return None
     return [section.name, *rest]

@@ -31,7 +31,7 @@ class Analyzer:
     timeout: float = DEFAULT_TIMEOUT
 
     def matches(self, name: str) -> bool:
-        """Tell whether the status called `name` belongs to this group."""
+        """Return whether the status called `name` belongs to this group."""
         parts = (name, _component(name))
         return any(_matches(parts, pattern) for pattern in (*self.match, *self.expected))
 
@@ -103,7 +103,7 @@ class Aggregator:
         return tuple(tree)
 
     def changed(self, now: float) -> bool:
-        """Tell whether the level of any group differs from the last report; before the first one it does."""
+        """Return whether the level of any group differs from the last report; before the first one it does."""
         return self._levels(now) != self._reported
 
     def top_level(self, now: float) -> Level:

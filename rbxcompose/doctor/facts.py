@@ -1,4 +1,4 @@
-"""What examinations look at, as data: collected before by who may open a bus and read the machine."""
+"""What examinations look at, as data: collected beforehand by code that may open a bus and read the machine."""
 
 from __future__ import annotations
 

@@ -58,5 +58,5 @@ def examine_all(facts: HostFacts) -> list[ExaminationResult]:
 
 
 def has_errors(answers: Sequence[ExaminationResult]) -> bool:
-    """Tell whether anything keeps a robot from running."""
+    """Return whether anything keeps a robot from running."""
     return any(one.level == Severity.ERROR.value for one in answers)

@@ -1,1 +1,1 @@
-"""Missions on a running robot: what they ask of it is done, several run beside each other, all can be watched."""
+"""Missions on a running robot: carries out their requests; several run side by side, all can be watched."""

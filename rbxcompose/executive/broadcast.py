@@ -28,7 +28,7 @@ class Broadcast:
         self._feeds = {name: MissionFeed(open_window(f"{PATH}/{name}", LookAtAll(name))) for name in names}
 
     def tell(self, missions: RunningMissions) -> None:
-        """Tell what has changed to those who watch; nothing is put together for nobody."""
+        """Send viewers what has changed; nothing is prepared without a viewer."""
         for name, one in missions.runs.items():
             self._feeds[name].tell(one)
 
@@ -42,7 +42,7 @@ class MissionFeed:
         self._told: dict[str, Any] = {}
 
     def tell(self, one: MissionRun) -> None:
-        """Tell what is new, if anybody listens and there is something."""
+        """Send what is new, if there is a subscriber and something new."""
         if not self._window.is_watched:
             return
         if one is not self._run:

@@ -41,7 +41,7 @@ class Errand:
         """Hold it as it is."""
 
     def resume(self) -> None:
-        """Go on."""
+        """Continue."""
 
     def next_look(self) -> float | None:
         """Return when it wants to be looked after [s]; None: it is told what happens."""
@@ -51,7 +51,7 @@ class Errand:
         """Look after it."""
 
     def end(self, result: Result) -> None:
-        """Tell how it ended."""
+        """Report how it ended."""
         if self._done is not None:
             done, self._done = self._done, None
             done(result)
@@ -59,14 +59,14 @@ class Errand:
 
     @property
     def is_over(self) -> bool:
-        """Tell whether it has ended or was halted."""
+        """Return whether it has ended or was halted."""
         return self._done is None
 
 
 class Waiting(Errand):
     """An errand that needs a server: it waits for one for a while."""
 
-    nobody: ClassVar[str] = "nobody serves"  # what is told of a server that is not there
+    nobody: ClassVar[str] = "nothing serves"  # what is told of a server that is not there
 
     def __init__(self, shell: Shell, done: WhenDone, name: str) -> None:
         super().__init__(shell, done)
@@ -93,7 +93,7 @@ class Waiting(Errand):
         self._shell.warn(f"{told}; waiting for up to {BACK_WITHIN:.0f} s")
 
     def next_look(self) -> float | None:
-        """Look after it while nobody is at it."""
+        """Look after it while no server works on it."""
         return None if self.is_sent else self._shell.now + LOOK_AGAIN
 
     def look(self) -> None:
@@ -139,7 +139,7 @@ class GoalErrand(Waiting):
         self._ask_to_pause(True)
 
     def resume(self) -> None:
-        """Let it go on; send it again if it is not there any more."""
+        """Let it continue; send it again if it is gone."""
         self._is_paused = False
         if self.is_sent:
             self._ask_to_pause(False)

@@ -62,7 +62,7 @@ class MissionRun:
 
     @property
     def is_over(self) -> bool:
-        """Tell whether it has ended, by itself or not."""
+        """Return whether it has ended, by itself or not."""
         return self.end is not None
 
     @property
@@ -89,7 +89,7 @@ class MissionRun:
         return True
 
     def reads(self, name: str) -> bool:
-        """Tell whether a new value of this name is worth a tick."""
+        """Return whether a new value of this name is worth a tick."""
         return not self.is_over and (self.engine.status == IDLE or name in self.engine.reads())
 
     def tick(self, now: float) -> None:
@@ -114,7 +114,7 @@ class MissionRun:
         self._do(logbook.PAUSE, lambda: self.engine.pause(now), now)
 
     def resume(self, now: float) -> None:
-        """Go on."""
+        """Continue."""
         self.is_paused = False
         self._do(logbook.RESUME, lambda: self.engine.resume(now), now)
 

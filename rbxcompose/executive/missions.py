@@ -1,4 +1,4 @@
-"""All missions of a robot: which run, whether another one may begin beside them, what people want of them."""
+"""All missions of a robot: which run, whether another one may start beside them, what users want of them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class RunningMissions:
         """
         program = self._program(name)
         if name in self.names:
-            raise Refused(f"mission {name} runs already")
+            raise Refused(f"mission {name} is already running")
         inputs = self._inputs(name, program, given)
         linked = link(program, self._equipment.names.missions)
         if clash := self._clash(linked):

@@ -53,7 +53,7 @@ class PythonErrand(Errand):
             self._safely(lambda: activity.pause(self._shell.now))
 
     def resume(self) -> None:
-        """Let the activity go on."""
+        """Let the activity continue."""
         self._is_paused, self._due = False, self._shell.now
         if (activity := self._activity) is not None:
             self._safely(lambda: activity.resume(self._shell.now))
@@ -91,7 +91,7 @@ class PythonErrand(Errand):
         if seconds > LONGEST and not self._is_told:
             self._is_told = True
             self._shell.warn(
-                f"the skill {self._declared.name} took {seconds * 1e3:.0f} ms in one call, and no mission went on: "
+                f"the skill {self._declared.name} took {seconds * 1e3:.0f} ms in one call and held up all missions: "
                 "make it an activity with shorter steps, or an action of a component"
             )
         return result

@@ -60,7 +60,7 @@ class PauseMission(_OfMission):
 
 @dataclass(frozen=True, slots=True)
 class ResumeMission(_OfMission):
-    """Go on with a mission that was held."""
+    """Resume a mission that was held."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,5 +133,5 @@ def settings(lines: Sequence[str]) -> Mapping[str, str]:
 def _setting(text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not name or not equals:
-        raise Refused(f"'{text}' is no NAME=VALUE")
+        raise Refused(f"'{text}' is not NAME=VALUE")
     return name, value

@@ -78,7 +78,7 @@ class Shell(Protocol):
         ...
 
     def info(self, text: str) -> None:
-        """Log an event of the robot's story."""
+        """Log an event."""
         ...
 
     def warn(self, text: str) -> None:

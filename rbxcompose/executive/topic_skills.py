@@ -1,4 +1,4 @@
-"""Skills that are topics: an order is a message, and another message may tell how it ended."""
+"""Skills that are topics: an order is a message, and another message may report how it ended."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Desks:
         return desk
 
     def told(self, port: str, message: Any) -> None:
-        """Take the end of an order; without an order nobody waits for it."""
+        """Take the end of an order; without an order nothing waits for it."""
         if port in self._desks:
             self._desks[port].told(message)
 
@@ -81,7 +81,7 @@ class Desks:
 class TopicErrand(Waiting):
     """An order on a topic."""
 
-    nobody = "nobody listens to"
+    nobody = "nothing subscribes to"
 
     def __init__(self, shell: Shell, done: WhenDone, desk: Desk, source: SkillSource, order: Any) -> None:
         super().__init__(shell, done, source.topic)
@@ -90,7 +90,7 @@ class TopicErrand(Waiting):
         self._sent_to: frozenset[bytes] = frozenset()
 
     def begin(self) -> None:
-        """Send the order, once no end of an earlier one can come any more; or wait for somebody who listens."""
+        """Send the order, once no end of an earlier one can come any more; or wait for a subscriber."""
         if self._source.orders.ends is not None:
             self._desk.take(self)
         self._begin_if_free()
@@ -98,7 +98,7 @@ class TopicErrand(Waiting):
             self.look_soon()
 
     def send(self) -> bool:
-        """Send it, if somebody listens who carries it out."""
+        """Send it, if there is a subscriber that carries it out."""
         sender: OrderSender[Any] = self._shell.bound[SKILL + self._source.skill.name]
         if not sender.listeners:
             return False
@@ -133,11 +133,11 @@ class TopicErrand(Waiting):
         if not self._source.skill.restartable:
             self.end(Result(False, GONE))
             return
-        self.wait(f"nobody listens to {self.name} any more", GONE)
+        self.wait(f"nothing subscribes to {self.name} any more", GONE)
         self.look_soon()
 
     def next_look(self) -> float | None:
-        """Look after it when it may be sent, and while nobody listens."""
+        """Look after it when it may be sent, and while there is no subscriber."""
         return super().next_look() if self._has_begun else max(self._desk.closed_until, self._shell.now)
 
     def look(self) -> None:
@@ -152,7 +152,7 @@ class TopicErrand(Waiting):
         self._shell.look_soon()
 
     def end(self, result: Result) -> None:
-        """Tell how it ended."""
+        """Report how it ended."""
         self._desk.leave(self)
         super().end(result)
 

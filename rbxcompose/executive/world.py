@@ -80,7 +80,7 @@ class RobotWorld:
         self._errands[leaf].pause()
 
     def resume(self, leaf: int, /) -> None:
-        """Let the skill of a leaf go on."""
+        """Let the skill of a leaf continue."""
         self._errands[leaf].resume()
 
     def say(self, event: MissionEvent, /) -> None:

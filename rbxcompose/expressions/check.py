@@ -271,7 +271,7 @@ class _Checker:
         )
 
     def is_measured(self, typed: _Typed) -> bool:
-        """Tell whether a value can be computed with, and say so if not."""
+        """Return whether a value can be computed with, and say so if not."""
         if typed.type != UNKNOWN and not typed.type.measure:
             self.wrong(typed.node, f"this must be a number; it is {typed.type.phrase}")
         return typed.type.measure is not None

@@ -71,7 +71,7 @@ def evaluate(expression: Expression, scope: Scope) -> Value:
 
 
 def holds(expression: Expression, scope: Scope) -> bool:
-    """Tell whether a condition holds, reading it from left to right until it is decided.
+    """Return whether a condition holds, reading it from left to right until it is decided.
 
     One that comes upon a value which has not arrived yet does not hold, not even under `not`.
 

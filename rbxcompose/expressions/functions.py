@@ -98,7 +98,7 @@ FUNCTIONS: Mapping[str, Function] = {
     "count": Function(1, 1, "count(list)", "How many items a list has, or entries a map.", _count),
     "age": Function(1, 1, "age($name)", "The time since the last message of a value."),
     "new": Function(
-        1, 1, "new($name)", "Whether a message came since its node started; in an interrupt, since that last acted."
+        1, 1, "new($name)", "Whether a message arrived since its node started; in an interrupt, since it last acted."
     ),
     "distance": Function(2, 2, "distance(a, b)", "The length between two places or poses.", _distance),
     "min": Function(1, _MANY, "min(a, b, ...)", "The smallest of several values, or of one list.", _least),

@@ -17,16 +17,16 @@ class Operator:
 
 
 OPERATORS: Sequence[Operator] = (
-    Operator(("or",), "One of two conditions; the second is asked only if the first does not hold.", "$a or $b"),
-    Operator(("and",), "Both conditions; the second is asked only if the first holds.", "$a and $b"),
+    Operator(("or",), "One of two conditions; the second is evaluated only if the first does not hold.", "$a or $b"),
+    Operator(("and",), "Both conditions; the second is evaluated only if the first holds.", "$a and $b"),
     Operator(("not",), "The opposite of a condition.", "not $is_open", is_prefix=True),
     Operator(
         ("<", "<=", ">", ">=", "==", "!=", "in", "not in"),
-        "Comparisons, of what has one dimension; not in chains. `in` asks for an item of a list or a key of a map.",
+        "Comparisons of values of one dimension; no chains. `in` looks for an item of a list or a key of a map.",
         "$battery < 30 %",
     ),
     Operator(
-        ("+", "-"), "Sum and difference of what has one dimension; `+` also joins texts and lists.", "$timeout + 5 s"
+        ("+", "-"), "Sum and difference of values of one dimension; `+` also joins texts and lists.", "$timeout + 5 s"
     ),
     Operator(("*", "/"), "Product and quotient; the dimensions are computed too.", "2 * 0.3 m/s"),
     Operator(("-",), "The negative of a number or quantity.", "-$offset", is_prefix=True),

@@ -207,13 +207,13 @@ class _Parser:
     def variable(self, token: Token) -> Variable:
         if not self.running:
             message = f"'${token.text}' is known only while the robot runs"
-            help_text = "'${...}' is filled in before: write a name without '$', such as 'args.speed'"
+            help_text = "'${...}' is filled in earlier: write a name without '$', such as 'args.speed'"
             raise ExpressionError(message, token.start, token.end, help_text)
         return Variable(token.start, token.end, token.text)
 
     def word(self, token: Token) -> Word:
         if token.text in _FOREIGN:
-            message = f"'{token.text}' has no meaning in an expression"
+            message = f"'{token.text}' means nothing in an expression"
             raise ExpressionError(message, token.start, token.end, _FOREIGN[token.text])
         return Word(token.start, token.end, token.text)
 

@@ -55,18 +55,18 @@ _VALUE = re.compile(r"""\s*(?!(?:and|or|in|not)\b)[$\w'"(\[]""")
 
 # What other languages have and this one has not; the longer ones first.
 _FOREIGN = {
-    "${": "'${...}' was filled in before; here write '$name', which is looked up while the robot runs",
+    "${": "'${...}' is filled in earlier; here write '$name', which is looked up while the robot runs",
     "$": "a name follows the '$', such as '$battery'",
     "&&": "write 'and'",
     "||": "write 'or'",
-    "**": "there is no power; multiply",
-    "^": "there is no power; multiply",
+    "**": "there is no power operator; multiply",
+    "^": "there is no power operator; multiply",
     "//": "write round(...) for whole numbers",
     "=": "write '==' to compare",
     "!": "write 'not'",
-    "%": "a percentage is written with its number, such as '30 %'; there is no remainder",
+    "%": "a percentage is written with its number, such as '30 %'; there is no remainder operator",
     "{": "a map cannot be written here",
-    "_": "names begin with a letter",
+    "_": "names start with a letter",
     "'": "the quote is not closed",
     '"': "the quote is not closed",
 }
@@ -117,4 +117,4 @@ def _unreadable(text: str, start: int) -> ExpressionError:
     foreign = next((symbol for symbol in _FOREIGN if text.startswith(symbol, start)), None)
     shown = foreign or text[start]
     fix = _FOREIGN[foreign] if foreign else ""
-    return ExpressionError(f"{shown!r} has no meaning in an expression", start, start + len(shown), fix)
+    return ExpressionError(f"{shown!r} means nothing in an expression", start, start + len(shown), fix)

@@ -1,4 +1,4 @@
-"""What kind of value an expression gives, known without its values; and what may stand for what."""
+"""What type of value an expression gives, known without its values; and which type fits where."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ _EQUAL_ACROSS = {frozenset({TypeKind.TEXT, TypeKind.PLACE}), frozenset({TypeKind
 
 
 def accepts(expected: Type, given: Type) -> bool:
-    """Tell whether a value of the type `given` may stand where `expected` is."""
+    """Return whether a value of the type `given` may stand where `expected` is."""
     if UNKNOWN in (expected, given):
         return True
     if expected.dimension:
@@ -125,7 +125,7 @@ def accepts(expected: Type, given: Type) -> bool:
 
 
 def are_comparable(one: Type, other: Type) -> bool:
-    """Tell whether it makes sense to ask if values of the two types are equal; poses never are, to the last digit."""
+    """Return whether it makes sense to ask if values of the two types are equal; poses never are, to the last digit."""
     if UNKNOWN in (one, other):
         return True
     if one.measure and other.measure:

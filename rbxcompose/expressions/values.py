@@ -70,7 +70,7 @@ class Scope(Protocol):
         ...
 
     def is_new(self, name: str) -> bool:
-        """Tell whether a message of `$name` came since this node started; KeyError if there is no such name."""
+        """Return whether a message of `$name` came since this node started; KeyError if there is no such name."""
         ...
 
 
@@ -93,12 +93,12 @@ class NotArrivedError(Exception):
 
 
 def is_number(value: Value) -> bool:
-    """Tell whether a value is a number; a flag is none."""
+    """Return whether a value is a number; a flag is none."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def is_same(one: Value, other: Value) -> bool:
-    """Tell whether two values are equal; a text equals the place of that name, a flag equals no number."""
+    """Return whether two values are equal; a text equals the place of that name, a flag equals no number."""
     if isinstance(one, str) != isinstance(other, str):
         text, thing = (one, other) if isinstance(one, str) else (other, one)
         return isinstance(thing, NamedPose) and thing.name == text

@@ -15,7 +15,7 @@ def _written(node: ExpressionNode) -> Number | None:
 
 
 def is_bare(node: ExpressionNode) -> bool:
-    """Tell whether a node is a number as written, without a unit."""
+    """Return whether a node is a number as written, without a unit."""
     number = _written(node)
     return number is not None and number.dimension == NUMBER
 

@@ -86,7 +86,7 @@ class PathAnswer:
             yield "" if index else "from", f"{source.name} {is_or_has} {plain(source.value)}{place}"
             for layer in reversed(source.below):
                 origin = Origin(layer.span, layer.name)
-                yield "", f"  in the place of {plain(layer.value or 'nothing')}  {origin.comment}"
+                yield "", f"  instead of {plain(layer.value or 'nothing')}  {origin.comment}"
         yield from self.hints
 
     def _layer_rows(self) -> Iterator[str]:

@@ -52,7 +52,7 @@ def _reason(each: Mapping[str, str]) -> str:
 
 
 def _place(robot: Robot, component: str, reason: Mapping[str, str | None]) -> str:
-    """Return where the new value stands, nothing where nobody wrote it."""
+    """Return where the new value stands, nothing where it is not written."""
     key = str(reason["key"])
     if component not in robot.components or reason["after"] is None:
         return ""

@@ -86,7 +86,7 @@ class DiagramWire:
 
     @property
     def is_pair(self) -> bool:
-        """Tell whether it leads from one box to one other."""
+        """Return whether it leads from one box to one other."""
         return len(self.sources) == len(self.targets) == 1
 
 
@@ -154,7 +154,7 @@ def _boxes(robot: Robot) -> Iterator[Box]:
 
 
 def _wires(robot: Robot) -> Iterator[DiagramWire]:
-    """Yield the wires by what they carry and by name; nothing is drawn that nobody uses."""
+    """Yield the wires by what they carry and by name; unused ones are not drawn."""
     found: dict[tuple[WireContent, str], _Open] = {}
     for component in robot.components.values():
         if component.name != MISSION:  # its missions are drawn in its place

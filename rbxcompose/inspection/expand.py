@@ -1,4 +1,4 @@
-"""The composed robot as one manifest, with the origin of each value behind it."""
+"""The composed robot as one manifest, with the origin of each value after it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def expand(manifest: RobotManifest, *, has_origins: bool = True) -> str:
 
 
 def expand_below(manifest: RobotManifest, path: KeyPath, root: MappingNode, defaults: Mapping[str, str]) -> str:
-    """Return what stands below `path`, with origins, and then the defaults of what nobody wrote there.
+    """Return what stands below `path`, with origins, and then the defaults of what is not written there.
 
     `root` is the map at `path`.
     """

@@ -124,7 +124,7 @@ def _second_line(wire: DiagramWire) -> str:
 def _told(wire: DiagramWire) -> str:
     """Return a wire in words."""
     lines = [f"{wire.kind} {wire.name}", wire.type, *([f"quality of service: {wire.qos}"] if wire.qos else [])]
-    lines += [f"from {_names(wire.sources) or wire.about or 'outside'}", f"to {_names(wire.targets) or 'nobody here'}"]
+    lines += [f"from {_names(wire.sources) or wire.about or 'outside'}", f"to {_names(wire.targets) or 'nothing here'}"]
     return "\n".join(lines)
 
 
@@ -171,7 +171,7 @@ def _tables(diagram: Diagram) -> Iterator[str]:
         yield f"<tr>{_cells(box.name, box.type, box.group, box.about)}</tr>"
     yield "</table></section><section><h2>Wires</h2><table><tr><th>kind<th>name<th>type<th>class<th>from<th>to</tr>"
     for wire in diagram.wires:
-        begin, end = _names(wire.sources) or wire.about or "outside", _names(wire.targets) or "nobody here"
+        begin, end = _names(wire.sources) or wire.about or "outside", _names(wire.targets) or "nothing here"
         cells = _cells(str(wire.kind), wire.name, wire.type, wire.qos, begin, end)
         yield f'<tr data-kind="{wire.kind}">{cells}</tr>'
     yield "</table></section>"

@@ -23,7 +23,7 @@ NO_GRAPHVIZ = kind(
     """Graphviz is not installed
 
 The pictures of `graph --format html`, and of machines in `mission show --format html`, are laid out by Graphviz, which
-robots do not need, so that it is an extra of its own: `pip install 'rbxcompose[graph]'`. `--format dot` and
+robots do not need; it is an extra: `pip install 'rbxcompose[graph]'`. `--format dot` and
 `--format mermaid` work without it.
 """,
 )

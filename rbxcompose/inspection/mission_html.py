@@ -36,7 +36,7 @@ def _page(picture: MissionPicture, statuses: Sequence[int]) -> Iterator[str]:
     yield from _box(picture.main, statuses)
     yield "</main>"
     if picture.interrupts:
-        yield '<h2>Interrupts, the first that holds comes first</h2><section class="interrupts">'
+        yield '<h2>Interrupts, in order of priority</h2><section class="interrupts">'
         for one in picture.interrupts:
             yield from _box(one, statuses)
         yield "</section>"

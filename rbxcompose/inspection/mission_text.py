@@ -1,4 +1,4 @@
-"""A mission as lines of text: one node each, below each other, with how each stands."""
+"""A mission as lines of text: one node per line, with its state."""
 
 from __future__ import annotations
 

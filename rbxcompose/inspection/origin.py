@@ -48,7 +48,7 @@ def origin_of(manifest: RobotManifest, path: KeyPath, node: TreeNode) -> Origin:
 
 
 def is_leaf(node: TreeNode) -> bool:
-    """Tell whether nothing stands below a node."""
+    """Return whether nothing stands below a node."""
     match node:
         case MappingNode(entries=entries):
             return not entries

@@ -17,9 +17,9 @@ from rbxcompose.sections.include import include
 
 NO_SUCH_PATH = kind(
     "RBX9011",
-    """`why` asks for what the robot does not have
+    """`why` asks for something that the robot does not have
 
-A path begins with a component, a mux or a section, as for `--set`; then come the keys, with dots between them. A
+A path starts with a component, a mux or a section, as for `--set`; then come the keys, with dots between them. A
 component is also followed by one of its ports.
 
 Bad: `rbxcompose why battery.runtme robots/turtlebot`
@@ -65,7 +65,7 @@ def found_at(manifest: RobotManifest, path: KeyPath) -> TreeNode | None:
 def no_such_path(robot: Robot, path: KeyPath, guide: Guide) -> Finding:
     """Return the finding for a path that leads nowhere, with what was probably meant at the first wrong name."""
     if path[0] == "profiles":
-        return NO_SUCH_PATH.at(None, "profiles have no value of their own", help="'--profile NAME' lays one on top")
+        return NO_SUCH_PATH.at(None, "profiles have no value of their own", help="'--profile NAME' applies one")
     length = next(n for n in range(1, len(path) + 1) if not is_known(robot.manifest, guide, path[:n]))
     above, name = path[: length - 1], str(path[length - 1])
     node = found_at(robot.manifest, above)
@@ -85,5 +85,5 @@ def no_such_path(robot: Robot, path: KeyPath, guide: Guide) -> Finding:
 
 
 def is_known(manifest: RobotManifest, guide: Guide, path: KeyPath) -> bool:
-    """Tell whether a path leads to something, or is a key that could be written where it stands."""
+    """Return whether a path leads to something, or is a key that could be written where it stands."""
     return found_at(manifest, path) is not None or str(path[-1]) in guide.keys(path[:-1])

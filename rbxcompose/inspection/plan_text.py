@@ -40,8 +40,8 @@ def _facts(plan: Plan) -> Iterator[tuple[str, str]]:
     yield "bus", f"domain {bus.domain}, {namespace}, wire format {bus.wire}"
     yield "router", router
     if plan.follows_clock:
-        yield "time", "follows /clock, which is told from outside"
-    yield "mission", f"{plan.start}, as soon as all is active" if plan.start else "none starts by itself"
+        yield "time", "follows /clock, which is published from outside"
+    yield "mission", f"{plan.start}, as soon as everything is active" if plan.start else "none starts by itself"
 
 
 def _options(instance: Instance) -> Iterator[str]:
@@ -49,7 +49,7 @@ def _options(instance: Instance) -> Iterator[str]:
     if instance.starts_after:
         yield f"after {', '.join(instance.starts_after)}"
     if instance.log is not Level.OK:
-        yield f"logs from {log_word(instance.log)} on"
+        yield f"logs {log_word(instance.log)} and above"
     if instance.restart != Restart():
         yield f"restarts: {instance.restart.when}, at most {instance.restart.max} within {instance.restart.within:g} s"
 

@@ -1,4 +1,4 @@
-"""Why a port of a component stands at its topic, and who is at the other end."""
+"""Why a port of a component has its topic, and what is at the other end."""
 
 from __future__ import annotations
 
@@ -71,5 +71,5 @@ def _others(robot: Robot, end: PortEnd) -> tuple[str, str]:
     names = [
         f"{one.instance}.{one.name}" for one in robot.ends if one.topic == end.topic and isinstance(one.port, other)
     ]
-    outside = "whoever is outside" if isinstance(end.port, In) and end.port.is_open else "nobody here"
+    outside = "anything outside" if isinstance(end.port, In) and end.port.is_open else "nothing here"
     return words, ", ".join(names) or outside

@@ -1,4 +1,4 @@
-"""Why a value of the robot is what it is: who wrote it, whom it took the place of, what it means."""
+"""Why a value of the robot is what it is: where it is written, what it replaced, what it means."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def _argument(manifest: RobotManifest, name: str, scope: str) -> Iterator[Argume
 
 
 def _unwritten(robot: Robot, guide: Guide, path: KeyPath) -> PathAnswer | None:
-    """Return what holds for a key that exists and that nobody wrote."""
+    """Return what holds for a key that exists but is not written."""
     if given := _input(robot, path):
         return _unwritten_input(path, given)
     if not all(is_known(robot.manifest, guide, path[:length]) for length in range(1, len(path) + 1)):
@@ -214,7 +214,7 @@ def _default(value: object) -> str:
 
 
 def _defaults(guide: Guide, path: KeyPath, node: MappingNode) -> Iterator[tuple[str, str]]:
-    """Yield the keys of a map that nobody wrote and that have a default, with that."""
+    """Yield the keys of a map that are not written and have a default, with that."""
     for key in guide.keys(path):
         if key not in node and (default := _default(guide.value((*path, key)).default)):
             yield key, default

@@ -125,7 +125,7 @@ def _of_value(spot: Spot, path: tuple[str | int, ...]) -> Iterator[CompletionIte
 
 
 def _is_expression(value: GuidedValue) -> bool:
-    """Tell whether places may be compared here."""
+    """Return whether places may be compared here."""
     return value.dimension is None and not value.words
 
 

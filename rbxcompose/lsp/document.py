@@ -31,12 +31,12 @@ class Document:
 
     @property
     def is_mission(self) -> bool:
-        """Tell whether names are looked up while the robot runs."""
+        """Return whether names are looked up while the robot runs."""
         return self.kind == MISSION
 
     @property
     def is_overlay(self) -> bool:
-        """Tell whether its sections change those of a robot."""
+        """Return whether its sections change those of a robot."""
         return self.kind == OVERLAY
 
     def at(self, line: int, column: int) -> Spot | None:

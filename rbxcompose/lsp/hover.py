@@ -1,4 +1,4 @@
-"""What is known of what stands at a position, as Markdown."""
+"""What is known about the text at a position, as Markdown."""
 
 from __future__ import annotations
 

@@ -10,14 +10,14 @@ from pathlib import Path
 from rbxcompose.lsp.project import FoundByFile, OutdatedError, Project
 from rbxcompose.schema.documents import MAKERS, installed_schema
 
-PAUSE = 0.1  # [s] without a key stroke before robots are compiled anew
+PAUSE = 0.1  # [s] without a key stroke before robots are compiled again
 
 
 class Newest:
     """The project as it was compiled last, and the texts that have changed since.
 
     A thread works on a copy of the project, which takes the project's place when it is done. A text that comes
-    meanwhile makes that outdated: it ends at the next robot, and the work begins anew with all texts. So what is
+    meanwhile makes that outdated: it ends at the next robot, and the work starts again with all texts. So what is
     `told` is always of the newest texts. All methods belong to the thread of the event loop.
     """
 
@@ -36,11 +36,11 @@ class Newest:
             self._thread.submit(installed_schema, kind)
 
     def has(self, path: Path) -> bool:
-        """Tell whether the editor's text of a file counts in place of the saved one."""
+        """Return whether the editor's text of a file counts in place of the saved one."""
         return self._waiting.get(path) is not None or (path in self.project.unsaved and path not in self._waiting)
 
     def is_compiled(self, path: Path, text: str) -> bool:
-        """Tell whether the project was compiled with this text of a file."""
+        """Return whether the project was compiled with this text of a file."""
         return not self._waiting and self.project.text(path) == text
 
     def change(self, path: Path, text: str | None, pause: float = 0.0) -> None:

@@ -58,7 +58,7 @@ class Project:
         return Project(self.environment, dict(self.unsaved), is_outdated, dict(self._watched), dict(self._alone))
 
     def has(self, path: Path, text: str) -> bool:
-        """Tell whether a text is one of ours: editors send every YAML file."""
+        """Return whether a text is one of ours: editors send every YAML file."""
         return _HEADER.search(text[:_BEGINNING]) is not None or bool(self._concerned(path))
 
     def text(self, path: Path) -> str:

@@ -1,4 +1,4 @@
-"""The language server: hands what an editor asks to the core, over stdin and stdout."""
+"""The language server: passes requests of an editor to the core, over stdin and stdout."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class Session:
         return self.convert.location(span) if span else None
 
     def hover(self, params: types.HoverParams) -> types.Hover | None:
-        """Tell what something is."""
+        """Say what something is."""
         document = self.document(params.text_document.uri)
         text = describe(document, *self.convert.position(document.text, params.position)) if document else ""
         return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, text)) if text else None

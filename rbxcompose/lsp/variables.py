@@ -13,7 +13,7 @@ from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.program.program import Program
 from rbxcompose.references import ARGUMENT
 
-_FILLS = {"robot.name": "name of the robot", "sim": "true in simulation", "env.": "a variable of the environment"}
+_FILLS = {"robot.name": "name of the robot", "sim": "true in simulation", "env.": "an environment variable"}
 _FILLS |= {"secret.": "a secret, from a file of its own or the environment; it is never shown"}
 
 

@@ -34,7 +34,7 @@ class ArgumentModel(Config):
     type: str = Field(json_schema_extra={"enum": [*TYPES, CHOICE]})
     """What it is: a dimension, `count`, `number`, `text`, `flag`, `place`, `pose`, `choice`, `list` or `map`."""
     default: Any = None
-    """Its value if nobody gives one."""
+    """Its value if none is given."""
     min: Any = None
     """Smallest value; for quantities, counts and numbers."""
     max: Any = None
@@ -78,7 +78,7 @@ def read_argument(name: str, node: TreeNode, path: KeyPath, report: Report) -> D
     for key in ("min", "max"):
         if (bound := node.get(key)) is not None:
             if declared.measure is None:
-                report.add(WRONG_TYPE.at(key_span(node, (key,)), f"'{key}' has no meaning for {declared.phrase}"))
+                report.add(WRONG_TYPE.at(key_span(node, (key,)), f"'{key}' does not apply to {declared.phrase}"))
                 continue
             bounds[key] = read_value(bound, declared, key, report)
     return DeclaredArgument(name, declared, node.get("default"), bounds.get("min"), bounds.get("max"))

@@ -32,4 +32,4 @@ def without_brackets(node: TreeNode | None) -> list[tuple[str, int]]:
 def bracketed(node: ScalarNode) -> tuple[str, Fix]:
     """Return the help for a text that lacks the brackets of a list, and its fix."""
     meant = f"[{', '.join(text for text, _ in without_brackets(node))}]"
-    return f"a list has brackets: write '{meant}'", replacement(node.span, node.text, meant)
+    return f"a list needs brackets: write '{meant}'", replacement(node.span, node.text, meant)

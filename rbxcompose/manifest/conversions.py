@@ -1,4 +1,4 @@
-"""What a strict field takes and YAML cannot write, made of what was read."""
+"""What a strict field takes and YAML cannot write, converted from what was read."""
 
 from __future__ import annotations
 

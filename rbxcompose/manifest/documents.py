@@ -16,7 +16,7 @@ from rbxcompose.manifest.validate import validate
 
 OTHER_KIND = kind(
     "RBX1304",
-    """Another kind of manifest
+    """The wrong kind of manifest
 
 Every manifest says what it describes: `kind: Robot`, `kind: Mission` and so on. This file is not what is needed here.
 
@@ -77,8 +77,9 @@ class Documents:
 def _trouble(root: TreeNode, wanted: str) -> Finding | None:
     """Return why a document is not of the kind that is wanted."""
     if not isinstance(root, MappingNode):
-        return OTHER_KIND.at(root.span, "a manifest is a map that begins with 'rbx: 1' and 'kind:'")
+        return OTHER_KIND.at(root.span, "a manifest is a map that starts with 'rbx: 1' and 'kind:'")
     written = root.get("kind")
     if not isinstance(written, ScalarNode) or written.text == wanted:
         return None
-    return OTHER_KIND.misspelt(written.span, f"this is no {wanted}", written.text, [wanted], "what is needed")
+    message = f"this is not a manifest of kind {wanted}"
+    return OTHER_KIND.misspelt(written.span, message, written.text, [wanted], "the kind needed here")

@@ -1,4 +1,4 @@
-"""The keys of each kind of manifest that is made of sections."""
+"""The keys of each kind of manifest that consists of sections."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
 
 FILES = {
-    ROBOT: "A robot: what it is made of and how that is connected.",
-    PART: "Something that robots are made of: sections of a robot with arguments of their own.",
+    ROBOT: "A robot: its components and how they are connected.",
+    PART: "A part of robots: sections of a robot with arguments of their own.",
     OVERLAY: "Changes to a robot, given by `-f FILE`.",
 }
 

@@ -12,10 +12,10 @@ from rbxcompose.printable import plain
 
 OUTSIDE = kind(
     "RBX1306",
-    """A path that leads out of the project
+    """A path outside the project
 
-A robot's files lie together: below the nearest folder that holds `robots/` or `missions/`, or in the shipped library
-(`rbx:...`). A path may not leave it, not by `..`, and not by a link.
+A robot's files are together: below the nearest folder with `robots/` or `missions/`, or in the shipped library
+(`rbx:...`). A path may not leave it, neither by `..` nor by a link.
 
 Bad:
 ```yaml
@@ -54,7 +54,7 @@ def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
     """Return the file that a manifest names, or the finding that says why it may not or cannot."""
     path = _absolute(written, writer.resolve().parent)
     if path is None or not any(path.is_relative_to(root) for root in (project_of(writer), library_root())):
-        message, folder = f"'{plain(written)}' leads out of the project", plain(shown_name(project_of(writer)))
+        message, folder = f"'{plain(written)}' is outside the project", plain(shown_name(project_of(writer)))
         where = f"'{folder}'" if folder != "." else "this folder"
         return OUTSIDE.at(span, message, help=f"the project is {where}: move the file there, or use what 'rbx:' has")
     return path if path.is_file() else _missing(written, path, span, writer)
@@ -64,7 +64,7 @@ def find(written: str) -> Path | Finding:
     """Return the file that a command names: a manifest, a robot's folder, or `rbx:...`."""
     path = _absolute(written, Path.cwd())
     if path is None:
-        return OUTSIDE.at(None, f"'{plain(written)}' leads out of the library")
+        return OUTSIDE.at(None, f"'{plain(written)}' is outside the library")
     return path if path.is_file() else _missing(written, path, None)
 
 
@@ -83,7 +83,7 @@ def _absolute(written: str, folder: Path) -> Path | None:
 
 def _missing(written: str, path: Path, span: Span | None, writer: Path | None = None) -> Finding:
     if os.path.lexists(path):  # a pipe, a device, a link to what is not there
-        return UNREADABLE.at(span, f"'{plain(written)}' is no regular file")
+        return UNREADABLE.at(span, f"'{plain(written)}' is not a regular file")
     if writer is not None and (namesakes := files_named(path.name, writer)):
         message, help_text = f"'{plain(written)}' does not exist", " or ".join(f"'{one}'" for one in namesakes)
         return UNREADABLE.at(span, message, help=f"did you mean {help_text}?")

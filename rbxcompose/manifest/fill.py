@@ -32,7 +32,7 @@ SYNTAX = kind(
     "RBX1201",
     """`${...}` that cannot be read
 
-Between `${` and `}` stands a name or an expression.
+Between `${` and `}` there must be a name or an expression.
 
 Bad:
 ```yaml
@@ -48,7 +48,7 @@ UNKNOWN_NAME = kind(
     "RBX1202",
     """Unknown name in `${...}`
 
-What can be filled in: `args.NAME`, `robot.name`, `sim`, `env.NAME`. What is known only while the robot runs, such as
+You can fill in `args.NAME`, `robot.name`, `sim`, `env.NAME`. What is known only while the robot runs, such as
 `$battery`, has no braces and belongs in missions.
 
 Bad:
@@ -80,7 +80,7 @@ speed: ${args.speed + 0.1 m/s}
 )
 ENVIRONMENT = kind(
     "RBX1204",
-    """A variable of the environment is not set
+    """An environment variable is not set
 
 `${env.NAME}` needs the variable; `${env.NAME:-default}` does without; `${env.NAME:?why}` says why it is needed.
 
@@ -98,8 +98,8 @@ NOT_RUNNING = kind(
     "RBX1205",
     """`$name` where `${...}` belongs
 
-A robot's file is put together before the robot runs: what is to be filled in has braces. `$name` is looked up while
-the robot runs and belongs in missions. A dollar is written `$$`.
+A robot's file is composed before the robot runs: values to fill in have braces. `$name` is looked up while the robot
+runs and belongs in missions. Write a dollar as `$$`.
 
 Bad:
 ```yaml
@@ -115,10 +115,10 @@ speed: ${args.speed}
 
 SECRET = kind(
     "RBX1207",
-    """A secret that cannot be had
+    """A secret that is not available
 
 `${secret.NAME}` is the text in the file `secrets/NAME` of the project, which only its owner may read (mode 0600), or in
-the variable `RBX_SECRET_NAME` of the environment.
+the environment variable `RBX_SECRET_NAME`.
 
 Bad: `${secret.token}` without the file `secrets/token`.
 Good: `mkdir -p secrets; cat > secrets/token; chmod 600 secrets/token`
@@ -126,10 +126,10 @@ Good: `mkdir -p secrets; cat > secrets/token; chmod 600 secrets/token`
 )
 SHOWN_SECRET = kind(
     "RBX1208",
-    """A secret where it would be shown
+    """A secret in a place that is shown
 
-A secret stands alone, as the value of a component's setting that takes one. Names, texts and missions are shown and
-logged, so that they cannot hold it.
+A secret must be the whole value of a component's setting that takes one. Names, texts and missions are shown and
+logged, so they cannot contain it.
 
 Bad:
 ```yaml
@@ -195,12 +195,12 @@ class _Filler:
             return self.within(scalar, self.where_given(_typed(scalar, values[pieces[0]]), pieces[0]))
         for piece, value in values.items():
             if isinstance(value, Secret):
-                broken = self.shown_secret(scalar, piece, "a secret cannot stand inside a text")
+                broken = self.shown_secret(scalar, piece, "a secret cannot be part of a text")
                 return replace(scalar, filled=broken)
         for piece, value in values.items():
             if isinstance(value, SequenceNode | tree.MappingNode):
                 span = part_span(scalar, piece.start(), piece.end())
-                message = f"{describe(to_plain(value)).removeprefix('this is ')} cannot stand inside a text"
+                message = f"{describe(to_plain(value)).removeprefix('this is ')} cannot be part of a text"
                 self.report.add(WRONG_OPERATION.at(span, message))
                 return replace(scalar, filled=BROKEN)
         parts, position = [], 0
@@ -252,8 +252,8 @@ class _Filler:
     def running_name(self, scalar: ScalarNode, piece: re.Match[str]) -> object:
         name = piece["name"].rstrip(".")
         known = [key for key in self.known if name in (key, key.removeprefix("args."))]
-        help_text = f"write '${{{known[0]}}}'" if known else "what is filled in has braces; a dollar is written '$$'"
-        message = f"'${plain(name, 60)}' is looked up while the robot runs, and this is filled in before"
+        help_text = f"write '${{{known[0]}}}'" if known else "use braces to fill in a value; write '$$' for a dollar"
+        message = f"'${plain(name, 60)}' is looked up while the robot runs, but this is filled in earlier"
         span = part_span(scalar, piece.start(), piece.start() + 1 + len(name))
         fix = replacement(span, f"${name}", f"${{{known[0]}}}") if known else None
         self.report.add(NOT_RUNNING.at(span, message, help=help_text, fix=fix))
@@ -268,13 +268,13 @@ class _Filler:
             return _FromEnvironment(rest)
         why = plain(rest) if mode and rest else ""
         span = part_span(scalar, piece.start(), piece.end())
-        message = f"the variable '{name}' of the environment is not set"
+        message = f"the environment variable '{name}' is not set"
         self.report.add(ENVIRONMENT.at(span, message, label=why, help=f"set it, or write '${{env.{name}:-DEFAULT}}'"))
         return BROKEN
 
     def secret(self, scalar: ScalarNode, piece: re.Match[str], name: str) -> object:
         if piece.group() != scalar.text:
-            return self.shown_secret(scalar, piece, "a secret cannot stand inside a text")
+            return self.shown_secret(scalar, piece, "a secret cannot be part of a text")
         if self.names.secrets is None:
             return self.shown_secret(scalar, piece, "a mission cannot hold a secret: what it does is logged")
         try:
@@ -302,7 +302,8 @@ class _Filler:
             return known[expression.text.strip()].value
         if secret := next((word for word in expression.words if isinstance(known[word.name].value, Secret)), None):
             span = part_span(scalar, offset + secret.start, offset + secret.end)
-            self.report.add(SHOWN_SECRET.at(span, "nothing can be computed with a secret", help="it stands alone"))
+            message = "nothing can be computed with a secret"
+            self.report.add(SHOWN_SECRET.at(span, message, help="a secret must stand alone"))
             return BROKEN
         type_, problems = check(expression, NameTypes(known))
         for problem in problems:
@@ -319,10 +320,10 @@ class _Filler:
 
     def name_help(self, name: str) -> str:
         if name.startswith("env."):
-            return "a variable of the environment stands alone: '${" + name + "}'"
+            return "an environment variable must stand alone: '${" + name + "}'"
         if name.startswith("secret."):
-            return "a secret stands alone: '${" + name.lower() + "}'"
-        fix = suggest(name, self.known, "what can be filled in")
+            return "a secret must stand alone: '${" + name.lower() + "}'"
+        fix = suggest(name, self.known, "names that can be filled in")
         if self.runs and not fix.startswith("did you mean"):
             return f"what is known while the robot runs is written '${name}'"
         return fix

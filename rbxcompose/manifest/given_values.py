@@ -1,4 +1,4 @@
-"""Values that an argument was given: a mistake in one is told where it was given, not where the argument is used."""
+"""Values given to an argument: an error in one is reported where it was given, not where the argument is used."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def told_where_given(finding: Finding) -> Finding:
     related = [one for other in finding.related for one in _plain(other)]
     if not isinstance(finding.span, GivenSpan):
         return finding if related == list(finding.related) else replace(finding, related=_once(related))
-    uses = [Related(use, "handed on here") for use in finding.span.uses[:-1]]
+    uses = [Related(use, "passed on here") for use in finding.span.uses[:-1]]
     uses += [Related(use, "used here") for use in finding.span.uses[-1:]]
     return replace(finding, span=Span(*finding.span), related=_once([*uses, *related]))
 

@@ -1,4 +1,4 @@
-"""The keys that every manifest begins with."""
+"""The keys at the start of every manifest."""
 
 from __future__ import annotations
 
@@ -15,6 +15,6 @@ class ManifestHeader(Config):
     kind: str
     """What this file describes: `Robot`, `Part`, `Overlay`, `Mission` or `Test`."""
     name: Name
-    """Its name: small letters, digits and underscores."""
+    """Its name: lower-case letters, digits and underscores."""
     about: str = ""
     """What it is for, in a sentence."""

@@ -1,4 +1,4 @@
-"""How large a manifest may be: what lies above is a finding before it costs time or memory."""
+"""How large a manifest may be: anything above is a finding before it costs time or memory."""
 
 FILE_BYTES = 2_000_000
 URDF_BYTES = 4_000_000

@@ -9,7 +9,7 @@ from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 
 
 def is_moderate(section: TreeNode | None, what: str, report: Report) -> bool:
-    """Tell whether each entry of a section holds no more than a mission takes, after a finding for each that does."""
+    """Return whether each entry of a section holds no more than a mission takes, after a finding for each that does."""
     entries = section.entries.values() if isinstance(section, MappingNode) else ()
     large = [entry for entry in entries if is_larger(entry.value, DATA_NODES)]
     for entry in large:

@@ -23,16 +23,16 @@ RestartModel = Annotated[Restart, BeforeValidator(_spelt_out, json_schema_input_
 
 
 class ComponentOptions(Config):
-    """What every component takes beside its own configuration."""
+    """What every component takes besides its own configuration."""
 
     process: Name | None = None
-    """Its process group; what shares a group shares a process."""
+    """Its process group; components of one group share a process."""
     starts_after: tuple[ComponentName, ...] = ()
-    """Components that are active before this one."""
+    """Components that must be active before this one starts."""
     restart: RestartModel = DEFAULT
-    """When it is tried again after a failure: a word, or a map with `when`, `max`, `within` and `backoff`."""
+    """When it restarts after a failure: a word, or a map with `when`, `max`, `within` and `backoff`."""
     log: Literal["info", "warn", "error"] = "info"
-    """The least level of what it writes to the log."""
+    """The lowest level that it logs."""
     connect: dict[Annotated[Name, Refers(OWN_PORT, is_told=True)], TopicName] = {}
     """Topics by port, where they differ from the port's name."""
 

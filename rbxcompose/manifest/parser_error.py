@@ -1,4 +1,4 @@
-"""One error of the YAML parser with the text around it: what those who explain it look at."""
+"""One error of the YAML parser with the text around it, for those that explain it."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ QUOTES_NEEDED = kind(
     "RBX1101",
     """Text that needs quotes
 
-Some characters mean something to YAML: a colon with a space behind it, ` #`, and a quote, `>`, `|`, `@`, `%`, `*`, `&`
-or `!` at the beginning; inside `{}` and `[]` also commas and brackets. Text that holds one of them stands in quotes.
+Some characters have a meaning in YAML: a colon followed by a space, ` #`, and a quote, `>`, `|`, `@`, `%`, `*`, `&`
+or `!` at the beginning; inside `{}` and `[]` also commas and brackets. Text with one of them needs quotes.
 
 Bad:
 ```yaml
@@ -31,7 +31,7 @@ NOT_YAML = kind(
     "RBX1102",
     """Not valid YAML
 
-The file cannot be read from the marked place on. Usually a bracket, a quote, a colon or the indentation is wrong there
+The file cannot be read beyond the marked place. Usually a bracket, a quote, a colon or the indentation is wrong there
 or just above.
 
 Bad:
@@ -45,7 +45,7 @@ match: [battery, charger]
 """,
     is_fixable=True,
 )
-QUOTE_HELP = "put quotes round this"
+QUOTE_HELP = "put quotes around this"
 
 _BEHIND_KEY = re.compile(r"\s*+(- +)*+[^\s:][^:]*+: +")
 _DASHES = re.compile(r" *+(- ++)*")
@@ -112,7 +112,7 @@ class Trouble:
         return next((one for one in self.lines[line + 1 :] if is_written(one)), "")
 
     def quoting(self, span: Span) -> Fix | None:
-        """Return the fix that puts quotes round a text that goes to the end of its line, if that is all of it."""
+        """Return the fix that puts quotes around a text that goes to the end of its line, if that is all of it."""
         written = self.line_text[span.column - 1 : span.end_column - 1]
         meant = written
         if written[:1] == written[-1:] == "'":
@@ -138,5 +138,5 @@ def behind_dashes(line: str) -> int:
 
 
 def is_written(line: str) -> bool:
-    """Tell whether a line holds more than a comment."""
+    """Return whether a line holds more than a comment."""
     return bool(line.strip()) and not line.lstrip().startswith("#")

@@ -1,4 +1,4 @@
-"""Reading a manifest: bytes -> text -> located tree, with every mistake as a finding."""
+"""Reading a manifest: bytes -> text -> located tree, with every error as a finding."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ UNREADABLE = kind(
     "RBX1301",
     """A file cannot be read
 
-The file does not exist, may not be read, or is no regular file. Paths are relative to the file that writes them.
+The file does not exist, cannot be read, or is not a regular file. Paths are relative to the file that writes them.
 
 Bad:
 ```yaml
@@ -104,7 +104,7 @@ def _saved(path: Path, shown: str, most: int) -> bytes | Finding:
         with open_regular(path) as file:
             return file.read(most + 1)
     except NotRegularError:
-        return UNREADABLE.at(None, f"'{shown}' is no regular file")
+        return UNREADABLE.at(None, f"'{shown}' is not a regular file")
     except OSError as error:
         is_missing = error.errno == errno.ENOENT
         reason = "does not exist" if is_missing else f"cannot be read: {os.strerror(error.errno or 0)}"
@@ -142,7 +142,7 @@ def read_text(text: str | bytes, file: str) -> tuple[TreeNode | None, list[Findi
     if failure:
         return None, [failure]
     if root is None:
-        return None, [NOT_YAML.at(Span(file, 1, 1, 1, 2), "there is nothing in this file")]
+        return None, [NOT_YAML.at(Span(file, 1, 1, 1, 2), "this file is empty")]
     walk = Walk(text, file)
     node = walk.node(root)
     return node, walk.findings
@@ -151,7 +151,7 @@ def read_text(text: str | bytes, file: str) -> tuple[TreeNode | None, list[Findi
 def _trouble_in_characters(text: str, file: str) -> Iterator[Finding]:
     """Find what must not reach the parser: it would stop there with a byte position, or pass it."""
     if found := FORBIDDEN.search(text):
-        message = f"a manifest may not hold the character {code_point(found.group())}"
+        message = f"a manifest may not contain the character {code_point(found.group())}"
         yield CHARACTER.at(_character_span(text, found.start(), file), message, help="remove it")
     tab = text.find("\t")
     if tab >= 0:
@@ -159,12 +159,12 @@ def _trouble_in_characters(text: str, file: str) -> Iterator[Finding]:
         lines = sum("\t" in line for line in text.split("\n"))
         label = f"and {lines - 1} more {'line' if lines == 2 else 'lines'}" if lines > 1 else ""
         help_text = r'use spaces (in text with double quotes a tab is written "\t")'
-        message, fix = "there is a tab here, and a manifest has none", _spaces_for_tabs(text, file)
+        message, fix = "there is a tab here; manifests have no tabs", _spaces_for_tabs(text, file)
         yield CHARACTER.at(span, message, label=label, help=help_text, fix=fix)
     for number, line in enumerate(text.split("\n"), 1):
         if line.startswith("%"):
             span = Span(file, number, 1, number, len(line) + 1)
-            yield NOT_YAML.at(span, "a manifest has no lines that begin with '%'", help="remove this line")
+            yield NOT_YAML.at(span, "a manifest has no lines that start with '%'", help="remove this line")
         if line.strip() and not line.lstrip().startswith("#"):
             return  # directives stand before everything else
 

@@ -51,12 +51,12 @@ class Secrets:
                     raise NoSecretError(f"others may read the secret in '{shown}'", f"chmod 600 {shown}")
                 data = file.read(SECRET + 1)
         except NotRegularError:
-            message = f"'{shown}' is no regular file"
+            message = f"'{shown}' is not a regular file"
             raise NoSecretError(message, f"put the secret into the file '{shown}'") from None
         except OSError as error:
             is_missing = error.errno in (errno.ENOENT, errno.ENOTDIR)
             reason = "does not exist" if is_missing else f"cannot be read: {os.strerror(error.errno or 0)}"
-            message = f"the secret '{name}' is not there: the file '{shown}' {reason}"
+            message = f"the secret '{name}' is not available: the file '{shown}' {reason}"
             raise NoSecretError(
                 message, f"put it into '{shown}' with mode 0600, or into the variable {VARIABLE}{name.upper()}"
             ) from None

@@ -123,7 +123,7 @@ class Declaration(Generic[M]):
 
     @property
     def is_map(self) -> bool:
-        """Tell whether its keys are names that the user gives."""
+        """Return whether its keys are names that the user gives."""
         return bool(self.names) and not self.at
 
     def types_of(self, entry: TreeNode) -> Iterable[Any]:
@@ -133,11 +133,11 @@ class Declaration(Generic[M]):
         return self.models(entry) if self.models else (self.model,)
 
     def has_names_of(self, kind: str) -> bool:
-        """Tell whether its keys are names of a kind; what runs is a component as well."""
+        """Return whether its keys are names of a kind; what runs is a component as well."""
         return kind == self.names or (kind == COMPONENT and self.runs)
 
     def is_shared(self, path: KeyPath) -> bool:
-        """Tell whether several parts may add to the map at a path below it."""
+        """Return whether several parts may add to the map at a path below it."""
         patterns = self.shared if self.shared is not None else [()] if self.is_map else []
         return any(
             len(pattern) == len(path) and all(one in (ANY, key) for one, key in zip(pattern, path, strict=True))
@@ -285,7 +285,7 @@ class Reading(Generic[M]):
 
 
 def is_empty(node: TreeNode) -> bool:
-    """Tell whether there is nothing behind the name of a section."""
+    """Return whether there is nothing behind the name of a section."""
     return isinstance(node, ScalarNode) and node.plain and not node.text
 
 
@@ -295,7 +295,7 @@ def named_entries(root: MappingNode, path: tuple[str, ...], report: Report) -> I
     if node is None or is_empty(node):
         return
     if not isinstance(node, MappingNode):
-        message = f"'{path[-1]}' must be a map from names to what they are"
+        message = f"'{path[-1]}' must be a map of named entries"
         report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
         return
     for name, entry in node.entries.items():

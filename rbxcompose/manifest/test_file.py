@@ -1,4 +1,4 @@
-"""The file of a test as types: the shape of what stands in it; what the names mean is told by the robot."""
+"""The file of a test as types: the shape of its contents; what the names mean depends on the robot."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class TrialFile(ManifestHeader):
     mission: Any = None
     """The mission that is tested, by the name that it has in the robot."""
     with_: Any = Field(None, alias="with")
-    """Values of its inputs, by name, in the place of those that the robot gives."""
+    """Values of its inputs, by name, instead of those of the robot."""
     mocks: Any = None
-    """Skills and services that the test answers itself, by name; all others run as they are."""
+    """Skills and services that the test answers itself, by name; all others run for real."""
     events: Any = None
     """What happens to the robot from outside, and when."""
     expect: Any = None
@@ -43,18 +43,18 @@ class TrialFile(ManifestHeader):
 
 
 class MockModel(Config):
-    """How the test answers in the place of a skill or a service."""
+    """How the test answers instead of a skill or a service."""
 
     takes: Time = Field(0.0, ge=0)
     """How long each call takes."""
     result: Name = "success"
     """How calls end: `success`, `failure`, or an outcome that the skill declares."""
     message: str = ""
-    """The reason that is told with a failure."""
+    """The reason given for a failure."""
     sets: dict[Name, Any] = {}
     """Values that are set when a call has succeeded, by expressions that also see the arguments of the call."""
     fails_at: tuple[Annotated[int, Field(ge=1)], ...] = ()
-    """Which calls fail, counted from 1; one that was halted is not counted."""
+    """Which calls fail, counted from 1; halted calls do not count."""
     fails_for: tuple[Any, ...] = ()
     """Values of the main argument for which calls fail."""
     outcome_at: dict[CallNumber, Name] = {}
@@ -71,7 +71,7 @@ class SentModel(Config):
 
 
 class EventModel(Config):
-    """Something that happens to the robot; several things of one instant happen in the order of the text."""
+    """Something that happens to the robot; events of one instant happen in the order of the text."""
 
     at: Time = Field(ge=0)
     """When, counted from the start of the test."""
@@ -86,28 +86,28 @@ class EventModel(Config):
     pause: TrueOnly = False
     """The mission is paused."""
     resume: TrueOnly = False
-    """The mission goes on."""
+    """The mission continues."""
 
 
 class ExpectModel(Config):
     """What must have happened."""
 
     outcome: Name | None = None
-    """How the mission ends: `success`, `failure`, an end of its own, or `running`, together with `for`."""
+    """How the mission ends: `success`, `failure`, an end of its own, or `running` together with `for`."""
     for_: Time | None = Field(None, gt=0, le=LONGEST_TEST, alias="for")
     """How long it is watched, an hour at most."""
     steps: tuple[Any, ...] = ()
-    """What is done, in this order; other steps may lie between."""
+    """Steps in this order; others may come between."""
     never: tuple[Any, ...] = ()
-    """Steps that are not done."""
+    """Steps that must not happen."""
     count: dict[Name, int] = {}
-    """How often a step is begun, by its name."""
+    """How often a step starts, by its name."""
     data: dict[Name, Any] = {}
     """Values of the mission's data at the end."""
     published: tuple[SentModel, ...] = ()
-    """Messages that it publishes, in this order; only the fields that are written count."""
+    """Messages that it publishes, in this order; only the fields listed count."""
     reports: tuple[str, ...] = ()
-    """Texts that stand in what it logs or reports."""
+    """Texts that are part of what it logs or reports."""
 
 
 def _in_full(value: object) -> object:

@@ -106,7 +106,7 @@ def size(node: TreeNode) -> int:
 
 
 def is_larger(node: TreeNode, most: int) -> bool:
-    """Tell whether a tree has more than `most` nodes below its root; it is not looked at any further."""
+    """Return whether a tree has more than `most` nodes below its root; it is not looked at any further."""
     count, waiting = 0, [node]
     while waiting and count <= most:
         below = [child for _, child in children(waiting.pop())]

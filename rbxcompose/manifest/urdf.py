@@ -12,9 +12,9 @@ from rbxcompose.printable import plain
 
 NOT_XML = kind(
     "RBX2001",
-    """A URDF file is not XML that can be read
+    """A URDF file is not valid XML
 
-The file of `body: {urdf: FILE}` must be well-formed XML in UTF-8: each element is closed, each value stands in quotes.
+The file of `body: {urdf: FILE}` must be well-formed XML in UTF-8: each element is closed, each value has quotes.
 A DOCTYPE is refused, since it can make a small file grow without bounds.
 
 Bad:
@@ -33,10 +33,10 @@ Good:
 )
 NOT_URDF = kind(
     "RBX2002",
-    """A file is no URDF
+    """A file is not a URDF
 
 The root of a URDF file is the element `robot`. Files of other kinds, such as SDF, and files that xacro has yet to
-expand are not taken.
+expand are not accepted.
 
 Bad:
 ```xml
@@ -59,9 +59,9 @@ _ENCODINGS = {"utf-8", "us-ascii", "ascii"}  # what text in UTF-8 may call itsel
 _WORDS = {
     expat.errors.XML_ERROR_NO_ELEMENTS: "there is no element in this file",
     expat.errors.XML_ERROR_UNCLOSED_TOKEN: "the file ends before this does",
-    expat.errors.XML_ERROR_INVALID_TOKEN: "this cannot stand here",
-    expat.errors.XML_ERROR_DUPLICATE_ATTRIBUTE: "this attribute stands here twice",
-    expat.errors.XML_ERROR_UNDEFINED_ENTITY: "nothing says what this stands for",
+    expat.errors.XML_ERROR_INVALID_TOKEN: "this does not belong here",
+    expat.errors.XML_ERROR_DUPLICATE_ATTRIBUTE: "this attribute occurs twice",
+    expat.errors.XML_ERROR_UNDEFINED_ENTITY: "this entity is not defined",
     expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT: "the root element has ended, and nothing may follow it",
     expat.errors.XML_ERROR_MISPLACED_XML_PI: "'<?xml' must be the very first thing in the file",
 }
@@ -122,7 +122,7 @@ class _Reader:
 
     def _declared(self, version: str, encoding: str | None, standalone: int) -> None:
         if encoding is not None and encoding.lower() not in _ENCODINGS:
-            message = f"this file says that it is in '{plain(encoding, _SHOWN)}', and it must be in UTF-8"
+            message = f"this file declares the encoding '{plain(encoding, _SHOWN)}'; it must be UTF-8"
             raise _RefusedError(NOT_XML.at(self._here("<?xml"), message, help='write encoding="utf-8"'))
 
     def _doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
@@ -135,9 +135,9 @@ class _Reader:
             raise _RefusedError(NOT_URDF.at(self._tag(name), message))
         if name.startswith(XACRO):
             help_text = "expand it first: 'xacro FILE.xacro -o FILE.urdf'"
-            raise _RefusedError(NOT_URDF.at(self._tag(name), "this file is to be expanded by xacro", help=help_text))
+            raise _RefusedError(NOT_URDF.at(self._tag(name), "xacro must expand this file first", help=help_text))
         if len(self.open) >= DEPTH:
-            message = f"more than {DEPTH} elements lie inside each other"
+            message = f"elements are nested more than {DEPTH} levels deep"
             raise _RefusedError(TOO_LARGE.at(self._tag(name), message))
         if self.elements > URDF_ELEMENTS:
             raise _RefusedError(TOO_LARGE.at(self._tag(name), f"more than {URDF_ELEMENTS:,} elements in one file"))
@@ -152,7 +152,7 @@ class _Reader:
             return NOT_XML.at(span, _words(error))
         name, line, column = self.open[-1]
         shown = plain(name, _SHOWN)
-        begun = Related(Span(self.file, line, column, line, column + 1 + len(name)), f"'<{shown}>' begins here")
+        begun = Related(Span(self.file, line, column, line, column + 1 + len(name)), f"'<{shown}>' starts here")
         told = expat.ErrorString(error.code)
         if told == expat.errors.XML_ERROR_TAG_MISMATCH:
             return NOT_XML.at(span, f"another element ends here before '<{shown}>' does", related=[begun])

@@ -36,7 +36,7 @@ UNKNOWN_KEY = kind(
     "RBX1001",
     """Unknown key
 
-Every map has a fixed set of keys; this one is not among them, so that it would have no effect. Mostly it is misspelt.
+Every map has a fixed set of keys; this one is not among them, so it would have no effect. Usually it is misspelt.
 
 Bad:
 ```yaml
@@ -57,7 +57,7 @@ MISSING_KEY = kind(
     "RBX1002",
     """Missing key
 
-This map needs a key that is not there and has no default.
+This map lacks a key that has no default.
 
 Bad:
 ```yaml
@@ -77,8 +77,7 @@ WRONG_TYPE = kind(
     "RBX1003",
     """Wrong type or unit
 
-The value is not what this key takes: text where a number stands, a time where a speed stands, an angle without its
-unit.
+The value is not what this key takes: text instead of a number, a time instead of a speed, an angle without its unit.
 
 Bad:
 ```yaml
@@ -114,7 +113,7 @@ OUT_OF_RANGE = kind(
     "RBX1005",
     """Out of range
 
-The value has the right type and is too small or too large, or a list has too few or too many items.
+The value has the right type but is too small or too large, or a list has too few or too many items.
 
 Bad:
 ```yaml
@@ -132,8 +131,8 @@ BAD_NAME = kind(
     "RBX1006",
     """A name of the wrong form
 
-Names begin with a small letter and go on with small letters, digits and underscores, at most 60 of them, so that they
-can stand in topics, in paths and in expressions.
+Names start with a lower-case letter and continue with lower-case letters, digits and underscores, at most 60 in all:
+they are used in topics, paths and expressions.
 
 Bad:
 ```yaml
@@ -177,7 +176,7 @@ def _adapter(model: Any) -> TypeAdapter[Any]:
 
 
 def is_valid(model: Any, data: object) -> bool:
-    """Tell whether plain data are what `model` takes, without words on why not."""
+    """Return whether plain data are what `model` takes, without words on why not."""
     try:
         _adapter(model).validate_python(data, strict=True)
     except ValidationError:
@@ -279,8 +278,8 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
     if error["loc"][-1:] == ("[key]",) or error["type"] == "string_pattern_mismatch":
         place = key_span(node, loc) if error["loc"][-1:] == ("[key]",) else span
         text = value.text if isinstance(value, ScalarNode) and place is span else name
-        help_text = "small letters, digits and underscores, beginning with a letter"
-        return BAD_NAME.at(place, f"'{text}' is no name", help=help_text)
+        help_text = "lower-case letters, digits and underscores, starting with a letter"
+        return BAD_NAME.at(place, f"'{text}' is not a valid name", help=help_text)
     match error["type"]:
         case "missing":
             message = f"{where((*path, *loc[:-1]))} needs the key '{name}'"
@@ -331,7 +330,7 @@ def _called(path: KeyPath) -> str:
 
 
 def is_broken(node: TreeNode | None) -> bool:
-    """Tell whether a value could not be filled in, or is no number that can be taken, which was said."""
+    """Return whether a value could not be filled in, or is no number that can be taken, which was said."""
     return isinstance(node, ScalarNode) and (
         node.filled is BROKEN or (node.filled is None and bool(number_trouble(node)))
     )
@@ -370,7 +369,7 @@ def _with(data: object, path: KeyPath, value: object) -> object:
 
 
 def _takes(model: Any, data: object, loc: KeyPath) -> bool:
-    """Tell whether a model has nothing against what stands at `loc`."""
+    """Return whether a model has nothing against what stands at `loc`."""
     try:
         _adapter(model).validate_python(data)
     except ValidationError as error:

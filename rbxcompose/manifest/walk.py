@@ -24,7 +24,7 @@ TWICE = kind(
     "RBX1104",
     """A key is written twice
 
-A map names each thing once; of two equal keys YAML silently takes the last.
+A map names each thing once; of two equal keys, YAML silently keeps the last.
 
 Bad:
 ```yaml
@@ -41,9 +41,9 @@ warn: 50 %
 )
 NOT_A_KEY = kind(
     "RBX1105",
-    """A key that is no plain word, or a key without a value
+    """A key that is not a plain word, or has no value
 
-Keys are words. Inside `{}` each key has a value; text with a comma in it is cut in two there and needs quotes.
+Keys are words. Inside `{}`, each key needs a value, and text with a comma needs quotes.
 
 Bad:
 ```yaml
@@ -58,10 +58,10 @@ home:
 )
 CHARACTER = kind(
     "RBX1106",
-    """A character that a manifest may not hold
+    """A character that a manifest may not contain
 
-Control characters and characters that turn the direction of writing make a text look different from what it is. Tabs
-have no fixed width, so that YAML does not allow them for indentation; write spaces.
+Control characters and characters that change the direction of writing make a text look different from what it is. Tabs
+have no fixed width, so YAML does not allow them for indentation; write spaces.
 
 Bad:
 ```yaml
@@ -78,7 +78,7 @@ TAG = kind(
     "RBX1107",
     """A tag that manifests do not have
 
-The only tags are `!remove` and `!replace`, in profiles and overlays. Text that begins with `!` stands in quotes.
+The only tags are `!remove` and `!replace`, in profiles and overlays. Text that starts with `!` needs quotes.
 
 Bad:
 ```yaml
@@ -92,9 +92,9 @@ about: "!important drives slowly"
 )
 ALIAS = kind(
     "RBX1108",
-    """An alias that leads to itself or multiplies
+    """An alias that contains itself or multiplies
 
-`*name` repeats what `&name` marks. It may not lie inside what it repeats, and all aliases of a file may repeat at most
+`*name` repeats what `&name` marks. It may not be inside what it repeats, and all aliases of a file may repeat at most
 10,000 values.
 
 Bad:
@@ -109,9 +109,9 @@ corners: [corner_1, corner_2]
 )
 NUMBER = kind(
     "RBX1109",
-    """A number that cannot be taken
+    """An invalid number
 
-Numbers are finite and have at most 40 characters.
+A number must be finite and have at most 40 characters.
 
 Bad:
 ```yaml
@@ -127,8 +127,8 @@ HASH = kind(
     "RBX1110",
     """Text after `#` is a comment
 
-A ` #` begins a comment, and what follows is not part of the value. Put quotes round the text if it is, and a space
-behind the `#` if it is not.
+A ` #` starts a comment, and what follows is not part of the value. Put quotes around the text if it is, and a space
+after the `#` if it is not.
 
 Bad:
 ```yaml
@@ -181,7 +181,7 @@ class Walk:
         if not self.may_repeat:
             return self._read(node)
         if id(node) in self._open:
-            self._refuse_alias(node, "this alias leads back to what it lies in")
+            self._refuse_alias(node, "this alias leads back to what contains it")
             return MappingNode({}, span_of(node, self.file)), 1, 1
         if (done := self._done.get(id(node))) is not None:
             return self._repeat(node, done)
@@ -202,7 +202,7 @@ class Walk:
         if self._alias_nodes > ALIAS_NODES:
             self._refuse_alias(node, f"the aliases of this file repeat more than {ALIAS_NODES:,} values")
         elif len(self._open) + height > DEPTH:
-            self._refuse_alias(node, f"with its aliases this file has more than {DEPTH} levels inside each other")
+            self._refuse_alias(node, f"with its aliases values are nested more than {DEPTH} levels deep")
         else:
             return done
         return MappingNode({}, span_of(node, self.file)), 1, 1
@@ -245,10 +245,10 @@ class Walk:
             return written
         short = written.replace("tag:yaml.org,2002:", "!!")
         if short == REMOVE:
-            message, help_text = "'!remove' stands alone and takes no value", "remove the value behind it"
+            message, help_text = "'!remove' takes no value", "remove the value after it"
         else:
             message = f"manifests have no tag '{plain(short, 60)}'"
-            help_text = "put quotes round it if it is text; the only tags are '!remove' and '!replace'"
+            help_text = "put quotes around it if it is text; the only tags are '!remove' and '!replace'"
         self.add(TAG.at(span_of(node, self.file), message, help=help_text))
         return ""
 
@@ -259,7 +259,7 @@ class Walk:
             message = f"this text has {len(text):,} characters, {TEXT:,} are the limit"
             self.add(TOO_LARGE.at(scalar.span, message))
         if not text.isprintable() and (found := FORBIDDEN.search(text)):
-            message = f"this text holds the character {code_point(found.group())}, which cannot be seen"
+            message = f"this text contains the invisible character {code_point(found.group())}"
             self.add(CHARACTER.at(scalar.span, message))
         if trouble := number_trouble(scalar):
             self.add(NUMBER.at(scalar.span, f"this number {trouble}"))
@@ -271,7 +271,7 @@ class Walk:
         if line is not None and (found := _SWALLOWED.match(line, span.end_column - 1)):
             start, end = found.span(1)
             place = Span(self.file, span.end_line, start + 1, span.end_line, end + 1)
-            help_text = "put quotes round the whole text, or a space behind the '#'"
+            help_text = "put quotes around the whole text, or a space after the '#'"
             self.add(HASH.at(place, "this is a comment, not part of the value", help=help_text))
 
     def _check_cut(self, items: list[yaml.Node]) -> None:
@@ -280,7 +280,7 @@ class Walk:
             if isinstance(item, yaml.ScalarNode) and not item.style and item.value.count("(") > item.value.count(")"):
                 start, end = span_of(item, self.file), span_of(following, self.file)
                 span = Span(self.file, start.line, start.column, end.end_line, end.end_column)
-                message = "inside {} and [] a comma ends the text, so that this is cut in two"
+                message = "inside {} and [] a comma ends the text, so this is cut in two"
                 self.add(QUOTES_NEEDED.at(span, message, label=QUOTE_HELP))
                 return
 
@@ -316,7 +316,7 @@ class Walk:
                 continue
             if node.flow_style and not is_cut and self._is_missing(value):
                 message = f"'{plain(key.text, 60)}' has no value"
-                help_text = "inside {} each key has a value: 'key: value'"
+                help_text = "inside {}, each key needs a value: 'key: value'"
                 self.add(NOT_A_KEY.at(key.span, message, help=help_text))
             self._check_comment(value)
             self._enter(own, Entry(key, value))
@@ -329,7 +329,7 @@ class Walk:
         if self.may_tag:
             self._tag(node)
         if not isinstance(node, yaml.ScalarNode):
-            help_text = "put quotes round it if it is text"
+            help_text = "put quotes around it if it is text"
             self.add(NOT_A_KEY.at(span_of(node, self.file), "a key is one word", help=help_text))
             return None
         key = self._scalar(node)

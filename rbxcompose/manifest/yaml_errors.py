@@ -34,15 +34,15 @@ def _colon(trouble: Trouble) -> Finding:
         span = trouble.to_line_end(column)
         message = "text with a colon and a space needs quotes"
         return QUOTES_NEEDED.at(span, message, label=QUOTE_HELP, fix=trouble.quoting(span))
-    message = "this key cannot stand here: the line above already holds a value"
+    message = "this key cannot be here: the line above already holds a value"
     begin = indent(trouble.line_text)
     span = trouble.span(trouble.line, begin, max(begin, trouble.column))
-    return NOT_YAML.at(span, message, help="begin it in the same column as the key that it belongs beside")
+    return NOT_YAML.at(span, message, help="start it in the same column as the key that it belongs with")
 
 
 def _first_character(trouble: Trouble) -> Finding:
     character = trouble.line_text[trouble.column : trouble.column + 1]
-    message = f"text that begins with '{plain(character)}' needs quotes"
+    message = f"text that starts with '{plain(character)}' needs quotes"
     span = trouble.to_line_end(trouble.column)
     fix = trouble.quoting(span) if character in _NO_SIGIL else None
     return QUOTES_NEEDED.at(span, message, label=QUOTE_HELP, fix=fix)
@@ -51,22 +51,22 @@ def _first_character(trouble: Trouble) -> Finding:
 def _sigil(trouble: Trouble) -> Finding:
     trouble.line, trouble.column = trouble.opening.line - 1, trouble.opening.column - 1
     if tag := re.match(r"(!remove|!replace)[,\]}]", trouble.line_text[trouble.column :]):
-        return NOT_YAML.at(trouble.here, f"a space is missing behind '{tag[1]}'")
+        return NOT_YAML.at(trouble.here, f"a space is missing after '{tag[1]}'")
     return _first_character(trouble)
 
 
 def _unknown_alias(trouble: Trouble) -> Finding:
     span = trouble.to_line_end(trouble.column)
-    help_text = "put quotes round it if it is text; an alias needs its anchor ('&name') above it"
-    return QUOTES_NEEDED.at(span, "'*' here means an alias, and nothing has this name", help=help_text)
+    help_text = "put quotes around it if it is text; an alias needs its anchor ('&name') above it"
+    return QUOTES_NEEDED.at(span, "'*' here means an alias, but nothing has this name", help=help_text)
 
 
 def _unclosed_bracket(trouble: Trouble) -> Finding:
     what, opening, closing = _CLOSES["mapping" if "mapping" in trouble.context else "sequence"]
-    begun = (Related(trouble.opening, f"the {what} begins here"),)
+    begun = (Related(trouble.opening, f"the {what} starts here"),)
     is_key = re.fullmatch(r"\s*[\w.-]+", trouble.before)
     if is_key and indent(trouble.line_text) <= indent(trouble.lines[trouble.opening.line - 1]):
-        here = (Related(trouble.here, "a new key begins here"),)
+        here = (Related(trouble.here, "a new key starts here"),)
         return NOT_YAML.at(trouble.opening, f"the closing '{closing}' of this {what} is missing", related=here)
     message = f"a ',' or the closing '{closing}' of this {what} is missing before this place"
     help_text = f"text with brackets, commas or quotes inside '{opening}{closing}' needs quotes"
@@ -77,27 +77,27 @@ def _after_value(trouble: Trouble) -> Finding:
     if trouble.is_behind_quote:
         begin = re.match(r"\s*(- +)*([^\s:'\"][^:]*: +)?", trouble.before)
         span = trouble.to_line_end(begin.end() if begin else 0)
-        help_text = "put quotes of the other kind round the whole text"
-        message, fix = "text goes on after its closing quote", trouble.quoting(span)
+        help_text = "put the other kind of quotes around the whole text"
+        message, fix = "there is text after the closing quote", trouble.quoting(span)
         return QUOTES_NEEDED.at(span, message, label=QUOTE_HELP, help=help_text, fix=fix)
     message = "this line does not fit the lines above it"
-    begun = (Related(trouble.opening, "what it would belong to begins here"),)
+    begun = (Related(trouble.opening, "what it would belong to starts here"),)
     return NOT_YAML.at(
         trouble.here,
         message,
-        help="check the indentation: keys that belong together begin in one column",
+        help="check the indentation: keys that belong together start in one column",
         related=begun,
     )
 
 
 def _missing_dash(trouble: Trouble) -> Finding:
-    begun = (Related(trouble.opening, "the list begins here"),)
+    begun = (Related(trouble.opening, "the list starts here"),)
     key = re.match(r" *([a-z][a-z0-9_]*):", trouble.line_text)
     help_text = "put a dash here"
     if key:
-        where = "move it right if it belongs to the item above, left if it belongs beside the list"
+        where = "move it right if it belongs to the item above, left if it belongs next to the list"
         help_text = f"{where}; put a dash here if '{key[1]}' is an item of its own"
-    return NOT_YAML.at(trouble.here, "this stands in a list and has no dash", help=help_text, related=begun)
+    return NOT_YAML.at(trouble.here, "this list item has no dash", help=help_text, related=begun)
 
 
 def _missing_colon(trouble: Trouble) -> Finding:
@@ -126,7 +126,7 @@ def _unclosed_quote(trouble: Trouble) -> Finding:
 
 
 _ESCAPE = _plainly(
-    "a backslash in double quotes begins an escape, and this is none",
+    "a backslash in double quotes starts an escape, but this is not one",
     "write the backslash twice, or use single quotes",
 )
 _ANSWERS: dict[str, Callable[[Trouble], Finding]] = {
@@ -146,17 +146,15 @@ _ANSWERS: dict[str, Callable[[Trouble], Finding]] = {
     NO_KEY: _after_value,
     NO_COLON: _missing_colon,
     "block sequence entries are not allowed": _plainly(
-        "a list cannot begin on the line of its key",
-        "begin a list on the line below its key; text that begins with '- ' needs quotes",
+        "a list cannot start on the line of its key",
+        "start a list on the line below its key; text that starts with '- ' needs quotes",
     ),
-    "did not find expected <document start>": _plainly(
-        "there is something left over here, after the end of the manifest"
-    ),
+    "did not find expected <document start>": _plainly("there is extra text here, after the end of the manifest"),
     "did not find expected node content": _no_content,
     "unknown escape character": _ESCAPE,
     "did not find expected hexdecimal number": _ESCAPE,
     "found duplicate anchor": _anchor_twice,
     "but found another document": _plainly(
-        "a second document begins here", "a file holds one manifest: remove the '---'"
+        "a second document starts here", "a file holds one manifest: remove the '---'"
     ),
 }

@@ -12,7 +12,7 @@ from rbxcompose.manifest.yaml_errors import explain
 
 TOO_LARGE = kind(
     "RBX1103",
-    """Larger than a manifest may be
+    """A manifest is too large
 
 A manifest has limits, so that no file can use up time or memory: 2 MB, 200,000 values, 64 levels, 64 kB for one text,
 200 characters for a key, 40 for a number, 10,000 values reached through aliases, 10,000 values in one datum of a
@@ -53,7 +53,7 @@ class _LimitedLoader(yaml.CSafeLoader):
         self.nodes += 1
         self.depth += 1
         if self.depth > DEPTH:
-            raise _LimitError(current_node.start_mark, f"more than {DEPTH} levels lie inside each other")
+            raise _LimitError(current_node.start_mark, f"values are nested more than {DEPTH} levels deep")
         if self.nodes > NODES:
             siblings = current_node.value
             last = siblings[-1] if siblings else current_node

@@ -6,7 +6,7 @@ from rbxcompose.findings import Severity, kind
 
 UNKNOWN = kind(
     "RBX4201",
-    """A test names what is not there
+    """A test names something that does not exist
 
 Everything that a test mocks, sets, expects or counts must exist: a skill of the robot, a value, a step of the mission,
 a datum. A step that the mission does not have could never be found, and a `never` for it would always pass.
@@ -50,7 +50,7 @@ events:
 )
 NEVER = kind(
     "RBX4203",
-    """Something in a test can never be
+    """Something in a test is impossible
 
 It cannot happen, whatever the mission does: an event or a step after the end of the test, a mission that continues
 while the robot is stopped, a call number 0, `running` without the time to watch.
@@ -79,8 +79,8 @@ NO_STEP = kind(
     "RBX4204",
     """A step of a test is written wrongly
 
-A step is the name of a skill, a node or a state. A skill may have the value of its main argument behind it, or a map of
-its arguments below it. `ended` and `at` go beside it.
+A step is the name of a skill, a node or a state. A skill may be followed by the value of its main argument, or by a
+map of its arguments below it. `ended` and `at` go beside it.
 
 Bad:
 ```yaml

@@ -44,7 +44,7 @@ def _deed(context: TrialContext, word: str, node: TreeNode, model: trials.EventM
 
 
 def _published(context: TrialContext, node: TreeNode, sent: trials.SentModel) -> EventDeed | None:
-    """Return a message for a topic that somebody reads or writes."""
+    """Return a message for a topic that has a publisher or subscriber."""
     topics, topic = _topics(context), resolve(sent.topic, context.robot.manifest.bus.namespace or "")
     if topic not in topics:
         message = f"no component has the topic '{sent.topic}'"

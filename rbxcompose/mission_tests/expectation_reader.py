@@ -78,7 +78,7 @@ def _step(context: TrialContext, node: TreeNode) -> ExpectedStep | None:
         entries = {node.text: Entry(node, ScalarNode("", node.span))}
     names = [key for key in entries if key not in STEP_KEYS]
     if len(names) != 1 or not names[0]:
-        message = "this is no step" if not names else f"a step has one name, this has {len(names)}"
+        message = "this is not a step" if not names else f"a step has one name, this has {len(names)}"
         context.report.add(codes.NO_STEP.at(node.span, message, help=STEP_HELP))
         return None
     name, steps = names[0], context.facts.steps
@@ -113,7 +113,7 @@ def _arguments(context: TrialContext, name: str, node: TreeNode) -> dict[str, Va
         return {}
     skill = context.facts.skills.get(name)
     if skill is None:
-        context.report.add(codes.NO_STEP.at(node.span, f"'{name}' is no skill, so that it has no arguments"))
+        context.report.add(codes.NO_STEP.at(node.span, f"'{name}' is not a skill, so it has no arguments"))
         return {}
     written = {key: one.value for key, one in entries_of(node)} if isinstance(node, MappingNode) else {skill.main: node}
     found: dict[str, Value] = {}
@@ -135,7 +135,7 @@ def _counts(context: TrialContext, node: TreeNode | None, counts: Mapping[str, i
             message = f"the mission '{context.program.name}' has no step '{name}'"
             context.report.add(codes.UNKNOWN.misspelt(entry.key.span, message, name, context.facts.steps, "its steps"))
         elif counts.get(name, -1) < 0:
-            context.report.add(codes.NEVER.at(entry.value.span, "nothing is done less often than never"))
+            context.report.add(codes.NEVER.at(entry.value.span, "a count cannot be below 0"))
         else:
             found.append(ExpectedValue(name, counts[name], entry.key.span))
     return found

@@ -107,7 +107,7 @@ class Explorer:
         self.fresh = save(self.engine)
 
     def explore(self) -> Explored:
-        """Go on until there is nothing new, or the limits are reached."""
+        """Continue until there is nothing new, or the limits are reached."""
         while self.waiting:
             moment = self.waiting.popleft()
             self.out.deepest = max(self.out.deepest, len(moment.script))
@@ -172,7 +172,7 @@ class Explorer:
         return (skill.outcomes if skill else {}).get(choice.outcome, choice.outcome)
 
     def look(self, script: tuple[str, ...]) -> None:
-        """Tell what is wrong here, and keep the moment if the mission goes on."""
+        """Report what is wrong here, and keep the moment if the mission continues."""
         for text in self.world.reports:
             self.tell(text, script)
         if self.engine.held_until is not None:
@@ -188,11 +188,11 @@ class Explorer:
         moment = Moment(save(self.engine), world.now, dict(world.values), dict(world.calls), held, script)
         waits_for = self.engine.reads() & self.values.keys()
         if not moment.calls and self.engine.next_wake() is None and not waits_for:
-            self.tell("the mission waits for ever: nothing runs, nothing is due, and no value can change that", script)
+            self.tell("the mission waits for ever: nothing runs, nothing is due, and no value can end the wait", script)
         self.keep(moment)
 
     def keep(self, moment: Moment) -> None:
-        """Go on from a moment later, if it is new."""
+        """Continue from a moment later, if it is new."""
         mark = fingerprint(moment, self.engine.tasks)
         if mark not in self.met:
             self.met.add(mark)
@@ -257,11 +257,11 @@ class ExploredWorld:
         self.held[leaf] = self.calls.pop(leaf)
 
     def resume(self, leaf: int, /) -> None:
-        """Let a call go on."""
+        """Let a call continue."""
         self.calls[leaf] = self.held.pop(leaf)
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
-        """Nobody listens."""
+        """Do nothing: there is no subscriber."""
 
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
         """Let a call run."""
@@ -315,7 +315,7 @@ def _state(task: Task, state: Sequence[Any], now: float, runs: bool) -> list[Any
 
 def text_of(explored: Explored) -> str:
     """Return what came out, for people."""
-    reach = "as far as the limits reach" if explored.is_cut else "all there are"
+    reach = "cut off at the limits" if explored.is_cut else "complete"
     lines = [f"{explored.mission}: {explored.states} states, {explored.deepest} choices deep; {reach}"]
     for end, script in sorted(explored.ends.items()):
         lines.append(f"  can end with {end}: {_script(script)}")

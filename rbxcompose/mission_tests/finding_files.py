@@ -24,7 +24,7 @@ def tests_of(paths: Iterable[Path]) -> list[Path]:
 
 
 def is_test(path: Path) -> bool:
-    """Tell whether a file says that it is a test."""
+    """Return whether a file says that it is a test."""
     if path.suffix not in _SUFFIXES or not path.is_file():
         return False
     with open_regular(path) as file:

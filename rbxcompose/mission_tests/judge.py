@@ -77,7 +77,7 @@ def _steps(expected: Sequence[ExpectedStep], record: TrialRecord) -> Iterator[Un
 
 
 def is_it(step: ExpectedStep, done: Done) -> bool:
-    """Tell whether a step that was done is the one that is looked for."""
+    """Return whether a step that was done is the one that is looked for."""
     return done.name == step.name and not _differences(step, done)
 
 
@@ -90,7 +90,7 @@ def _differences(step: ExpectedStep, done: Done) -> list[str]:
     if step.ended and step.ended not in (done.ended, step.counts_as.get(done.ended)):
         found.append("was still running" if done.ended == RUNS else f"ended {done.ended}")
     if step.at is not None and abs(step.at - done.began) > ON_TIME:
-        found.append(f"began at {at(done.began)}")
+        found.append(f"started at {at(done.began)}")
     return found
 
 
@@ -103,11 +103,11 @@ def _nearest(step: ExpectedStep, done: Sequence[Done], behind: int) -> str:
     later = [(one, _differences(step, one)) for one in done[behind:] if one.name == step.name]
     near, differences = min(later, key=lambda pair: ("" in pair[1], len(pair[1])), default=(None, []))
     if near and not (earlier and "" in differences):
-        told = [one for one in differences if one and not one.startswith("began")]
+        told = [one for one in differences if one and not one.startswith("started")]
         return f"the nearest is {near.text} at {at(near.began)}" + "".join(f", which {one}" for one in told)
     if earlier:
-        return f"it was done only before, at {at(earlier[-1].began)}"
-    return "it was never begun" if not behind else f"it was not begun after {done[behind - 1].text}"
+        return f"it was done only earlier, at {at(earlier[-1].began)}"
+    return "it never started" if not behind else f"it did not start after {done[behind - 1].text}"
 
 
 def _written(step: ExpectedStep) -> str:
@@ -120,7 +120,7 @@ def _never(never: Sequence[ExpectedStep], record: TrialRecord) -> Iterator[Unmet
         done = next((one for one in record.steps if is_it(step, one)), None)
         if done:
             yield UnmetExpectation(
-                f"{_written(step)} must never be done, and was at {at(done.began)}", step.span, done.line
+                f"{_written(step)} must never be done, but was at {at(done.began)}", step.span, done.line
             )
 
 
@@ -160,7 +160,7 @@ def _published(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpec
 def _reports(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpectation]:
     for one in expect.reports:
         if not any(one.name in text for text in record.reports):
-            yield UnmetExpectation(f"nothing that was logged or reported has '{one.name}' in it", one.span)
+            yield UnmetExpectation(f"nothing that was logged or reported contains '{one.name}'", one.span)
 
 
 def at(seconds: float) -> str:

@@ -34,7 +34,7 @@ def junit(outcomes: Sequence[FileOutcome]) -> str:
             messages = [problem.message for problem in one.verdict.problems]
             _add(case, "failure", messages[0], Teller().trace(one.verdict))
         elif not one.verdict:
-            _add(case, "error", "the test has mistakes", "\n".join(f"{f.span or ''} {f.message}" for f in one.findings))
+            _add(case, "error", "the test has errors", "\n".join(f"{f.span or ''} {f.message}" for f in one.findings))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 

@@ -1,4 +1,4 @@
-"""What a mission with all that it uses asks of the robot, and which steps it has."""
+"""What a mission with all that it uses needs from the robot, and which steps it has."""
 
 from __future__ import annotations
 

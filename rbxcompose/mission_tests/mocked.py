@@ -45,11 +45,11 @@ class Mocked:
         return self._calls.pop(leaf, None) is not None
 
     def pause(self, leaf: int, now: float) -> bool:
-        """Hold a call; tell whether there is one."""
+        """Hold a call; return whether there is one."""
         return self._shift(leaf, -now, True)
 
     def resume(self, leaf: int, now: float) -> bool:
-        """Let a call go on; tell whether there is one."""
+        """Let a call continue; return whether there is one."""
         return self._shift(leaf, now, False)
 
     def _shift(self, leaf: int, seconds: float, is_held: bool) -> bool:

@@ -1,4 +1,4 @@
-"""From the file of a test to the test, with a finding for each mistake."""
+"""From the file of a test to the test, with a finding for each error."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class TrialReader:
 
 
 def _no_robot(robot: str, which: str) -> str:
-    return f"the robot '{robot}' has mistakes, so that {which} cannot run"
+    return f"the robot '{robot}' has errors, so {which} cannot run"
 
 
 def _without_values(root: MappingNode) -> MappingNode:
@@ -176,7 +176,7 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
 
 
 def _is_complete(facts: MissionFacts, mocks: Mapping[str, Mock], events: tuple[TrialEvent, ...]) -> bool:
-    """Tell whether the mission asks for nothing but what the test gives, and nothing goes over the bus."""
+    """Return whether the mission asks for nothing but what the test gives, and nothing goes over the bus."""
     deeds = [deed for event in events for deed in event.deeds]
     values = {name for deed in deeds for name in deed.settings} | {name for one in mocks.values() for name in one.sets}
     is_answered = {*facts.skills, *facts.services} <= mocks.keys()
@@ -234,6 +234,6 @@ def _no_resume(is_stopped: bool, is_paused: bool) -> str:
 
 _REFUSED: Mapping[str, Callable[[bool, bool], str]] = {
     "resume": _no_resume,
-    "pause": lambda stopped, paused: "the mission is paused here already" if paused else "",
+    "pause": lambda stopped, paused: "the mission is already paused here" if paused else "",
     "release": lambda stopped, paused: "" if stopped else "the robot is not stopped here",
 }

@@ -1,4 +1,4 @@
-"""What a run leaves behind: lines with their times, the steps that were done, messages, data, the end."""
+"""The record of a run: lines with their times, the steps that were done, messages, data, the end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How tests are told: one line each, a trace of what went wrong, a summary, what no test has tried; text and JSON."""
+"""The report of tests: one line each, a trace of what went wrong, a summary, the paths not covered; text and JSON."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class FileOutcome:
 
     @property
     def passed(self) -> bool:
-        """Tell whether the test ran, and all was as expected."""
+        """Return whether the test ran, and all was as expected."""
         return self.verdict is not None and self.verdict.passed
 
     @property
@@ -93,8 +93,8 @@ class Teller:
         lines = [f"{self.paint('fail' if failed else 'pass', counted)} in {took * 1e3:.0f} ms"]
         if coverage.ways:
             share = f"{len(coverage.taken)} of {len(coverage.ways)}"
-            rest = "" if not coverage.missing else "; --coverage tells the others"
-            lines.append(f"{share} ways of the missions were taken{rest}")
+            rest = "" if not coverage.missing else "; --coverage shows the others"
+            lines.append(f"{share} paths of the missions were taken{rest}")
         return "\n".join(lines)
 
 
@@ -112,7 +112,7 @@ def coverage_text(coverage: Coverage) -> str:
     for mission in sorted({way.mission for way in coverage.ways}):
         ways = [way for way in coverage.ways if way.mission == mission]
         missing = [way for way in coverage.missing if way.mission == mission]
-        lines.append(f"{mission}: {len(ways) - len(missing)} of {len(ways)} ways taken")
+        lines.append(f"{mission}: {len(ways) - len(missing)} of {len(ways)} paths taken")
         lines += [f"  {way.span.file}:{way.span.line}  {way.text}" for way in missing]
     return "\n".join(lines)
 

@@ -1,4 +1,4 @@
-"""Values that stand for all others: one on either side of each number that a mission compares a value with."""
+"""Values that represent all others: one on either side of each number that a mission compares a value with."""
 
 from __future__ import annotations
 

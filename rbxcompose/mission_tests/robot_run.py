@@ -85,7 +85,7 @@ class RobotRun:
             missing = self.executive.missions.runs[self.trial.mission].missing()
             if missing:
                 names = ", ".join(f"${name}" for name in missing)
-                self.record.trouble = f"the mission does not begin: nothing has come for {names}"
+                self.record.trouble = f"the mission does not start: nothing has arrived for {names}"
         return self.record.end is not None or bool(self.record.trouble)
 
     def _happens(self, event: TrialEvent) -> None:
@@ -173,7 +173,7 @@ class TrialWorld:
             self._robot.pause(leaf)
 
     def resume(self, leaf: int, /) -> None:
-        """Let a call go on."""
+        """Let a call continue."""
         if self._run.mocked.resume(leaf, self._run.now):
             self._run.await_calls()
         else:

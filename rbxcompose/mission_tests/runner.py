@@ -22,7 +22,7 @@ class Verdict:
 
     @property
     def passed(self) -> bool:
-        """Tell whether all was as expected."""
+        """Return whether all was as expected."""
         return not self.problems
 
 

@@ -48,7 +48,7 @@ class TrialScope:
         return self._values.age(name)
 
     def is_new(self, name: str) -> bool:
-        """Tell whether any message has come."""
+        """Return whether any message has come."""
         return name not in self._known and self._values.count(name) > 0
 
 
@@ -108,7 +108,7 @@ def read_value(node: TreeNode, wanted: Type, robot: RobotNames, what: str) -> tu
 
 
 def agrees(expected: Value, happened: Value) -> bool:
-    """Tell whether a value is the one that was expected.
+    """Return whether a value is the one that was expected.
 
     Of maps only the entries that were written count; one without entries is expected to be empty.
     """

@@ -61,11 +61,11 @@ class TrialStage:
         self.mocked.pause(leaf, self.now)
 
     def resume(self, leaf: int, /) -> None:
-        """Let a call go on."""
+        """Let a call continue."""
         self.mocked.resume(leaf, self.now)
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
-        """Nobody listens; the event is what counts."""
+        """There is no subscriber; the event is what counts."""
 
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
         """Begin a call."""
@@ -103,7 +103,7 @@ class TrialStage:
         if until is not None:
             self.now = self.record.now = until
         elif upcoming is None:
-            self.record.trouble = f"did not end: since {self.now:g} s it waits for what the test does not do"
+            self.record.trouble = f"did not end: since {self.now:g} s it waits for something that the test does not do"
         else:
             self.record.trouble = f"did not end within {LONGEST_TEST:g} s of robot time"
 

@@ -1,4 +1,4 @@
-"""What both ways of running a test share: who watches, and values that are set and told."""
+"""What both ways of running a test share: the observers, and values that are set and reported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How messages flow through a robot: who speaks and listens on a topic, which commands reach which base, how often."""
+"""How messages flow: publishers and subscribers of a topic, which commands reach which base, how often."""
 
 from __future__ import annotations
 
@@ -88,5 +88,5 @@ def setting_span(robot: Robot, *settings: tuple[RobotComponent, str]) -> Span:
 
 
 def is_written(robot: Robot, component: RobotComponent, name: str) -> bool:
-    """Tell whether a field of the configuration is written down in the manifest."""
+    """Return whether a field of the configuration is written down in the manifest."""
     return bool(name) and at(robot.manifest.root, (*component.path, *name.split("."))) is not None

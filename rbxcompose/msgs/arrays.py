@@ -27,7 +27,7 @@ def zeros(dtype: str, length: int) -> NDArray[Any]:
 
 
 def holds_numbers(type_: FieldType) -> bool:
-    """Tell whether a field of this type is a numpy array."""
+    """Return whether a field of this type is a numpy array."""
     return type_.shape is not FieldShape.SINGLE and type_.base in PRIMITIVES and type_.base not in _NO_NUMBERS
 
 

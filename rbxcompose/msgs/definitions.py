@@ -53,7 +53,7 @@ class FieldType:
 
     @property
     def is_message(self) -> bool:
-        """Tell whether the values are messages."""
+        """Return whether the values are messages."""
         return self.base not in PRIMITIVES
 
     def __str__(self) -> str:

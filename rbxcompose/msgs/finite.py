@@ -21,7 +21,7 @@ class NotFiniteError(ValueError):
 
 
 def is_finite(message: Message) -> bool:
-    """Tell whether `message` holds neither NaN nor an infinity, however deep."""
+    """Return whether `message` holds neither NaN nor an infinity, however deep."""
     tests = _tests.get(type(message))
     if tests is None:
         tests = _tests[type(message)] = _tests_of(type(message))

@@ -33,7 +33,7 @@ WRONG_VALUE = kind(
     """A value that does not fit the field of a message
 
 Each field has a type and a range: numbers, flags, texts, lists with a given length, other messages. Numbers in messages
-have no units: they are what ROS 2 takes them for, mostly SI.
+have no units: they are in the units of ROS 2, mostly SI.
 
 Bad: `rbxcompose topic pub /answer std_msgs/Int32 '{data: many}'`
 Good: `rbxcompose topic pub /answer std_msgs/Int32 '{data: 42}'`
@@ -135,18 +135,18 @@ class _Reading(Generic[M]):
         if type_.base == "string":
             return self._text(type_, value, path)
         if type_.base == "bool":
-            return value if isinstance(value, bool) else self._wrong(path, "true or false is expected")
+            return value if isinstance(value, bool) else self._wrong(path, "expected true or false")
         return self._number(type_.base, value, path)
 
     def _list(self, type_: FieldType, value: object, path: KeyPath) -> Any:
         if not isinstance(value, list | tuple):
-            return self._wrong(path, f"a list is expected ({type_})")
+            return self._wrong(path, f"expected a list ({type_})")
         count, length = len(value), type_.length
         if (type_.shape is FieldShape.ARRAY and count != length) or (
             type_.shape is FieldShape.BOUNDED and count > length
         ):
             most = "at most " if type_.shape is FieldShape.BOUNDED else ""
-            return self._wrong(path, f"{most}{length} values are expected, these are {count}")
+            return self._wrong(path, f"{most}{length} values are expected, not {count}")
         single = FieldType(type_.base, text_limit=type_.text_limit)
         values = [self._value(single, one, (*path, index)) for index, one in enumerate(value)]
         if self.findings:
@@ -155,20 +155,20 @@ class _Reading(Generic[M]):
 
     def _text(self, type_: FieldType, value: object, path: KeyPath) -> Any:
         if not isinstance(value, str):
-            return self._wrong(path, "text is expected; a number or a flag that is meant as text stands in quotes")
+            return self._wrong(path, "expected text; quote a number or a flag that is meant as text")
         limit = type_.text_limit
         if limit and len(value.encode()) > limit:
-            return self._wrong(path, f"at most {limit} bytes of text are expected, these are {len(value.encode())}")
+            return self._wrong(path, f"at most {limit} bytes of text are expected, not {len(value.encode())}")
         return value
 
     def _number(self, base: str, value: object, path: KeyPath) -> Any:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            return self._wrong(path, f"a number is expected ({base}), without a unit")
+            return self._wrong(path, f"expected a number ({base}), without a unit")
         if base in FLOATS:
             return self._float(base, value, path)
         low, high = _RANGES[base]
         if not isinstance(value, int) or not low <= value <= high:
-            return self._wrong(path, f"a whole number from {low} to {high} is expected ({base})")
+            return self._wrong(path, f"expected a whole number from {low} to {high} ({base})")
         return value
 
     def _float(self, base: str, value: float, path: KeyPath) -> Any:

@@ -68,11 +68,11 @@ class MuxCore(Generic[M]):
 
     @property
     def stopped(self) -> bool:
-        """Tell whether the lock `stop` is latched."""
+        """Return whether the lock `stop` is latched."""
         return self._stopped
 
     def receive(self, name: str, message: M, now: float) -> M | None:
-        """Take a message of input `name`; return it if it is to be forwarded, else None."""
+        """Take a message of input `name`; return it if it must be forwarded, else None."""
         was_silent = now > self._input_until[name]
         self._neutral.discard(name)
         if self._is_zero(message):
@@ -112,7 +112,7 @@ class MuxCore(Generic[M]):
         return min((math.nextafter(end, math.inf) for end in ends if self._now <= end < math.inf), default=None)
 
     def stop(self, now: float) -> M:
-        """Latch the lock `stop`; return the zero that is to be sent at once."""
+        """Latch the lock `stop`; return the zero to send at once."""
         self._stopped = True
         self._settle(now)
         self._owes_zero = False
@@ -132,7 +132,7 @@ class MuxCore(Generic[M]):
         self._settle(now)
 
     def hold(self, now: float) -> M:
-        """Let nothing through until `resume`; return the zero that is to be sent at once."""
+        """Let nothing through until `resume`; return the zero to send at once."""
         self._held = True
         self._settle(now)
         self._owes_zero = False

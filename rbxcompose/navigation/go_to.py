@@ -54,7 +54,7 @@ class GoToCore:
 
     @property
     def stuck(self) -> bool:
-        """Tell whether the base has not come away from where it is for `stuck_after`."""
+        """Return whether the base has not come away from where it is for `stuck_after`."""
         return self._idle > self.settings.stuck_after
 
     def start(self, goal: Pose2) -> None:

@@ -45,7 +45,7 @@ class ParameterField:
 
     @property
     def is_live(self) -> bool:
-        """Tell whether it may change while the robot runs."""
+        """Return whether it may change while the robot runs."""
         return any(isinstance(mark, Live) for mark in self._marks)
 
     @property

@@ -52,7 +52,7 @@ class Difference:
 
     @property
     def is_empty(self) -> bool:
-        """Tell whether the plans do the same."""
+        """Return whether the plans do the same."""
         return not (self.plan or self.added or self.removed or self.changed)
 
     def text(self) -> str:
@@ -131,7 +131,7 @@ def _compared(before: Mapping[str, str], after: Mapping[str, str]) -> Iterator[C
 
 
 def _fills(key: str, empty: Mapping[str, str], full: Mapping[str, str]) -> bool:
-    """Tell whether a map is empty on one side only: what the other side has in it tells that already."""
+    """Return whether a map is empty on one side only: what the other side has in it tells that already."""
     return empty.get(key) == EMPTY and any(one.startswith(f"{key}.") for one in full)
 
 

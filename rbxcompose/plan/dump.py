@@ -1,4 +1,4 @@
-"""A plan as text, and back: `load(dump(plan)) == plan`, unless a configuration holds a secret, which nobody is shown.
+"""A plan as text, and back: `load(dump(plan)) == plan`, unless a configuration has a secret, which is never shown.
 
 The text is JSON. Types stand in no text: they are those of the plan's fields and of the components' configurations, so
 that loading a file makes nothing but plans. Configurations are validated again, missions are read again from their
@@ -63,16 +63,16 @@ def load(text: str) -> Plan:
     try:
         data = json.loads(text)
         if not isinstance(data, dict) or data.pop(VERSION_KEY, None) != VERSION:
-            raise PlanTextError(f"this is no plan of version {VERSION}")
+            raise PlanTextError(f"this is not a plan of version {VERSION}")
         plan = _decode(data, Plan)
     except PlanTextError:
         raise
     except RecursionError:
-        raise PlanTextError("this is no plan: it is nested too deeply") from None
+        raise PlanTextError("this is not a plan: it is nested too deeply") from None
     except (AttributeError, IndexError, KeyError, TypeError, ValueError, OverflowError) as error:
-        raise PlanTextError(f"this is no plan: {error!r}"[:300]) from error
+        raise PlanTextError(f"this is not a plan: {error!r}"[:300]) from error
     if not isinstance(plan, Plan):
-        raise PlanTextError("this is no plan")
+        raise PlanTextError("this is not a plan")
     return plan
 
 
@@ -143,7 +143,7 @@ def _decode(data: Any, hint: Any) -> Any:
     if is_dataclass(hint):
         return hint(**_members(data, hint))
     if hint in (str, bool, int, float) and not isinstance(data, (int, float) if hint is float else hint):
-        raise TypeError(f"{data!r} is no {hint.__name__}")
+        raise TypeError(f"{data!r} is not a {hint.__name__}")
     return data
 
 
@@ -203,13 +203,13 @@ def _model(data: Any, cls: type[BaseModel]) -> Any:
     try:
         return cls.model_validate(_members(data, cls))
     except ValidationError as error:
-        raise PlanTextError(f"this is no plan: {error.errors(include_url=False)[0]['msg']}") from error
+        raise PlanTextError(f"this is not a plan: {error.errors(include_url=False)[0]['msg']}") from error
 
 
 def _members(data: Any, cls: Any) -> dict[str, Any]:
     hints = _hints(cls)
     if unknown := data.keys() - hints.keys():
-        raise PlanTextError(f"this is no plan: unknown '{min(unknown)}'"[:300])
+        raise PlanTextError(f"this is not a plan: unknown '{min(unknown)}'"[:300])
     return {name: _decode(each, hints[name]) for name, each in data.items()}
 
 

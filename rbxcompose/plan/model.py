@@ -71,7 +71,7 @@ class Plan:
 
     @property
     def follows_clock(self) -> bool:
-        """Tell whether robot time is told from outside."""
+        """Return whether robot time is told from outside."""
         return self.bus.clock == "external"
 
     @property

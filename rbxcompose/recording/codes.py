@@ -56,7 +56,7 @@ other than `cdr`, or without a known type, cannot be published.
 )
 SENT_ALREADY = kind(
     "RBX9210",
-    """The recording has topics that somebody sends now
+    """Topics of the recording are being published now
 
 Old messages would mix with new ones: an old `/tf` misleads a robot that drives, an old status hides what is wrong. A
 stopped robot publishes too. Choose other topics with `--topics` or `--class`, replay where no robot runs, or use
@@ -68,7 +68,7 @@ Good: `rbxcompose replay run.mcap --topics '/camera/*'`
 )
 NOT_ENOUGH = kind(
     "RBX9208",
-    """The recording has not enough to run a component again
+    """The recording lacks what is needed to run a component again
 
 `replay --into` needs all inputs of the component in their order, with the requests that it received and the responses
 to its own. `rbxcompose up --rate max --record FILE` writes them; `rbxcompose record` sees only topics. The component
@@ -77,7 +77,7 @@ must belong to the robot. A secret in its configuration comes from the robot's f
 )
 DIFFERENT = kind(
     "RBX9209",
-    """A component does not send what it sent when it was recorded
+    """A component does not send what was recorded
 
 The message names the first difference: robot time, topic, field and both values. If you changed code or configuration
 on purpose, this is the effect. If not, the component uses something that is not one of its inputs, such as a system

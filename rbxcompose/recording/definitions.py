@@ -1,4 +1,4 @@
-"""The text of a message type with all that it is made of, as `ros2msg` schemas of MCAP have it."""
+"""The text of a message type with all types that it uses, as `ros2msg` schemas of MCAP have it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Files of recordings. One that is being written has `.part` behind its name and is locked by its writer.
 
-So a part that nobody locks is one that was never finished; it is recovered and then gets its name.
+So a part that is not locked is one that was never finished; it is recovered and then gets its name.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def create(path: Path) -> IO[bytes]:
         OSError: if it cannot be created.
     """
     if path.exists():
-        raise FileExistsError(f"{path} is there already")
+        raise FileExistsError(f"{path} already exists")
     file = part_of(path).open("xb")
     fcntl.flock(file.fileno(), fcntl.LOCK_EX)
     return file
@@ -54,7 +54,7 @@ def write_problem(path: Path) -> str:
     """Return why `create` would fail, or nothing: to be told before a run begins."""
     name = plain(str(path))
     if path.exists() or part_of(path).exists():
-        return f"'{name}' is there already"
+        return f"'{name}' already exists"
     if not path.parent.is_dir():
         return f"'{name}' cannot be written: there is no folder '{plain(str(path.parent))}'"
     return "" if os.access(path.parent, os.W_OK) else f"'{name}' cannot be written: its folder is read-only"
@@ -91,7 +91,7 @@ def _is_ours(file: IO[bytes], part: Path) -> bool:
 
 def _recover(file: IO[bytes], part: Path, path: Path) -> int:
     if path.exists():
-        raise FileExistsError(f"{path} is there already")
+        raise FileExistsError(f"{path} already exists")
     new = part.with_name(part.name + _NEW)
     new.unlink(missing_ok=True)  # of a recovery that was interrupted
     with new.open("xb") as whole:

@@ -44,7 +44,7 @@ class RecordingReader:
         """
         head = file.read(len(_MAGIC))
         if not _MAGIC.startswith(head):
-            raise NotARecordingError("it does not begin as MCAP does")
+            raise NotARecordingError("it does not start like an MCAP file")
         file.seek(0)
         self.damage = ""
         self.attachments: dict[str, bytes] = {}  # by name, as far as the file was read
@@ -110,5 +110,5 @@ def _unpacked(chunk: Chunk) -> Chunk:
     elif not chunk.compression:
         data = chunk.data
     else:
-        raise ValueError("a chunk is packed in a way that is not known")
+        raise ValueError("a chunk has an unknown compression")
     return replace(chunk, compression="", data=data)

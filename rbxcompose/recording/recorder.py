@@ -1,4 +1,4 @@
-"""A recording that goes on: closed chunks twice a second, and a new file when one is full. Time [s] is an argument."""
+"""A recording in progress: closed chunks twice a second, and a new file when one is full. Time [s] is an argument."""
 
 from __future__ import annotations
 

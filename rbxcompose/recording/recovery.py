@@ -1,4 +1,4 @@
-"""Recovers recordings that were not finished: all that is whole goes into a new file, which then has its index."""
+"""Recovers unfinished recordings: all intact content goes into a new file, which then has its index."""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ class Tape:
 
 
 class _Taped:
-    """A transport that tells a tape what leaves the process, also what nobody outside of it wants."""
+    """A transport that tells a tape what leaves the process, also without a subscriber outside."""
 
     def __init__(self, tape: Tape, inner: Transport) -> None:
         self._tape, self._inner = tape, inner
@@ -140,7 +140,7 @@ class _Taped:
 
 
 class _TapedPublisher:
-    """A publisher that always has somebody who listens: the tape."""
+    """A publisher that always has a subscriber: the tape."""
 
     has_match = True
 

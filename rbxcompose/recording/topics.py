@@ -67,7 +67,7 @@ def by_name(counts: Mapping[RecordedTopic, int]) -> dict[RecordedTopic, int]:
 
 
 def is_replayable(topic: RecordedTopic) -> bool:
-    """Tell whether a recorded topic can be published: its names must be fit for the bus, which has only CDR."""
+    """Return whether a recorded topic can be published: its names must be fit for the bus, which has only CDR."""
     is_named = _TYPE.fullmatch(topic.type) and _HASH.fullmatch(topic.hash) and not name_problem(topic.name)
     return bool(is_named) and topic.encoding == CDR
 
@@ -104,10 +104,10 @@ class Selection:
     classes: Sequence[Qos] = ()
 
     def takes(self, topic: RecordedTopic) -> bool:
-        """Tell whether a topic is wanted."""
+        """Return whether a topic is wanted."""
         return self.names(topic) and (not self.classes or topic.qos in self.classes)
 
     def names(self, topic: RecordedTopic) -> bool:
-        """Tell whether a topic has one of the names that are wanted."""
+        """Return whether a topic has one of the names that are wanted."""
         name = topic.name.lstrip("/")
         return not self.patterns or any(fnmatchcase(name, pattern.lstrip("/")) for pattern in self.patterns)

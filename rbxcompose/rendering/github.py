@@ -1,4 +1,4 @@
-"""Findings as workflow commands of GitHub, which shows each beside its line of the change."""
+"""Findings as workflow commands of GitHub, which shows each next to its line of the change."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names that are made anew in each run: those of a component's clients, and of the goals that it sends.
+"""Names that differ in each run: those of a component's clients, and of the goals that it sends.
 
 They follow from the place of an end among all of its process. A component that runs alone gets others, which stand for
 the recorded ones from the moment at which both were seen in the same request.

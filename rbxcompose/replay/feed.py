@@ -60,7 +60,7 @@ class ReplayFeed:
         self._schedule(is_after_own=True)
 
     def is_past(self, time: float) -> bool:
-        """Tell whether a time [s] lies behind all that was recorded."""
+        """Return whether a time [s] lies behind all that was recorded."""
         return self._next is None and round(time * NANOSECONDS) > self._last
 
     @property
@@ -82,7 +82,7 @@ class ReplayFeed:
         return exact if stamp == record.log_time else record.log_time / NANOSECONDS
 
     def _schedule(self, *, is_after_own: bool = False) -> None:
-        """Go on to the next input, over what is none, and have it come at its time."""
+        """Continue to the next input, over what is none, and have it come at its time."""
         while self._next is not None and not self._is_input(self._next):
             if self._next.topic.node == self._name:
                 self._expect(self._next)
@@ -170,7 +170,7 @@ class ReplayFeed:
 
 
 def _belong_together(first: Recorded, record: Recorded) -> bool:
-    """Tell whether two records were made in one go."""
+    """Return whether two records were made in one go."""
     return (record.topic.node, record.log_time) == (first.topic.node, first.log_time) and (
         (record.topic.name == ORDERS) == (first.topic.name == ORDERS)
     )

@@ -35,7 +35,7 @@ class Rerun:
 
 
 def missing_topics(plan: Plan, instance: Instance, topics: Iterable[RecordedTopic]) -> list[str]:
-    """Return the inputs of a component that somebody in the robot publishes, and that the recording does not have."""
+    """Return the inputs of a component that the robot publishes and that the recording does not have."""
     recorded = {topic.name for topic in topics}
     published = {wire.topic for one in plan.instances for wire in one.wires if wire.kind == "out"}
     wanted: set[str] = set()

@@ -1,4 +1,4 @@
-"""The services of one component, its own and those that it asks: their keys, and the topics of their events."""
+"""The services of one component, those that it serves and calls: their keys, and the topics of their events."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class ReplayedServices:
         return self._known.get(topic)
 
     def is_served(self, pattern: str) -> bool:
-        """Tell whether a pattern of tokens is that of the servers of a service that the robot has."""
+        """Return whether a pattern of tokens is that of the servers of a service that the robot has."""
         is_server = f"/{EntityKind.SERVER}/" in pattern
         return is_server and any(f"/{mangle(name)}/" in pattern for name in self._served)
 

@@ -1,4 +1,4 @@
-"""What stands in for the rest of the robot: a transport through which a recording speaks, and a bus over it."""
+"""The substitute for the rest of the robot: a transport that plays a recording, and a bus over it."""
 
 from __future__ import annotations
 

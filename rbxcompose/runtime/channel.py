@@ -135,7 +135,7 @@ class AtRest:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """A component, or with no name the process itself, has failed for good; the robot cannot go on as it is."""
+    """A component, or with no name the process itself, has failed for good; the robot cannot continue as it is."""
 
     instance: str
     message: str
@@ -260,7 +260,7 @@ class Channel:
 
     @property
     def is_behind(self) -> bool:
-        """Tell whether the other side has not taken all; what can be left out may be left out."""
+        """Return whether the other side has not taken all; what can be left out may be left out."""
         return bool(self._unsent)
 
     def flush(self) -> None:

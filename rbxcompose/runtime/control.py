@@ -186,7 +186,7 @@ def ask(folder: RobotFolder, request: Request[A], *, timeout: float = ANSWER) ->
     try:
         answer: A = from_data(request.answer_type(), reply["answer"])
     except UnreadableError as error:
-        raise Refused(f"it answers as another version of rbxcompose: {error}") from error
+        raise Refused(f"its answer is from another version of rbxcompose: {error}") from error
     return answer
 
 

@@ -1,4 +1,4 @@
-"""What follows a fault: how it is told, and when the component that made it may try again."""
+"""What follows a fault: how it is reported, and when the component that raised it may retry."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class RestartPolicy:
 
     @property
     def is_allowed(self) -> bool:
-        """Tell whether there is any further try, however few failures there were."""
+        """Return whether there is any further try, however few failures there were."""
         return self._restart.when != "never"
 
     def after_failure(self, now: float) -> float | None:

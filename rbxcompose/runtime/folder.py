@@ -32,7 +32,7 @@ SILENT = "silent"
 
 
 class UnsafeFolderError(OSError):
-    """Raised when the folder belongs to somebody else or is open to others."""
+    """Raised when the folder belongs to another user or is open to others."""
 
 
 class BrokenStateError(ValueError):
@@ -106,7 +106,7 @@ class RobotState:
 
     @property
     def is_supervised(self) -> bool:
-        """Tell whether the supervisor still runs."""
+        """Return whether the supervisor still runs."""
         return self._is_ours(self.supervisor)
 
     def _is_ours(self, process: Process) -> bool:
@@ -133,7 +133,7 @@ def all_folders() -> list[RobotFolder]:
     """Return the folders of all robots that are up or were left behind, by name.
 
     Raises:
-        UnsafeFolderError: if the folder above them is somebody else's or open to others.
+        UnsafeFolderError: if the folder above them is another user's or open to others.
     """
     base = base_folder()
     try:
@@ -150,12 +150,12 @@ def _require_private(folder: Path) -> None:
 
     Raises:
         FileNotFoundError: if it does not exist.
-        UnsafeFolderError: if it is somebody else's, open to others, or no folder.
+        UnsafeFolderError: if it is another user's, open to others, or not a folder.
     """
     try:
         found = os.lstat(folder)
     except PermissionError as error:
-        raise UnsafeFolderError(f"{folder} cannot be looked into: it is somebody else's") from error
+        raise UnsafeFolderError(f"{folder} cannot be opened: it belongs to another user") from error
     if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) & 0o077:
         raise UnsafeFolderError(f"{folder} must be a folder of this user that nobody else can open (mode 0700)")
 
@@ -175,7 +175,7 @@ class RobotFolder:
         """Create the folder if it is not there.
 
         Raises:
-            UnsafeFolderError: if it, or the one above, is somebody else's or open to others.
+            UnsafeFolderError: if it, or the one above, is another user's or open to others.
         """
         for folder in (self.path.parent, self.path):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -183,12 +183,12 @@ class RobotFolder:
 
     @property
     def is_known(self) -> bool:
-        """Tell whether a robot is up here or has left its state behind."""
+        """Return whether a robot is up here or has left its state behind."""
         return (self.path / STATE).exists() or self.is_held
 
     @property
     def is_held(self) -> bool:
-        """Tell whether somebody holds the lock."""
+        """Return whether a process holds the lock."""
         try:
             descriptor = os.open(self.path / LOCK, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
         except OSError:
@@ -202,11 +202,11 @@ class RobotFolder:
         return False
 
     def has_lost(self, lock: int) -> bool:
-        """Tell whether somebody has removed files of a robot that runs and holds `lock`."""
+        """Return whether somebody has removed files of a robot that runs and holds `lock`."""
         return self.has_lost_lock(lock) or not all((self.path / name).exists() for name in (STATE, SOCKET))
 
     def has_lost_lock(self, lock: int) -> bool:
-        """Tell whether the lock that is held is no longer the one that others would try to hold."""
+        """Return whether the lock that is held is no longer the one that others would try to hold."""
         return not self._is_current(lock)
 
     def lock(self) -> int | None:
@@ -237,7 +237,7 @@ class RobotFolder:
         """Return the state, or None if there is none.
 
         Raises:
-            BrokenStateError: if the file is not what was written, or somebody else may have written it.
+            BrokenStateError: if the file is not what was written, or another user may have written it.
         """
         try:
             file = open_regular(self.path / STATE, follow=False)
@@ -248,7 +248,7 @@ class RobotFolder:
         with file:
             found = os.fstat(file.fileno())
             if found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) & 0o077:
-                raise BrokenStateError("somebody else may have written it")
+                raise BrokenStateError("another user may have written it")
             text = file.read(_LARGEST)  # a file that is cut off here has another checksum
         try:
             return RobotState.from_text(text.decode())

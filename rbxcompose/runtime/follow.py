@@ -1,4 +1,4 @@
-"""Reading a log that may still be written: whole lines only, and on to the next file when a new one begins."""
+"""Reading a log that may still be written: whole lines only, and on to the next file when a new one starts."""
 
 from __future__ import annotations
 

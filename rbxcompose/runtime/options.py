@@ -1,4 +1,4 @@
-"""How a robot is to run: what `up` was asked for."""
+"""How a robot runs: the options of `up`."""
 
 from __future__ import annotations
 

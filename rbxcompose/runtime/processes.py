@@ -43,16 +43,16 @@ class Process:
 
     @property
     def is_running(self) -> bool:
-        """Tell whether it still exists and has not ended."""
+        """Return whether it still exists and has not ended."""
         return self._state() not in ("", "Z", "X")
 
     @property
     def is_stopped(self) -> bool:
-        """Tell whether a signal has stopped it, so that it can hear no other but SIGKILL."""
+        """Return whether a signal has stopped it, so that it can hear no other but SIGKILL."""
         return self._state() in ("T", "t")
 
     def is_titled(self, prefix: str) -> bool:
-        """Tell whether it is a process of this user whose title starts with `prefix`."""
+        """Return whether it is a process of this user whose title starts with `prefix`."""
         folder = Path(f"/proc/{self.pid}")
         try:
             return folder.stat().st_uid == os.getuid() and folder.joinpath("cmdline").read_bytes().startswith(
@@ -62,7 +62,7 @@ class Process:
             return False
 
     def holds_file_of(self, folder: Path) -> bool:
-        """Tell whether it has a file open that lies in `folder`, or lay there before it was removed."""
+        """Return whether it has a file open that lies in `folder`, or lay there before it was removed."""
         try:
             return any(os.readlink(one).startswith(f"{folder}/") for one in Path(f"/proc/{self.pid}/fd").iterdir())
         except OSError:  # it has ended, or closes one meanwhile

@@ -58,7 +58,7 @@ def read_name(text: str, what: str, taken: Collection[str] = ()) -> str:
 
 def _better(text: str) -> str:
     made = re.sub(r"[^a-z0-9]+", "_", text.lower()).lstrip("_0123456789").rstrip("_")[:LONGEST_NAME]
-    return f"did you mean '{made}'?" if made else "a name is made of small letters, digits and underscores"
+    return f"did you mean '{made}'?" if made else "a name has lower-case letters, digits and underscores"
 
 
 def read_text(text: str) -> str:
@@ -106,6 +106,6 @@ def read_place(text: str, taken: Collection[str] = ()) -> Place:
         message = f"the place '{name}': a number {error.message}{detail}"
         raise AnswerError(ANSWER.at(None, message, help=error.help)) from None
     if max(abs(x), abs(y)) > FARTHEST:
-        help_text = f"begin with places within {FARTHEST:.0f} m, and move it in the file"
+        help_text = f"use places within {FARTHEST:.0f} m, and move it in the file"
         raise AnswerError(ANSWER.at(None, f"the place '{name}' is very far away", help=help_text))
     return Place(name, x, y, heading)

@@ -21,7 +21,7 @@ def read_component_name(text: str) -> str:
     """
     name = read_name(text, "a component type", component_names())
     if keyword.iskeyword(name) or keyword.issoftkeyword(name):
-        raise _taken(name, "it is a word of Python")
+        raise _taken(name, "it is a reserved word of Python")
     if name in sys.stdlib_module_names or _is_module(name):
         raise _taken(name, "there is a Python module of that name")
     if not class_name(name).isidentifier() or class_name(name) in _CLASSES:

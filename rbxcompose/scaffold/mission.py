@@ -21,7 +21,7 @@ _INDENT = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\r?\n)*( +)\S")
 
 @dataclass(frozen=True, slots=True)
 class MissionAnswers:
-    """What is to be known of a new mission.
+    """What must be known of a new mission.
 
     `robot` is the path of the robot's file in its project, `skill` the one that drives to places, if there is one, at
     `speed` [m/s].

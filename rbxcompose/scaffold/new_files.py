@@ -13,7 +13,7 @@ from rbxcompose.printable import plain
 
 EXISTS = kind(
     "RBX9101",
-    """A file is there already
+    """A file already exists
 
 `new` never overwrites anything. Choose another name, move the file away, or use another folder with `--into`.
 """,
@@ -22,7 +22,7 @@ NOT_WRITTEN = kind(
     "RBX9104",
     """A file cannot be written
 
-The system refuses: the folder is not writable, the disk is full, or a file stands where a folder should be. `new`
+The system refuses: the folder is not writable, the disk is full, or a file is where a folder should be. `new`
 leaves nothing behind.
 """,
 )
@@ -41,7 +41,7 @@ def write_new(folder: Path, files: Mapping[str, str]) -> Finding | None:
         path = Path(error.filename2 or error.filename)
         return EXISTS.at(
             None,
-            f"'{plain(shown_name(path))}' is there already; nothing was written",
+            f"'{plain(shown_name(path))}' already exists; nothing was written",
             help="choose another name, or another folder with '--into'",
         )
     except OSError as error:

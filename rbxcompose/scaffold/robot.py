@@ -36,7 +36,7 @@ _WORDS = ("and", "or", "not", "in", "is", "lambda", "do", "else", "then")
 
 @dataclass(frozen=True, slots=True)
 class RobotAnswers:
-    """What is to be known of a new robot; the dock is always at the origin."""
+    """What must be known of a new robot; the dock is always at the origin."""
 
     name: str
     about: str = ABOUT
@@ -115,7 +115,9 @@ def read_base(name: str) -> str:
         help_text = f"take '{BASE}', and write the other one into the file"
         raise AnswerError(ANSWER.at(None, f"'{name}' needs settings of its own", help=help_text)) from None
     if drives is None:
-        raise AnswerError(ANSWER.at(None, f"'{name}' is no base: it does not follow 'cmd_vel'", help=f"take '{BASE}'"))
+        raise AnswerError(
+            ANSWER.at(None, f"'{name}' is not a base: it does not follow 'cmd_vel'", help=f"take '{BASE}'")
+        )
     return name
 
 

@@ -1,4 +1,4 @@
-"""What may stand at a place of a manifest, read from its JSON Schema and what is written around the place."""
+"""What may be at a place of a manifest, read from its JSON Schema and the text around the place."""
 
 from __future__ import annotations
 

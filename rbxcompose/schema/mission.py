@@ -46,21 +46,21 @@ NODE_NAME: Schema = {
 }
 _ABOUT = {
     "inputs": "What is given to the mission when it starts: typed values by name.",
-    "data": "Values of the mission's own by name, with what they are at the start; `set` changes them.",
+    "data": "The mission's own data by name, with initial values; `set` changes them.",
     "interrupts": "Conditions that cut the mission short, by name; the first one that holds wins.",
-    "rate": "How often conditions are asked that nothing announces.",
-    "outputs": "What the mission gives to one that uses it: expressions by name.",
+    "rate": "How often conditions are evaluated whose changes are not announced.",
+    "outputs": "What the mission returns to one that uses it: expressions by name.",
     "do": "What the mission does.",
     "machine": "What the mission does, as a state machine.",
     "when": "The condition that cuts the mission short.",
     "reaction": "What is done then.",
-    "afterwards": "What comes after the reaction: `continue` goes on with what was cut short, `restart` begins the "
-    "mission anew, `restart` with a name below it what is named, `end` ends the mission in success.",
+    "afterwards": "What comes after the reaction: `continue` resumes what was cut short, `restart` restarts the "
+    "mission, or the step named below it, `end` ends the mission in success.",
 }
 _MACHINE = {
-    "start": "The state in which it begins.",
+    "start": "The state in which it starts.",
     "states": "The states by name.",
-    "ends": "Ends beside `finished` and `failed`, each with what it counts as.",
+    "ends": "Ends besides `finished` and `failed`, each with what it counts as.",
     "history": HISTORY,
 }
 _STATE = {

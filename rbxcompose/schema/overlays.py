@@ -13,7 +13,7 @@ from rbxcompose.sections.components import components
 
 OVER = "overlay_"  # begins the name of a definition that is another one in an overlay
 REMOVED = "removed"
-_REMOVED: Schema = {"enum": [None, ""], "description": "With the tag `!remove`: takes it out of what lies below."}
+_REMOVED: Schema = {"enum": [None, ""], "description": "With the tag `!remove`: removes it from the layers below."}
 _NOT_NEEDED = ("required", "minProperties", "minItems", "default")
 _NOTES = ("description", "x-names", "x-dimension")  # what editors look for at the key itself
 

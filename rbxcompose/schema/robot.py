@@ -1,4 +1,4 @@
-"""Schemas of what is made of sections: robots, the parts that they include, and what is laid over them."""
+"""Schemas of what consists of sections: robots, the parts that they include, and their overlays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Schemas of what stands in one scalar: quantities with units, expressions, names, and `${...}` in place of any."""
+"""Schemas of single scalars: quantities with units, expressions, names, and `${...}` in place of any."""
 
 from __future__ import annotations
 

@@ -14,9 +14,9 @@ from rbxcompose.schema.settle import opened, schemas_of
 STEP = "step"
 WORDS: dict[str, Any] = {"robot": str, "mission": Name, "with": dict[Name, Any]}
 _ABOUT = {
-    STEP: "A skill, a named node or a state; behind a skill stands its main argument, or a map of its arguments.",
+    STEP: "A skill, a named node or a state; a skill may be followed by its main argument, or a map of its arguments.",
     "ended": "How it ended: `success`, `failure`, `halted`, `skipped`, `running`, or an outcome of its own.",
-    "at": "When it began, counted from the start of the test.",
+    "at": "When it started, counted from the start of the test.",
 }
 
 

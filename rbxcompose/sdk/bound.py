@@ -38,7 +38,7 @@ class OrderSender(Sender[M_contra], Protocol[M_contra]):
         ...
 
     def watch(self, changed: Callable[[], None], /) -> None:
-        """Have `changed` called whenever somebody begins or ceases to listen."""
+        """Have `changed` called whenever a subscriber comes or goes."""
         ...
 
 
@@ -69,7 +69,7 @@ class Caller(Protocol[Q_contra, R]):
 
     @property
     def is_available(self) -> bool:
-        """Tell whether a server is known."""
+        """Return whether a server is known."""
         ...
 
     def __call__(self, request: Q_contra, then: Callable[[Reply[R]], None], /, *, timeout: float = 5.0) -> None:
@@ -84,7 +84,7 @@ class Outcome(StrEnum):
     ABORTED = "aborted"
     CANCELED = "canceled"
     REJECTED = "rejected"  # the server refused it
-    LOST = "lost"  # the server went away
+    LOST = "lost"  # the server is gone
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,16 +106,16 @@ class ServedGoal(Protocol[G_co, R_contra, F_contra]):
 
     @property
     def cancel_requested(self) -> bool:
-        """Tell whether the goal should end soon, by `canceled`."""
+        """Return whether the goal should end soon, by `canceled`."""
         ...
 
     @property
     def is_paused(self) -> bool:
-        """Tell whether the goal is to be held as it is, until it goes on or is cancelled."""
+        """Return whether the goal must be held as it is, until it continues or is cancelled."""
         ...
 
     def feedback(self, message: F_contra, /) -> None:
-        """Tell the client how far it got."""
+        """Send the client feedback."""
         ...
 
     def succeeded(self, result: R_contra | None = None, /) -> None:
@@ -153,7 +153,7 @@ class ActionCaller(Protocol[G_contra, R, F_co]):
 
     @property
     def is_available(self) -> bool:
-        """Tell whether a server is known."""
+        """Return whether a server is known."""
         ...
 
     def __call__(
@@ -168,11 +168,11 @@ class Window(Protocol):
 
     @property
     def is_watched(self) -> bool:
-        """Tell whether anybody would hear news; nothing need be put together while nobody does."""
+        """Return whether there is a subscriber; without one, nothing need be prepared."""
         ...
 
     def put(self, value: object, /) -> None:
-        """Tell news, as data for JSON."""
+        """Send an update, as data for JSON."""
         ...
 
 

@@ -1,7 +1,7 @@
 """Capabilities: what the compiler and the tools need to know of a component, as the component itself declares it.
 
-Nobody knows a component by its type's name: somebody else's battery, base or driver counts as much as ours. A text in a
-capability is the name of a port of the component; everything else is a `Setting`. Quantities are in SI.
+No rule knows a component by its type's name: a battery, base or driver from elsewhere counts as much as ours. A text in
+a capability is the name of a port of the component; everything else is a `Setting`. Quantities are in SI.
 """
 
 from __future__ import annotations

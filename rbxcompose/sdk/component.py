@@ -27,7 +27,7 @@ class Context(Protocol):
 
     @property
     def is_stopped(self) -> bool:
-        """Tell whether the robot is held by a stop."""
+        """Return whether the robot is held by a stop."""
         ...
 
     def log(self, level: Level, text: str) -> None:
@@ -35,7 +35,7 @@ class Context(Protocol):
         ...
 
     def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
-        """Tell diagnostics how the component is."""
+        """Report the component's state to diagnostics."""
         ...
 
     def wake_at(self, time: float) -> None:
@@ -43,7 +43,7 @@ class Context(Protocol):
         ...
 
     def notify(self, event: RobotEvent) -> None:
-        """Tell the supervisor of something that concerns the whole robot."""
+        """Report something that concerns the whole robot to the supervisor."""
         ...
 
     def repeat(self, requests: Sequence[Command]) -> None:
@@ -56,11 +56,11 @@ class Context(Protocol):
 
 
 class Component(Generic[C]):
-    """A running part of the robot: subclass it, declare ports, fill in what is needed.
+    """A running component of the robot: subclass it, declare ports, override what you need.
 
     The runtime calls one method at a time. Time comes from `now`, never from Python's clocks.
 
-    A component that is `blocking` is called in a thread of its own, so that it delays nobody. Meanwhile its messages
+    A component that is `blocking` is called in its own thread, so that it delays nothing else. Meanwhile its messages
     wait, as many as their class of quality allows; goals and commands are refused. `is_at_rest`, `occupation` and
     `summary` are asked for at any time, also during a call: let them read plain attributes.
     """
@@ -111,7 +111,7 @@ class Component(Generic[C]):
 
     @property
     def is_at_rest(self) -> bool:
-        """Tell whether nothing that this component moves is moving."""
+        """Return whether nothing that this component moves is moving."""
         return True
 
     @property
@@ -121,11 +121,11 @@ class Component(Generic[C]):
 
     @property
     def claims(self) -> bool:
-        """Tell whether its occupation claims what moves the robot."""
+        """Return whether its occupation claims what moves the robot."""
         return False
 
     def info(self, text: str) -> None:
-        """Log an event of the robot's story."""
+        """Log an event."""
         self.context.log(Level.OK, text)
 
     def warn(self, text: str) -> None:
@@ -133,11 +133,11 @@ class Component(Generic[C]):
         self.context.log(Level.WARN, text)
 
     def status(self, level: Level, message: str, /, **values: object) -> None:
-        """Tell diagnostics how this component is."""
+        """Report this component's state to diagnostics."""
         self.context.status(level, message, values)
 
     def configure(self) -> None:
-        """Get ready: import what is heavy, build the core, open devices. Nothing moves yet."""
+        """Prepare: import heavy packages, build the core, open devices. Nothing moves yet."""
 
     def reconfigure(self, old: C) -> None:
         """Follow `config`, of which a field that is marked `Live` has changed since it was `old`.
@@ -147,16 +147,16 @@ class Component(Generic[C]):
         """
 
     def take_over(self, old: Self) -> None:
-        """Go on in the place of `old`, which had other settings and has been retired; comes after `configure`."""
+        """Replace `old`, which had other settings and has been retired; called after `configure`."""
 
     def activate(self) -> None:
-        """Start to work; steps and messages come from now on."""
+        """Start working; steps and messages come from now on."""
 
     def deactivate(self) -> None:
-        """Stop to work; steps and messages end."""
+        """Stop working; steps and messages end."""
 
     def cleanup(self) -> None:
-        """Give back what `configure` took."""
+        """Release what `configure` acquired."""
 
     def step(self, dt: float) -> None:
         """Advance by `dt` [s], `rate` times per second."""
@@ -165,7 +165,7 @@ class Component(Generic[C]):
         """Take a message of an input that has no method `on_<port>` of its own."""
 
     def wake(self) -> None:
-        """Do what was asked for by `context.wake_at`."""
+        """Do what `context.wake_at` was called for."""
 
     def start(self) -> None:
         """Begin what waits for the whole robot to be active."""
@@ -177,16 +177,16 @@ class Component(Generic[C]):
         """Allow motion again; start none."""
 
     def hold(self) -> None:
-        """Command nothing but rest until `go_on`: robot time stands still, and so do all deadlines."""
+        """Command only a stop until `go_on`: robot time stands still, and so do all deadlines."""
 
     def go_on(self) -> None:
-        """Command again: robot time goes again. What was commanded before does not count any more."""
+        """Command again: robot time runs again. Earlier commands no longer count."""
 
     def brake(self) -> None:
-        """Come to rest for good: the robot is going down."""
+        """Stop for good: the robot is going down."""
 
     def lost(self, names: tuple[str, ...], cause: str) -> None:
-        """Hear that these components have gone."""
+        """Learn that these components are lost."""
 
     @classmethod
     def requests(cls) -> Requests:

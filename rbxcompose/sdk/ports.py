@@ -1,4 +1,4 @@
-"""Ports: what a component says and hears, declared in its class so that `check` can prove the wiring.
+"""Ports: what a component publishes and subscribes to, declared in its class so that `check` can prove the wiring.
 
 On a class, a port is its declaration; on a component, it is the live thing that the runtime has bound to it.
 """
@@ -69,7 +69,7 @@ class Out(Port[Sender[M]]):
 
 
 class In(Port[Latest[M]]):
-    """Subscribes to messages: each one goes to the method `on_<port>`, the newest can be asked for."""
+    """Subscribes to messages: each one goes to the method `on_<port>`; the newest can be read."""
 
     kind = "in"
 
@@ -133,11 +133,11 @@ class ServesTopic(In[M]):
         super().__init__(message, topic, qos=qos, is_open=True, max_rate=max_rate)
         end: type[Message] | None = ends.interface if ends is not None else None
         if end is not None and end.FIELDS.get("success") != "bool":
-            raise ValueError(f"{end.TYPE} has no flag 'success' by which it could tell the end of an order")
+            raise ValueError(f"{end.TYPE} has no flag 'success' to report the end of an order")
         if halts is not None and end is None:
             raise ValueError("an order without 'ends' is over once it is sent: 'halts' would never be used")
         if outcomes and end is None:
-            raise ValueError("an order without 'ends' is over once it is sent: there is nobody to tell an outcome")
+            raise ValueError("an order without 'ends' is over once it is sent: nothing can report an outcome")
         _require_outcomes(outcomes, end)
         if halts is not None:
             halts.is_open = True  # whether a mission feeds it depends on what the robot's missions use
@@ -154,7 +154,7 @@ class SendsOrders(Out[M]):
 
 
 class Serves(Port[None]):
-    """Answers requests: the method `on_<port>` takes a request and returns the response."""
+    """Serves requests: the method `on_<port>` takes a request and returns the response."""
 
     kind = "serves"
 
@@ -164,7 +164,7 @@ class Serves(Port[None]):
 
 
 class Calls(Port[Caller[Q, R]]):
-    """Asks a service of another component."""
+    """Calls a service of another component."""
 
     kind = "calls"
 

@@ -23,13 +23,13 @@ def component(name: str) -> Callable[[T], T]:
     """Register a component class under its type's name.
 
     Raises:
-        TypeError: if it is no subclass of `Component`.
+        TypeError: if it is not a subclass of `Component`.
         ValueError: if another class has this name, or one of its ports belongs to a port that it does not have.
     """
 
     def register(cls: T) -> T:
         if not issubclass(cls, Component):
-            raise TypeError(f"{cls.__module__}.{cls.__qualname__} is no subclass of Component")
+            raise TypeError(f"{cls.__module__}.{cls.__qualname__} is not a subclass of Component")
         other = _TYPES.get(name)
         if other is not None and (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
             raise ValueError(f"two component types are named '{name}': {other.__module__} and {cls.__module__}")
@@ -49,7 +49,7 @@ def _require_ends(cls: type[Component[Any]]) -> None:
             other = getattr(port, word)
             if other is not None and not any(other is one for one in ports):
                 where = f"{cls.__module__}.{cls.__qualname__}"
-                raise ValueError(f"{where}: '{word}' of the port '{port.name}' is no port of this class")
+                raise ValueError(f"{where}: '{word}' of the port '{port.name}' is not a port of this class")
 
 
 def component_names() -> list[str]:

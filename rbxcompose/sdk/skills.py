@@ -42,17 +42,17 @@ class Activity:
     rate: ClassVar[float] = 20.0  # [Hz] of `step`
 
     def step(self, now: float) -> Told | None:
-        """Go on; return None while it is not done."""
+        """Continue; return None while it is not done."""
         raise NotImplementedError
 
     def halt(self) -> None:
-        """Stop at once: nobody waits for it any more."""
+        """Stop at once: nothing waits for it any more."""
 
     def pause(self, now: float) -> None:
         """Hold, at robot time `now` [s]; no steps come until `resume`."""
 
     def resume(self, now: float) -> None:
-        """Go on, at robot time `now` [s]."""
+        """Continue, at robot time `now` [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class SkillType:
 
     @property
     def is_activity(self) -> bool:
-        """Tell whether it may take time."""
+        """Return whether it may take time."""
         return inspect.isclass(self.make)
 
 
@@ -143,7 +143,7 @@ def _arguments(made: Callable[..., Any]) -> tuple[dict[str, Type], frozenset[str
     function: Callable[..., Any] = made
     if inspect.isclass(made):
         if not issubclass(made, Activity) or not callable(getattr(made, "start", None)):
-            raise TypeError(f"{_place(made)} is no subclass of Activity with a method 'start'")
+            raise TypeError(f"{_place(made)} is not a subclass of Activity with a method 'start'")
         function = getattr(made, "start")  # noqa: B009 - each subclass has arguments of its own
     hints = get_type_hints(function, include_extras=True)
     found: dict[str, Type] = {}

@@ -1,4 +1,4 @@
-"""The section `body`: the file that describes what the robot is made of."""
+"""The section `body`: the file that describes the robot's body."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Body(Config):
     """What the robot looks like and how it moves."""
 
     urdf: FileName
-    """The URDF file, relative to this one; it goes out on the topic `robot_description`, as it is."""
+    """The URDF file, relative to this one; it is published unchanged on `robot_description`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,13 +20,13 @@ class BusModel(Config):
     namespace: TopicName | None = None
     """Prefix of all relative topics."""
     port: int = Field(7447, ge=1, le=65535)
-    """TCP port of the robot's router; the next free one is taken if it is in use."""
+    """TCP port of the robot's router; if it is in use, the next free one."""
     wire: Literal["jazzy"] = "jazzy"
     """The ROS 2 distribution whose wire format is spoken."""
     router: str | None = None
-    """An existing router to use instead of an own one, such as `tcp/192.168.0.2:7447`."""
+    """An existing router to use instead of the robot's own, such as `tcp/192.168.0.2:7447`."""
     clock: Literal["own", "external"] = "own"
-    """Whose time the robot follows: its own, or that of a simulator outside, which publishes it on `/clock`."""
+    """Whose time the robot follows: its own, or that of an external simulator, which publishes it on `/clock`."""
 
 
 @section("bus", BusModel, order=100, files=(ROBOT, OVERLAY))

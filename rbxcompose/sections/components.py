@@ -27,7 +27,7 @@ UNKNOWN_TYPE = kind(
     "RBX3004",
     """Unknown type of component
 
-No component type has this name, neither of those that ship with the project nor of those that are installed.
+Neither the project nor an installed package has a component type with this name.
 
 Bad:
 ```yaml
@@ -197,7 +197,7 @@ def _type_name(name: str, entry: Entry, node: MappingNode, report: Report) -> st
     if told := registry.PLUGINS.overshadowed(written.text):
         report.add(LEFT_OUT.at(written.span, told))
     if written.text not in registry.component_names():
-        message = f"component '{name}' is of a type that does not exist: '{plain(written.text, 60)}'"
+        message = f"component '{name}' has a type that does not exist: '{plain(written.text, 60)}'"
         report.add(UNKNOWN_TYPE.misspelt(written.span, message, written.text, registry.component_names(), "types"))
         return None
     try:

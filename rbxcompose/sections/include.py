@@ -1,4 +1,4 @@
-"""The section `include`: parts of which a robot is made."""
+"""The section `include`: the parts of a robot."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Include(Config):
     is_composed=False,
 )
 def include(reading: Reading[Include]) -> Iterator[tuple[str, Entry, Include | None]]:
-    """Parts of which the robot is made, by the name of the instance, which stands before all names of the part.
+    """The robot's parts, by instance name, which is a prefix of all names of the part.
 
     Example:
         include:

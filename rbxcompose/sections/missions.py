@@ -1,4 +1,4 @@
-"""The section `missions`: what the robot can be asked to do."""
+"""The section `missions`: what the robot can do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The section `muxes`: who may command."""
+"""The section `muxes`: which source may command."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ class MuxInput(Config):
     priority: int
     """The larger one wins."""
     timeout: Time = Field(gt=0)
-    """It has lost its turn after this long without a message."""
+    """It loses its turn after this long without a message."""
     source: PortName | None = Field(None, alias="from")
     """The component, or `component.port`, whose output this is; without it the input is open to the outside."""
     max_rate: Frequency | None = Field(None, gt=0)
-    """More is not taken from one publisher elsewhere: it is dropped, and told in diagnostics. 1000 Hz if left out."""
+    """Most messages from one publisher in another process; the rest is dropped and reported. Default: 1000 Hz."""
 
 
 class MuxLock(Config):
-    """A heartbeat that locks when it is silent."""
+    """A heartbeat that locks while it is silent."""
 
     priority: int
     """Inputs of a lower priority are locked."""
@@ -138,7 +138,7 @@ def _details(read: Iterable[str]) -> Mapping[str, str]:
     details=_details,
 )
 def muxes(reading: Reading[MuxModel]) -> dict[str, MuxModel]:
-    """Who may command, by the topic that is commanded: the live input of the largest priority is let through.
+    """Which source may command, by topic: the live input with the highest priority gets through.
 
     Example:
         muxes:

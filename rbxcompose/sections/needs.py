@@ -17,5 +17,5 @@ class Needs(Config):
 
 @section("needs", Needs, order=130, files=(PART,), scope=SetScope.NOTHING, is_composed=False)
 def needs(reading: Reading[Needs]) -> Needs:
-    """What must be there outside of the part; `check` sees to it."""
+    """What must exist outside the part; `check` verifies it."""
     return reading.whole() or Needs()

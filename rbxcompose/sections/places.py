@@ -18,7 +18,7 @@ class PlaceModel(Config):
     y: Length
     """Position along y."""
     heading: Angle = 0.0
-    """Direction, counted from x towards y: 90 deg looks along y."""
+    """Direction, measured from x towards y: 90 deg is along y."""
     colour: str = ""
     """How viewers draw it."""
 

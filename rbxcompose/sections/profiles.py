@@ -1,4 +1,4 @@
-"""The section `profiles`: changes to the robot that are made when asked for."""
+"""The section `profiles`: changes to the robot that are applied on request."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PROFILE = "profile"
     "profiles", dict[str, Any], order=120, files=(ROBOT,), names=PROFILE, scope=SetScope.NOTHING, is_composed=False
 )
 def profiles(reading: Reading[dict[str, Any]]) -> dict[str, Entry] | None:
-    """Changes to the robot by name, made when asked for by `--profile NAME`.
+    """Changes to the robot by name, applied with `--profile NAME`.
 
     Example:
         profiles:

@@ -21,5 +21,5 @@ class Provides(Config):
 
 @section("provides", Provides, order=140, files=(PART,), scope=SetScope.NOTHING, is_composed=False)
 def provides(reading: Reading[Provides]) -> Provides:
-    """What the part gives to the rest of the robot, by the part's own names; `check` sees to it."""
+    """What the part gives to the rest of the robot, under the part's own names; `check` verifies it."""
     return reading.whole() or Provides()

@@ -21,7 +21,7 @@ class ValueModel(Config):
     type: str | None = None
     """What it is: a dimension, `number`, `text`, `flag`, ..."""
     unit: str | None = None
-    """Unit of the message, where it is another than that of the type."""
+    """Unit of the message, if it differs from that of the type."""
 
 
 @section("values", ValueModel, order=80, names=VALUE, entry="value", short=Short("port", is_merged=False))

@@ -57,7 +57,7 @@ class BatteryCore:
     def set(self, level: float) -> str:
         """Set the charge; return why not if `level` is no ratio from 0 to 1, else nothing."""
         if not 0.0 <= level <= 1.0:
-            return f"a battery level lies between 0 % and 100 %, not at {level * 100:g} %"
+            return f"a battery level is between 0 % and 100 %, not at {level * 100:g} %"
         self._start, self._drained = level, 0.0
         return ""
 

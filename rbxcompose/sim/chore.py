@@ -22,7 +22,7 @@ class ChoreSettings:
 
 
 class ChoreCore:
-    """Work that takes a time, in strokes; each begins its count anew."""
+    """Work that takes a time, in strokes; each starts its own count."""
 
     def __init__(self, settings: ChoreSettings) -> None:
         self.settings = settings
@@ -35,7 +35,7 @@ class ChoreCore:
 
     @property
     def is_done(self) -> bool:
-        """Tell whether nothing is left to do."""
+        """Return whether nothing is left to do."""
         return self.left <= NOTHING_LEFT
 
     def step(self, dt: float) -> Velocity2:

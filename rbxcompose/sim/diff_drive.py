@@ -50,7 +50,7 @@ class DiffDriveCore:
 
     @property
     def at_rest(self) -> bool:
-        """Tell whether the base stands still."""
+        """Return whether the base stands still."""
         return self.velocity == AT_REST
 
     def command(self, velocity: Velocity2, now: float) -> None:

@@ -9,7 +9,7 @@ PER_WORD = 0.4  # [s] of unhurried speech
 
 @skill("say", claims="voice", pausable=True)
 class Say(Activity):
-    """Say words. A robot without a voice says them in its log only, and takes the time that they would take.
+    """Say words. A robot without a voice only logs them, and takes the time that speaking would take.
 
     Example:
         say: the kitchen is clean

@@ -1,4 +1,4 @@
-"""Finds where a source file asks for time itself: components are given theirs, or no run could be repeated."""
+"""Finds where a source file reads a clock itself: components get their time, or no run could be repeated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Golden files: what a person reads, kept as text beside the tests and compared to the letter."""
+"""Golden files: output for users, kept as text beside the tests and compared to the letter."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class Golden:
-    """A folder of golden files; `update` writes them anew instead of comparing (`pytest --update-golden`)."""
+    """A folder of golden files; `update` writes them instead of comparing (`pytest --update-golden`)."""
 
     folder: Path
     update: bool = False

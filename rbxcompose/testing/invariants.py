@@ -90,12 +90,12 @@ class SentVelocity:
 
     @property
     def is_finite(self) -> bool:
-        """Tell whether it is a velocity at all."""
+        """Return whether it is a velocity at all."""
         return math.isfinite(sum(self.velocity))
 
     @property
     def is_rest(self) -> bool:
-        """Tell whether nothing moves by it."""
+        """Return whether nothing moves by it."""
         return self.is_finite and max(map(abs, self.velocity)) <= ROUNDING
 
 

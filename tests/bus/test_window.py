@@ -25,12 +25,12 @@ def asked(network: Network, by: Connected) -> TransportReply:
 
 
 def _ask(by: Connected, found: list[TransportReply]) -> bool:
-    """Ask anew until there is an answer of the server: it may not be known yet."""
-    if not found or found[0].error == "the server went away":
+    """Ask again until the server answers: it may not be known yet."""
+    if not found or found[0].error == "the server is gone":
         found.clear()
         by.transport.ask(KEY, b"", b"", found.append)
         by.turn()
-    return bool(found) and found[0].error != "the server went away"
+    return bool(found) and found[0].error != "the server is gone"
 
 
 def is_watched(window: Window) -> bool:
@@ -62,7 +62,7 @@ def test_who_asks_gets_the_whole_and_who_listens_the_news(network: Network) -> N
     network.until(lambda: not window._remote.has_match)
     one.bus.close_owner("mission")
     other.transport.ask(KEY, b"", b"", lambda answer: heard.append(answer.error.encode()))
-    network.until(lambda: heard[-1] == b"the server went away")
+    network.until(lambda: heard[-1] == b"the server is gone")
 
 
 def test_a_refusal_reaches_who_asks(network: Network) -> None:

@@ -32,7 +32,7 @@ def told(key: str, reader: TopicReader = READER, now: float = 2 * SILENCE, start
 
 
 def test_a_publisher_that_is_there_and_silent_is_named_with_who_waits_for_it() -> None:
-    assert told(token()) == "'charger' has heard nothing on /level for 9 s, though 'battery' publishes it"
+    assert told(token()) == "'charger' has received nothing on /level for 9 s, though 'battery' publishes it"
 
 
 def test_another_version_of_the_type_is_told_at_once() -> None:

@@ -100,7 +100,7 @@ def test_how_far_above_its_limits_a_base_drops_commands_is_its_own_affair(tmp_pa
     text = "  base: {{type: toy_fixed_wheels}}\n  pilot: {{type: toy_pilot, pace: {}}}\n"
     assert {one.code for one in found(text.format("1.4 m/s"), tmp_path)} == {"RBX3501"}
     told = [one.message for one in found(text.format("1.6 m/s"), tmp_path) if one.code == "RBX3504"]
-    assert told == ["'pilot' drives with 1.6 m/s, but its base 'base' drops what is above 3 times its limit of 0.5 m/s"]
+    assert told == ["'pilot' drives at 1.6 m/s, but its base 'base' drops commands above 3 times its limit of 0.5 m/s"]
 
 
 def test_commands_are_followed_through_a_strangers_mux(tmp_path: Path) -> None:
@@ -110,7 +110,7 @@ def test_commands_are_followed_through_a_strangers_mux(tmp_path: Path) -> None:
     )
     assert [one.code for one in found(text, tmp_path)] == ["RBX3503"]
     [past] = found(text + "  spare: {type: toy_wheels, connect: {velocity: selected, frames: spare/tf}}\n", tmp_path)
-    assert (past.code, past.help) == ("RBX3102", "listen to the mux's output: 'velocity: cmd_vel'")
+    assert (past.code, past.help) == ("RBX3102", "subscribe to the mux's output: 'velocity: cmd_vel'")
 
 
 def test_a_frame_that_can_be_set_is_told_where_it_is_set(tmp_path: Path) -> None:

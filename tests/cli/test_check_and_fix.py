@@ -235,7 +235,7 @@ def test_a_file_that_changed_meanwhile_is_left_as_it_is(
 
     monkeypatch.setattr(fixes, "safe_fixes", meanwhile)
     told = output(capsys, "--fix", str(ROBOT), code=1)
-    assert f"left {ROBOT} as it is: it was changed since it was read" in told
+    assert f"left {ROBOT} as it is: it has changed since it was read" in told
     assert "type: chargr" in (project / ROBOT).read_text()
 
 
@@ -244,7 +244,7 @@ def test_a_file_that_may_not_be_written_is_left_as_it_is(
 ) -> None:
     change(project / ROBOT, "type: charger", "type: chargr")
     monkeypatch.setattr(os, "access", lambda *_: False)
-    assert f"left {ROBOT} as it is: it may not be written" in output(capsys, "--fix", str(ROBOT), code=1)
+    assert f"left {ROBOT} as it is: it is not writable" in output(capsys, "--fix", str(ROBOT), code=1)
 
 
 def test_what_was_fixed_does_not_stand_in_output_for_programs(

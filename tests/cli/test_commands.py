@@ -106,7 +106,7 @@ def test_ps_shows_what_a_dead_supervisor_last_wrote(capsys: pytest.CaptureFixtur
     out = capsys.readouterr().out
     assert "base  toy   dead   robot    -    1" in out
     assert "its supervisor has died" in out.splitlines()[-1]
-    assert "'rbxcompose down a', or the next 'up', clears away what it has left" in out
+    assert "'rbxcompose down a', or the next 'up', cleans up" in out
 
 
 @pytest.mark.parametrize("wanted", ["a", "/robots/a/robot.yaml", "/robots/a"])
@@ -162,7 +162,7 @@ def test_logs_of_somebody_who_is_not_there_is_a_finding_with_a_hint(capsys: pyte
     written("a")
     assert command.main(["logs", "bse"]) == 1
     shown = capsys.readouterr().err
-    assert "error[RBX9002]: 'bse' is no robot that is up, and no component in the log of 'a'" in shown
+    assert "error[RBX9002]: 'bse' is neither a robot that is up nor a component in the log of 'a'" in shown
     assert "did you mean 'base'?" in shown
 
 

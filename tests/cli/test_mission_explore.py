@@ -55,4 +55,4 @@ def test_what_is_wrong_with_inputs_is_told(
 
 def test_a_setting_without_a_value_is_wrong_usage(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["mission", "explore", "go", str(folder), "--set", "where"]) == 2
-    assert "'where' is no NAME=VALUE" in capsys.readouterr().err
+    assert "'where' is not NAME=VALUE" in capsys.readouterr().err

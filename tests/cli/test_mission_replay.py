@@ -61,16 +61,16 @@ def test_another_mission_is_told_with_the_first_difference(log: Path, capsys: py
 
 def test_a_mission_without_the_nodes_of_the_log_is_told(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("work.yaml").write_text(f"{HEAD}do:\n  wait: 1 h\n")
-    assert "it was changed too much to go on" in told(capsys, code=1)
+    assert "it has changed too much to continue" in told(capsys, code=1)
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("", "'work.log' is empty"),
-        ("no json\n", "'work.log' is no log: each line is a record in JSON"),
-        ("[1]\n", "'work.log' is no log"),
-        ('{"mission": "work", "run": 1, "event": "tick", "time": 1.0}\n', "does not begin with the beginning"),
+        ("no json\n", "'work.log' is not a log: each line must be a JSON record"),
+        ("[1]\n", "'work.log' is not a log"),
+        ('{"mission": "work", "run": 1, "event": "tick", "time": 1.0}\n', "does not start with the start"),
         ('{"mission": "wrok", "run": 1, "event": "tick", "time": 1.0}\n', "did you mean 'work'?"),
     ],
 )

@@ -64,7 +64,7 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
 def test_an_export_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     main(["msg", "export", str(tmp_path)])
     assert main(["msg", "export", str(tmp_path)]) == 1
-    assert "is there already" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
 
 
 def test_a_package_names_the_packages_that_its_types_are_made_of() -> None:

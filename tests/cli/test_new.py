@@ -59,7 +59,7 @@ def test_nothing_is_ever_overwritten(project: Path, capsys: pytest.CaptureFixtur
     (project / "missions").mkdir()
     (project / "missions/cart.yaml").write_text("mine")
     assert command.main(["new", "robot", "cart", "--yes"]) == 1
-    assert "error[RBX9101]: 'missions/cart.yaml' is there already" in capsys.readouterr().err
+    assert "error[RBX9101]: 'missions/cart.yaml' already exists" in capsys.readouterr().err
     assert files(project) == ["missions/cart.yaml"]
 
 
@@ -115,7 +115,7 @@ def test_a_mission_needs_one_robot(project: Path, capsys: pytest.CaptureFixture[
     command.main(["new", "robot", "a", "--yes"])
     command.main(["new", "robot", "b", "--yes"])
     assert command.main(["new", "mission", "lap", "--yes"]) == 1
-    assert "name it by '--robot': robots/a, robots/b" in capsys.readouterr().err
+    assert "name it with '--robot': robots/a, robots/b" in capsys.readouterr().err
     assert command.main(["new", "mission", "lap", "--robot", "robots/c"]) == 1
     assert command.main(["new", "mission", "lap", "--robot", "rbx:robots/turtlebot"]) == 1
     assert command.main(["new", "mission", "a", "--robot", "robots/a"]) == 1
@@ -177,7 +177,7 @@ def test_at_a_terminal_it_asks_and_asks_again_after_a_wrong_answer(project: Path
     terminal.answer("when the battery is low.]: ", "\n")
     terminal.answer("[diff_drive_sim]: ", "diff_drive\n")
     assert "did you mean 'diff_drive_sim'?" in terminal.answer("[diff_drive_sim]: ", "\n")
-    place = "(nothing: go on): "
+    place = "(empty: continue): "
     terminal.answer(place, "shelf=3,1\n")
     terminal.answer(place, "shelf=1,1\n")
     assert "it is taken" in terminal.answer(place, "door=1,-1,90 deg\n")

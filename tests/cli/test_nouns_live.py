@@ -125,7 +125,7 @@ def test_what_is_published_arrives(robot: Robot) -> None:
 
 def test_who_publishes_to_nobody_is_told_so(robot: Robot) -> None:
     done = robot.do("topic", "pub", "/nobody", "std_msgs/Empty", "--timeout", "0.2s")
-    assert "RBX9025]: nobody subscribes to '/nobody'" in done.stderr
+    assert "RBX9025]: nothing subscribes to '/nobody'" in done.stderr
     done = robot.do("topic", "pub", "/odom", "std_msgs/Empty", "--timeout", "0.2s")
     assert done.returncode == 1
     done = robot.do("topic", "pub", "/cmd_vel/teleop", "std_msgs/Empty", "--timeout", "0.2s")

@@ -170,13 +170,13 @@ def test_two_seconds_of_a_robot_and_a_recorder_that_is_killed(robot: Shell) -> N
     player = robot.start("replay", "whole.mcap", "--topics", "odom", "tf_static")
     output, _ = player.communicate(timeout=PATIENCE)
     assert player.returncode == 1
-    assert "error[RBX9210]: somebody sends now what is to be replayed: /odom, /tf_static" in output
+    assert "error[RBX9210]: these topics are being published now: /odom, /tf_static" in output
     assert "replayed" in robot.do("replay", "whole.mcap", "--topics", "odom", "--rate", "20x", "--over")
 
     recorder = robot.start("record", "-o", "cut.mcap")
     part = robot.folder / "cut.mcap.part"
     robot.until(lambda: part.exists() and part.stat().st_size > 10_000)
-    assert "no recording" not in robot.do("replay", "whole.mcap", "--info")  # leaves alone what is being written
+    assert "not a recording" not in robot.do("replay", "whole.mcap", "--info")  # leaves alone what is being written
     assert part.exists()
     recorder.kill()
     recorder.communicate(timeout=PATIENCE)
@@ -226,8 +226,8 @@ def test_a_file_that_was_cut_is_a_warning_and_shows_what_is_left(
 def test_what_cannot_be_read_is_a_finding(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a.txt").write_text("a text")
     assert "error[RBX9201]" in refused(["replay", str(tmp_path / "gone.mcap")], capsys)
-    assert "no recording" in refused(["replay", str(tmp_path / "a.txt")], capsys)
-    assert "no recording" in refused(["replay", str(tmp_path)], capsys)
+    assert "not a recording" in refused(["replay", str(tmp_path / "a.txt")], capsys)
+    assert "not a recording" in refused(["replay", str(tmp_path)], capsys)
 
 
 def test_nothing_to_replay_is_a_finding(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -192,7 +192,7 @@ def test_the_doctor_looks_at_a_robot_that_is_up(robot: Robot) -> None:
     fine = {one["examination"] for one in told if one["level"] == "ok"}
     assert {"ports", "clashes", "leftovers", "permissions", "limits"} <= fine
     (alone,) = (one for one in told if one["examination"] == "wires" and one["level"] == "warning")
-    assert alone["message"] == "/base of 'topped' subscribes to /cmd_vel, which nobody publishes"
+    assert alone["message"] == "/base of 'topped' subscribes to /cmd_vel, which has no publisher"
 
 
 def test_the_doctor_is_told_a_robot_that_is_there(robot: Robot) -> None:

@@ -201,7 +201,7 @@ def test_whenever_the_battery_steps_the_end_of_a_charge_is_seen(
     assert charged[0].outcome is Outcome.SUCCEEDED
 
 
-@pytest.mark.parametrize(("answers", "why"), [(True, "the battery told no level for 10 s"), (False, "no reply")])
+@pytest.mark.parametrize(("answers", "why"), [(True, "the battery reported no level for 10 s"), (False, "no reply")])
 def test_a_battery_that_tells_nothing_ends_the_charge_with_a_reason(answers: bool, why: str) -> None:
     robot = at_the_dock()
     Battery(robot, phase=1e6, delay=0.1 if answers else 1e6, tells_at_once=False, drain=1.0)

@@ -59,7 +59,7 @@ def test_a_mission_that_waits_for_a_value_says_so_again_each_minute() -> None:
     robot = Robot(PATROL)
     robot.start()
     robot.advance(130.0)
-    text = "waits for battery, of which nothing has come for 60 s"
+    text = "waits for battery, which has not arrived for 60 s"
     assert robot.lines == ["0 mission test waits for battery", f"60 mission test {text}", f"120 mission test {text}"]
     assert robot.events == [MissionWaits("test", text)] * 2
     robot.level(100.0)
@@ -215,7 +215,7 @@ def test_a_pause_cancels_the_goal_and_a_resume_sends_it_again() -> None:
     robot.go_to.end(Outcome.CANCELED)
     robot.advance(9.0)
     assert len(robot.go_to.goals) == 1
-    with pytest.raises(Refused, match="paused already"):
+    with pytest.raises(Refused, match="already paused"):
         robot.mission.handle(PauseMission())
     robot.mission.handle(ResumeMission())
     robot.advance(0.0)

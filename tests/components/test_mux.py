@@ -102,7 +102,7 @@ def test_commands_that_are_locked_out_are_told_in_the_log_once_each_time() -> No
             robot.publish("/cmd_vel/navigation", SLOW)
             robot.advance(0.1)
         robot.advance(1.0)
-    line = "cmd_vel: commands are not let through: deadman gives no heartbeat: navigation is locked out"
+    line = "cmd_vel: commands are blocked: deadman gives no heartbeat: navigation is locked out"
     assert robot.texts() == [line] * 2
 
 

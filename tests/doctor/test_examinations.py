@@ -115,7 +115,7 @@ def test_a_router_listens_at_its_port_or_somebody_else_does() -> None:
     orphaned = running(state(supervisor=GONE, processes={"router": GONE}))
     assert told("ports", replace(FINE, running=(orphaned,))) == []  # its end is told as what it has left
     assert told("ports", up) == [
-        ("RBX9403", "the router of 'cart' should listen at port 7447, but nobody listens there")
+        ("RBX9403", "the router of 'cart' should listen at port 7447, but nothing listens there")
     ]
     assert (
         "'zenohd' (process 1) listens there"
@@ -140,8 +140,8 @@ def test_a_clock_that_is_wrong_or_jumps_is_told(clocks: Clocks, code: str) -> No
 def test_a_node_whose_stamps_are_of_another_time_is_told() -> None:
     _, *others = told("clocks", on_bus(ages={"/near": 0.01, "/ahead": -3.0, "/behind": 2.0}))
     assert others == [
-        ("RBX9405", "the stamps of '/ahead' of 'cart' lie 3.00 s in the future"),
-        ("RBX9405", "the stamps of '/behind' of 'cart' lie 2.00 s in the past"),
+        ("RBX9405", "the stamps of '/ahead' of 'cart' are 3.00 s in the future"),
+        ("RBX9405", "the stamps of '/behind' of 'cart' are 2.00 s in the past"),
     ]
     assert told("clocks", on_bus(ages={"/near": 0.01}))[1] == (
         "ok",
@@ -159,8 +159,8 @@ def test_low_limits_are_told() -> None:
 def test_a_subscription_without_a_publisher_is_told_unless_it_is_open(tmp_path: Path) -> None:
     facts = on_bus(name_of("/odom", giver="/base"), name_of("/speed", taker="/radio"), name_of("/a/_b", taker="/x"))
     assert told("wires", facts) == [
-        ("RBX9407", "/radio of 'cart' subscribes to /speed, which nobody publishes"),
-        ("ok", "cart: 1 topics are published or open to the outside; published, and nobody listens: /odom"),
+        ("RBX9407", "/radio of 'cart' subscribes to /speed, which has no publisher"),
+        ("ok", "cart: 1 topics are published or open to the outside; published without a subscriber: /odom"),
     ]
     mux = "components: {base: {type: diff_drive_sim}}\nmuxes: {cmd_vel: {inputs: {pad: {priority: 1, timeout: 1 s}}}}\n"
     opened = on_bus(name_of("/cmd_vel/pad", taker="/cmd_vel"))
@@ -210,7 +210,7 @@ def test_folders_and_secrets_that_others_may_open_are_an_error(tmp_path: Path) -
     base.mkdir(mode=0o700)
     facts = replace(FINE, base=base, file=robot)
     token.chmod(0o600)
-    assert told("permissions", facts) == [("ok", "1 folders of robots and 1 secrets are this user's alone")]
+    assert told("permissions", facts) == [("ok", "1 folders of robots and 1 secrets are private")]
     token.chmod(0o640)
     base.chmod(0o755)
     wrong = told("permissions", facts)
@@ -229,9 +229,9 @@ def test_a_device_must_be_there_and_open(tmp_path: Path) -> None:
 
     assert told("devices", naming("/dev/null")) == [("ok", "/dev/null of 'base' can be opened")]
     assert told("devices", naming("/dev/no_such_tty")) == [
-        ("RBX9411", "'base' names /dev/no_such_tty, which is not there")
+        ("RBX9411", "'base' names /dev/no_such_tty, which does not exist")
     ]
-    assert told("devices", naming("/dev/shm")) == [("RBX9411", "'base' names /dev/shm, which is no device")]
+    assert told("devices", naming("/dev/shm")) == [("RBX9411", "'base' names /dev/shm, which is not a device")]
 
 
 def test_an_answer_is_plain_data() -> None:

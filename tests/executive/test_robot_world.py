@@ -68,7 +68,7 @@ def test_a_server_that_never_comes_is_a_failure_after_five_seconds() -> None:
     robot.advance(4.8)
     assert not robot.events
     robot.advance(0.5)
-    assert end_of(robot) == "do.call: nobody serves reset"
+    assert end_of(robot) == "do.call: nothing serves reset"
 
 
 def test_a_service_can_be_a_skill() -> None:
@@ -188,7 +188,7 @@ def test_a_skill_that_keeps_everything_waiting_is_told_once(call: str, monkeypat
     robot.advance(2.0)
     warned = [line for line, level in zip(robot.lines, robot.levels, strict=True) if level is Level.WARN]
     assert len(warned) == 1
-    assert "the skill toy_slow took 12 ms in one call, and no mission went on" in warned[0]
+    assert "the skill toy_slow took 12 ms in one call and held up all missions" in warned[0]
     assert end_of(robot) == "success"
 
 

@@ -73,8 +73,8 @@ def robot_with(**missions: str) -> Robot:
 
 def test_two_missions_that_claim_different_parts_run_beside_each_other() -> None:
     robot = robot_with(look=LOOK)
-    assert robot.mission.handle(RunMission("test")) == "mission test begins"
-    assert robot.mission.handle(RunMission("look")) == "mission look begins"
+    assert robot.mission.handle(RunMission("test")) == "mission test starts"
+    assert robot.mission.handle(RunMission("look")) == "mission look starts"
     robot.advance(0.0)
     assert (len(robot.go_to.goals), len(robot.scan.goals)) == (1, 1)
     robot.scan.end(Outcome.SUCCEEDED)
@@ -97,7 +97,7 @@ def test_one_that_needs_what_another_uses_is_refused_with_its_name() -> None:
     ("command", "reason"),
     [
         (RunMission("tset"), "the robot has no mission 'tset'"),
-        (RunMission("test"), "mission test runs already"),
+        (RunMission("test"), "mission test is already running"),
         (RunMission("greet", {"times": "many"}), "the input 'times' must be a whole number"),
         (RunMission("greet", {"tmes": "1"}), "has no input 'tmes'"),
         (RunMission("greet", start="somewhere"), "there is no machine"),

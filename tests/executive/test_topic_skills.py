@@ -219,7 +219,7 @@ def test_an_order_to_which_nobody_listens_fails_after_five_seconds(make: Make) -
     hand.bench.advance(5.8)
     assert hand.end == ""
     hand.bench.advance(0.5)
-    assert hand.end == "failure do.sequence.grip.1: nobody listens to /grip"
+    assert hand.end == "failure do.sequence.grip.1: nothing subscribes to /grip"
 
 
 def test_that_somebody_looks_on_carries_nothing_out(make: Make) -> None:
@@ -227,7 +227,7 @@ def test_that_somebody_looks_on_carries_nothing_out(make: Make) -> None:
     hand.bench.collect("grip", Float64)
     hand.lose_gripper()
     hand.bench.advance(7.0)
-    assert hand.end.endswith("nobody listens to /grip")
+    assert hand.end.endswith("nothing subscribes to /grip")
 
 
 def test_an_order_that_was_lost_is_sent_again_to_who_is_back(make: Make) -> None:
@@ -238,7 +238,7 @@ def test_an_order_that_was_lost_is_sent_again_to_who_is_back(make: Make) -> None
     hand.bring_gripper_back()
     hand.bench.advance(1.3)
     assert hand.end == "success"
-    assert "0.5 nobody listens to /grip any more; waiting for up to 5 s" in hand.lines
+    assert "0.5 nothing subscribes to /grip any more; waiting for up to 5 s" in hand.lines
     assert [line.split(" ", 1)[1] for line in hand.gripper.heard] == ["grip 0.02"]
 
 

@@ -118,7 +118,7 @@ def test_a_viewer_follows_a_mission_also_over_the_death_of_its_process(robot: Ro
         guest.run(lambda: False, 0.0)
         counted = watching.round
         os.kill(next(one["pid"] for one in found["components"] if one["name"] == "mission"), signal.SIGKILL)
-        watching.until(lambda: 0 < watching.round < counted)  # it was begun by a person, and begins anew
+        watching.until(lambda: 0 < watching.round < counted)  # it was begun by a person, and starts again
         before = watching.round
         watching.until(lambda: watching.round >= before + 2)
         robot.do("mission", "pause")

@@ -63,7 +63,7 @@ class Gripper(Component[GripperConfig]):
         self.heard: list[str] = []
 
     def on_grip(self, order: Float64) -> None:
-        """Begin, or begin anew; a width below zero breaks it."""
+        """Start, or start again; a width below zero breaks it."""
         if order.data < 0:
             raise ValueError("no such width")
         self.heard.append(f"{self.now:.1f} grip {order.data:g}")

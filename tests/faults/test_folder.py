@@ -35,7 +35,7 @@ def test_a_robot_whose_files_were_removed_is_found_and_restores_them(robot: Robo
         path.unlink()
     if removed == "*":
         robot.folder.path.rmdir()
-    eventually(lambda: robot.has_logged("somebody removed files of the running robot; they are restored"))
+    eventually(lambda: robot.has_logged("files of the running robot were removed; they are restored"))
     assert len(robot.ps()["components"]) == 2
     assert robot.do("stop").returncode == 0
     again = robot.up("-d")

@@ -114,7 +114,7 @@ def test_a_default_says_so_and_where_it_can_be_set() -> None:
         ("diagnostics.analyzers.power.match.7", "'diagnostics.analyzers.power.match' has no '7'", "what it has: 0, 1"),
         ("", "robot 'turtlebot' has no ''", ""),
         ("...", "robot 'turtlebot' has no ''", ""),
-        ("profiles.tired", "profiles have no value of their own", "'--profile NAME' lays one on top"),
+        ("profiles.tired", "profiles have no value of their own", "'--profile NAME' applies one"),
         ("places.\x1b[31m", "'places' has no", ""),
     ],
 )
@@ -204,8 +204,8 @@ def test_an_argument_that_a_value_is_filled_in_from_shows_what_it_took_the_place
     shown = [line.strip() for line in answer.text().replace(str(tmp_path), "").splitlines()[-4:]]
     assert shown == [
         "from           args.speed = 0.4 m/s  --set",
-        "in the place of 0.2 m/s  /over.yaml:4, overlay",
-        "in the place of 0.1 m/s  /robot.yaml:8, profile 'slow'",
-        "in the place of 0.3 m/s  /robot.yaml:5",
+        "instead of 0.2 m/s  /over.yaml:4, overlay",
+        "instead of 0.1 m/s  /robot.yaml:8, profile 'slow'",
+        "instead of 0.3 m/s  /robot.yaml:5",
     ]
     assert answer.data()["filled_in_from"][0]["below"][0]["line"] == 5

@@ -59,7 +59,7 @@ MISTAKES = [
     ("{type: list, default: a}", "RBX1003", "'it' must be a list"),
     ("{type: text, default: [a]}", "RBX1003", "'it' must be a text"),
     ("{type: speed, default: 1 m/s, max: fast}", "RBX1003", "'max' must be a speed, such as '0.3 m/s'"),
-    ("{type: text, default: a, max: 3}", "RBX1003", "'max' has no meaning for a text"),
+    ("{type: text, default: a, max: 3}", "RBX1003", "'max' does not apply to a text"),
     ("{type: speed, defualt: 1 m/s}", "RBX1001", "unknown key 'defualt' in argument 'it'"),
 ]
 

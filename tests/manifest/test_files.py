@@ -98,5 +98,5 @@ def test_what_is_there_and_no_file_is_told_as_that(project: Path, kind: str) -> 
         os.mkfifo(path)
     else:
         path.symlink_to("nowhere.yaml")
-    expected = "is no regular file" if kind == "pipe" else "does not exist"
+    expected = "is not a regular file" if kind == "pipe" else "does not exist"
     assert expected in refused("../../missions/odd.yaml", project).message

@@ -82,18 +82,18 @@ MISTAKES = [
     ("${args.sped}", "RBX1202", 6, "unknown name 'args.sped'", "did you mean 'args.speed'?"),
     ("${speed}", "RBX1202", 6, "unknown name 'speed'", "did you mean 'args.speed'?"),
     ("at ${robot.nam} now", "RBX1202", 9, "unknown name 'robot.nam'", "did you mean 'robot.name'?"),
-    ("${1 + env.PORT}", "RBX1202", 10, "unknown name 'env.PORT'", "stands alone"),
+    ("${1 + env.PORT}", "RBX1202", 10, "unknown name 'env.PORT'", "must stand alone"),
     ("${args.speed * }", "RBX1201", 19, "a value is missing at the end", ""),
     ("${}", "RBX1201", 6, "", ""),
     ("${args.speed", "RBX1201", 4, "this '${' is never closed", ""),
     ("${$speed}", "RBX1201", 6, "", ""),
     ("${args.speed + 1 s}", "RBX1203", 6, "", ""),
     ("${1 / 0}", "RBX1203", 10, "division by zero", ""),
-    ("goes to ${args.corners}", "RBX1203", 12, "a list cannot stand inside a text", ""),
-    ("${env.NONE}", "RBX1204", 4, "the variable 'NONE' of the environment is not set", "${env.NONE:-DEFAULT}"),
-    ("${env.EMPTY:?say why}", "RBX1204", 4, "the variable 'EMPTY' of the environment is not set", ""),
+    ("goes to ${args.corners}", "RBX1203", 12, "a list cannot be part of a text", ""),
+    ("${env.NONE}", "RBX1204", 4, "the environment variable 'NONE' is not set", "${env.NONE:-DEFAULT}"),
+    ("${env.EMPTY:?say why}", "RBX1204", 4, "the environment variable 'EMPTY' is not set", ""),
     ("$speed", "RBX1205", 4, "'$speed' is looked up while the robot runs", "write '${args.speed}'"),
-    ("$battery", "RBX1205", 4, "'$battery' is looked up while the robot runs", "a dollar is written '$$'"),
+    ("$battery", "RBX1205", 4, "'$battery' is looked up while the robot runs", "write '$$' for a dollar"),
 ]
 
 

@@ -210,7 +210,7 @@ def test_a_set_that_leads_to_nothing_is_a_finding_with_the_nearest_name() -> Non
     assert [(finding.code, finding.help) for finding in report] == [
         ("RBX1302", "did you mean 'battery'?"),
         ("RBX1302", "did you mean 'speed'?"),
-        ("RBX1302", "a path begins with: speed"),
+        ("RBX1302", "a path starts with: speed"),
         ("RBX1303", "write --set battery.KEY=VALUE"),
         ("RBX1303", "write --set battery.runtime='30 s'"),
         ("RBX1303", "write --set battery.runtime='30 s'"),

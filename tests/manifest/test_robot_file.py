@@ -136,23 +136,23 @@ def test_a_place_with_mistakes_is_not_missing_as_well(bench: Bench) -> None:
 MISTAKES = [
     (("rbx: 1\n", "rbx: 2\n"), "RBX1004", "'rbx' must be '1'"),
     (("name: turtlebot\n", ""), "RBX1002", "this file needs the key 'name'"),
-    (("name: turtlebot", "name: Turtle Bot"), "RBX1006", "'Turtle Bot' is no name"),
-    (("kind: Robot", "kind: Mission"), "RBX1304", "this is no Robot"),
+    (("name: turtlebot", "name: Turtle Bot"), "RBX1006", "'Turtle Bot' is not a valid name"),
+    (("kind: Robot", "kind: Mission"), "RBX1304", "this is not a manifest of kind Robot"),
     (("\nvalues:", "\nvalus:"), "RBX1001", "unknown key 'valus' in this file"),
     (
         ("  battery:\n    type: battery_sim", "  muxes:\n    type: battery_sim"),
         "RBX1007",
         "a component cannot be named",
     ),
-    (("  charger:", "  mission:"), "RBX1007", "every robot runs a component 'mission' already"),
+    (("  charger:", "  mission:"), "RBX1007", "every robot already runs a component 'mission'"),
     (("  charger:", "  cmd_vel:"), "RBX1007", "a component and a mux are both named 'cmd_vel'"),
     (("    type: go_to\n", ""), "RBX1002", "component 'go_to' needs the key 'type'"),
     (("\nplaces:", "\nbus: {wire: jazy}\nplaces:"), "RBX1004", "'wire' must be"),
     (("    reach: 20 cm", "    reach: 20 cm\n    proces: own"), "RBX1001", "unknown key 'proces' in component"),
     (("components:\n", "components: 5\nx:\n"), "RBX1001", "unknown key 'x' in this file"),
     (("\nplaces:", "\nbus: {port: 0}\nplaces:"), "RBX1005", "'port' must be at least 1"),
-    (("args:\n", "args: 5\nx:\n"), "RBX1003", "'args' must be a map from names to what they are"),
-    (("  speed:\n    type: speed", "  Speed:\n    type: speed"), "RBX1006", "'Speed' is no name"),
+    (("args:\n", "args: 5\nx:\n"), "RBX1003", "'args' must be a map of named entries"),
+    (("  speed:\n    type: speed", "  Speed:\n    type: speed"), "RBX1006", "'Speed' is not a valid name"),
     (("inputs:", "inputs: {}\n    locks:"), "RBX1005", "'inputs' must have at least 1 entry"),
 ]
 

@@ -51,7 +51,7 @@ def cured(text: str) -> str:
     ],
 )
 def test_a_list_without_brackets_gets_them(wrong: str, right: str) -> None:
-    assert told(wrong).help == f"a list has brackets: write '{right.partition(': ')[2]}'"
+    assert told(wrong).help == f"a list needs brackets: write '{right.partition(': ')[2]}'"
     assert cured(wrong) == right
 
 
@@ -67,7 +67,7 @@ def test_what_brackets_would_not_cure_gets_none(wrong: str) -> None:
     "text", ["base: type: drive", "a:\n  - base: type: drive\n", "next: success: finished, failure: b"]
 )
 def test_a_key_in_the_line_of_another_belongs_below_it(text: str) -> None:
-    assert told(text).message.startswith("two keys stand in one line")
+    assert told(text).message.startswith("two keys are on one line")
     assert cured(text) == text  # it may be a text all the same
 
 
@@ -92,7 +92,7 @@ def test_where_more_keys_follow_below_it_the_first_one_joins_them() -> None:
 def test_a_line_further_left_than_its_neighbours_is_the_one_that_is_told(text: str, line: int, columns: str) -> None:
     finding = told(text)
     assert finding.span
-    assert (finding.span.line, finding.message) == (line, "'c' stands too far left")
+    assert (finding.span.line, finding.message) == (line, "'c' is too far left")
     assert finding.help == f"move it {columns} to the right, into the column of 'b'"
 
 

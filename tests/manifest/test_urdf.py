@@ -142,7 +142,7 @@ def test_two_parts_do_not_both_bring_a_body(tmp_path: Path) -> None:
     others = {"shell.yaml": PART, "cart.urdf": CART}
     checked = check_text(f"{HEAD}include:\n  a: shell.yaml\n  b: shell.yaml\n", tmp_path, others=others)
     assert checked.codes == ["RBX1307"]
-    assert "a robot has one 'body': leave one out" in checked.text
+    assert "a robot has one 'body': remove one" in checked.text
 
 
 def test_a_value_of_the_command_line_is_relative_to_the_robot(tmp_path: Path) -> None:

@@ -84,8 +84,8 @@ MISTAKES = [
     ("max_speed: -1 m/s", "RBX1005", 12, "'max_speed' must be greater than 0 m/s", "", ""),
     ("charge: 150 %", "RBX1005", 9, "'charge' must be at most 100 %", "", ""),
     ("count: -1", "RBX1005", 8, "'count' must be at least 0", "", ""),
-    ("name: Big-Thing", "RBX1006", 7, "'Big-Thing' is no name", "", ""),
-    ("parts: {Front: {speed: 1 m/s}}", "RBX1006", 9, "'Front' is no name", "", ""),
+    ("name: Big-Thing", "RBX1006", 7, "'Big-Thing' is not a valid name", "", ""),
+    ("parts: {Front: {speed: 1 m/s}}", "RBX1006", 9, "'Front' is not a valid name", "", ""),
 ]
 
 

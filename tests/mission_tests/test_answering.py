@@ -29,7 +29,7 @@ def test_a_call_takes_its_time(trying: Trying) -> None:
 
 def test_a_step_that_was_done_before_is_said_to_have_been(trying: Trying) -> None:
     expect = "steps:\n  - go_to: corner_2\n  - go_to: corner_1"
-    assert trying.problems(text(expect)) == ["expected go_to corner_1: it was done only before, at 0 s"]
+    assert trying.problems(text(expect)) == ["expected go_to corner_1: it was done only earlier, at 0 s"]
 
 
 def test_a_call_fails_at_its_number(trying: Trying) -> None:
@@ -145,7 +145,7 @@ def test_data_are_compared_at_the_end(trying: Trying) -> None:
 
 def test_a_mission_that_waits_for_nothing_that_comes_is_told(trying: Trying) -> None:
     (problem,) = trying.problems(f"{OPEN}expect:\n  outcome: success\n", "patient")
-    assert problem == "did not end: since 2 s it waits for what the test does not do"
+    assert problem == "did not end: since 2 s it waits for something that the test does not do"
 
 
 def test_a_mission_that_goes_on_and_on_is_told(trying: Trying) -> None:

@@ -53,7 +53,7 @@ def test_a_filter_finds_a_test_whose_robot_has_mistakes(tmp_path: Path, capsys: 
     captured = capsys.readouterr()
     assert "FAILED  first" in captured.out
     assert "second" not in captured.out
-    assert "of a type that does not exist: 'bass'" in captured.err
+    assert "a type that does not exist: 'bass'" in captured.err
     assert "no test has" not in captured.err
     assert command(["test", folder, "--filter", "third"]) == 2
     captured = capsys.readouterr()
@@ -79,9 +79,9 @@ def test_a_mistake_of_a_robot_is_told_once_for_all_of_its_tests(
     assert command([verb, *map(str, sorted(folder.glob("*_file.yaml")))]) == 1
     captured = capsys.readouterr()
     told = captured.err + captured.out
-    assert told.count("of a type that does not exist: 'bass'") == 1
+    assert told.count("a type that does not exist: 'bass'") == 1
     assert told.count("RBX4203") == 1
-    assert "has mistakes, so that 3 tests cannot run" in told
+    assert "has errors, so 3 tests cannot run" in told
     assert command(["test", str(folder), "--json"]) == 1
     tests = json.loads(capsys.readouterr().out)["tests"]
     assert [len(one["problems"]) for one in tests] == [1, 1, 1]  # each test has its own reason
@@ -92,7 +92,7 @@ def test_traces_coverage_and_junit(repository: Path, tmp_path: Path, capsys: pyt
     assert command(["test", PATROL, "-v", "--coverage", "--junit", str(file)]) == 0
     out = capsys.readouterr().out
     assert "interrupt battery_low" in out
-    assert "patrol: 4 of 7 ways taken" in out
+    assert "patrol: 4 of 7 paths taken" in out
     suite = ElementTree.parse(file).getroot().find("testsuite")
     assert suite is not None
     assert suite.attrib["failures"] == "0"

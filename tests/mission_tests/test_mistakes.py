@@ -85,7 +85,7 @@ def test_each_mistake_is_told_at_its_place(trying: Trying, golden: Golden) -> No
         ("expect:\n  outcome: running\n  for: 1e14 s\n", "'for' must be at most"),
         ("expect:\n  steps: go_to\n", "'steps'"),
         ("expect:\n  steps:\n    - recharge: dock\n", "takes no argument"),
-        ("expect:\n  steps:\n    - [go_to]\n", "this is no step"),
+        ("expect:\n  steps:\n    - [go_to]\n", "this is not a step"),
         ("with: 3\nexpect:\n  outcome: success\n", "'with'"),
         ("with:\n  rounds: -1\nexpect:\n  outcome: success\n", "'rounds'"),
         ("expecting:\n  outcome: success\n", "unknown key 'expecting'"),
@@ -100,7 +100,7 @@ def test_a_wrong_shape_is_told(trying: Trying, text: str, words: str) -> None:
 def test_values_without_the_brackets_of_a_list_are_told_with_them(trying: Trying) -> None:
     trial, found = trying.read("mocks:\n  go_to:\n    fails_for: dock\nexpect:\n  for: 1 s\n")
     assert trial is None
-    assert "a list has brackets: write '[dock]'" in found
+    assert "a list needs brackets: write '[dock]'" in found
 
 
 def test_a_mock_that_nothing_uses_is_a_warning(trying: Trying) -> None:

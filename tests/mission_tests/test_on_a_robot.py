@@ -114,7 +114,7 @@ def test_a_message_comes_from_outside(trying: Trying) -> None:
 
 def test_a_mission_that_cannot_begin_is_told_with_what_it_waits_for(trying: Trying) -> None:
     (problem,) = trying.problems("expect:\n  outcome: success\n", "waiting")
-    assert problem == "the mission does not begin: nothing has come for $door"
+    assert problem == "the mission does not start: nothing has arrived for $door"
 
 
 def test_what_the_robot_refuses_is_told(trying: Trying) -> None:

@@ -57,8 +57,8 @@ def test_the_current_round_of_a_loop_begins_again() -> None:
     ("afterwards", "at", "told"),
     [
         ("continue", 1.5, "interrupt open done, back to b"),
-        ("restart", 1.5, "interrupt open done, the mission begins anew"),
-        ("{restart: last}", 2.5, "interrupt open done, last begins anew"),
+        ("restart", 1.5, "interrupt open done, the mission starts again"),
+        ("{restart: last}", 2.5, "interrupt open done, last starts again"),
         ("{restart: last}", 1.5, "interrupt open done, back to b"),  # it does not run
     ],
 )

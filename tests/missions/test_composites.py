@@ -233,7 +233,7 @@ def test_arguments_of_numbers_are_expressions() -> None:
         ("wait: 1 s / $battery", "division by zero"),
         ("repeat: $count_of_people\n  do: a", "'repeat' must be a whole number, not 2.5"),
         ("set:\n    x: $x / $battery", "division by zero"),
-        ("wait: -1 s", "a duration must be a number from 0 on, not -1"),
+        ("wait: -1 s", "a duration must be a number, at least 0, not -1"),
         ("log: $door", "'$door' has not arrived yet"),
         ("go_to: $nowhere", "there is no place 'nowhere'"),
     ],

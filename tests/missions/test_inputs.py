@@ -38,11 +38,11 @@ def test_what_is_not_given_has_its_default_and_places_are_places() -> None:
 @pytest.mark.parametrize(
     ("given", "message", "help_text"),
     [
-        ("pause: 2 s\n  rounds: many", "the input 'rounds' must be a whole number from 0 on", ""),
+        ("pause: 2 s\n  rounds: many", "the input 'rounds' must be a whole number, at least 0", ""),
         ("pause: 2 s\n  rounds: 6", "the input 'rounds' is above its 'max' of 5: 6", ""),
         ("pause: 0.5 s", "the input 'pause' is below its 'min' of 1 s: 0.5 s", ""),
         ("pause: 2 m", "the input 'pause' must be a time, such as '5 s'", ""),
-        ("pause: 2 s\n  mode: fats", "the input 'mode' is none of the choices: 'fats'", "did you mean 'fast'?"),
+        ("pause: 2 s\n  mode: fats", "the input 'mode' is not one of the choices: 'fats'", "did you mean 'fast'?"),
         ("pause: 2 s\n  home: dok", "there is no place 'dok'", "did you mean 'dock'?"),
         ("pause: 2 s\n  round: 3", "the mission '' has no input 'round'", "did you mean 'rounds'?"),
         ("rounds: 3", "the input 'pause' of the mission '' needs a value", "write it under 'with': 'pause: ...'"),

@@ -14,7 +14,7 @@ from rbxcompose.missions.view.replica import MOST_WAITING, Replica
 
 
 class Sender:
-    """The other side: an engine of which only this is seen, and a window on it that may be opened anew."""
+    """The other side: an engine of which only this is seen, and a window on it that may be opened again."""
 
     def __init__(self) -> None:
         self.statuses = [0] * 4

@@ -133,7 +133,7 @@ def test_it_is_read_with_its_options_and_those_of_any_node() -> None:
 
 
 def test_checks_ask_it() -> None:
-    assert findings("do: {persist: 0, gap: 1 s, do: a}") == ["'persist' must be above zero to have a meaning"]
+    assert findings("do: {persist: 0, gap: 1 s, do: a}") == ["'persist' must be above zero to have an effect"]
     assert findings("do: {persist: 2, gap: 1 s, do: {wait: 1 s}, optional: true}") == [
         "'optional' changes nothing here: 'persist' cannot fail"
     ]
@@ -209,5 +209,5 @@ def test_a_kind_that_leaves_something_unanswered_is_refused_and_a_type_error() -
 
 def test_nothing_of_it_is_left() -> None:
     registry.forget("persist")
-    assert findings("do: {persist: dock}") == ["mission '' uses a skill that nobody provides: 'persist'"]
+    assert findings("do: {persist: dock}") == ["mission '' uses a skill that the robot does not have: 'persist'"]
     declare()

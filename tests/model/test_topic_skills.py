@@ -62,7 +62,7 @@ TELLING = Out(GripEnd, "ended")
 @pytest.mark.parametrize(
     ("ends", "outcomes", "words"),
     [
-        (None, {"empty": "failure"}, "nobody to tell an outcome"),
+        (None, {"empty": "failure"}, "nothing can report an outcome"),
         (SILENT, {"empty": "failure"}, "SetBool_Response has no text field 'outcome'"),
         (TELLING, {"empty": "maybe"}, "counts as success or failure, not as maybe"),
     ],
@@ -87,7 +87,7 @@ def test_ends_and_halts_are_ports_of_the_same_class(word: str) -> None:
         if word == "halts":
             told = TELLING
 
-    with pytest.raises(ValueError, match=f"'{word}' of the port 'grip' is no port of this class"):
+    with pytest.raises(ValueError, match=f"'{word}' of the port 'grip' is not a port of this class"):
         component("toy_broken_hand")(Hand)
 
 

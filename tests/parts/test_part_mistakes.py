@@ -88,14 +88,14 @@ MISTAKES = [
     ("spare: {part: ../../parts/battery.yaml, with: {runtime: 9 m}}", "RBX1003", "'runtime' must be a time"),
     ("spare: {part: ../../parts/needy.yaml}", "RBX1206", "part 'spare' needs a value for its argument 'port'"),
     ("spare: {part: ../../parts/battery.yaml, conect: {}}", "RBX1001", "unknown key 'conect'"),
-    ("spare: {part: robot.yaml}", "RBX1304", "this is no Part"),
+    ("spare: {part: robot.yaml}", "RBX1304", "this is not a manifest of kind Part"),
     ("spare: {with: {}}", "RBX1002", "part 'spare' needs the key 'part'"),
-    ('spare: {part: "${args.x}"}', "RBX1003", "the file of a part cannot be filled in"),
-    ("Spare: {part: ../../parts/battery.yaml}", "RBX1006", "'Spare' is no name"),
+    ('spare: {part: "${args.x}"}', "RBX1003", "a part's file cannot use"),
+    ("Spare: {part: ../../parts/battery.yaml}", "RBX1006", "'Spare' is not a valid name"),
     (
         "spare: {part: ../../parts/battery.yaml, connect: {batery_level: x}}",
         "RBX1309",
-        "the part that 'spare' is an instance of has no topic 'batery_level'",
+        "the part of the instance 'spare' has no topic 'batery_level'",
     ),
     ("spare: {part: ../../parts/started.yaml}", "RBX1001", "unknown key 'start' in this file"),
 ]

@@ -77,7 +77,7 @@ def test_the_file_that_gives_it_is_where_it_is_told_through_two_levels(project: 
     project.check(robot, PARTS)
     [finding] = project.findings
     assert told(finding) == ("RBX1005", f"{ROBOT_FILE}:8")
-    assert uses(finding) == ["handed on here: parts/outer.yaml:11", f"used here: {USE}:13"]
+    assert uses(finding) == ["passed on here: parts/outer.yaml:11", f"used here: {USE}:13"]
 
 
 def test_a_part_that_gives_a_wrong_value_is_told_with_what_includes_it(project: Project) -> None:

@@ -157,7 +157,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
         create(path)
     part_of(path).write_bytes(unfinished(MESSAGES))
     (found,) = recover_all(tmp_path)
-    assert "is there already" in found.problem
+    assert "already exists" in found.problem
     assert path.read_bytes() == b"mine"
 
 

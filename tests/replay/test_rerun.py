@@ -178,7 +178,7 @@ def test_inputs_that_are_not_in_the_recording_are_named(
     [
         (["--into", "goto"], 1, "did you mean 'go_to'?"),
         (["--write", "x.mcap"], 2, "--write needs --into"),
-        (["--into", "go_to", "--set", "args.speed=0.2"], 2, "needs --into and --robot PATH"),
+        (["--into", "go_to", "--set", "args.speed=0.2"], 2, "need --into and --robot PATH"),
     ],
 )
 def test_what_cannot_be_is_told(
@@ -192,7 +192,7 @@ def test_a_recording_from_outside_is_refused(tmp_path: Path, capsys: pytest.Capt
     with (tmp_path / "a.mcap").open("wb") as file:
         RecordingWriter(file).finish()
     assert command.main(["replay", str(tmp_path / "a.mcap"), "--into", "go_to"]) == 1
-    assert "was not recorded from within a stepped run" in said(capsys)
+    assert "was not recorded within a stepped run" in said(capsys)
 
 
 def test_recovery_keeps_the_plan_and_the_silent_topics(recording: Recording) -> None:

@@ -150,7 +150,7 @@ def test_who_needs_what_has_failed_for_good_is_blocked_until_the_next_apply(robo
     shown = robot.ps()
     assert (shown["go_to"]["state"], shown["mission"]["waits_for"]) == ("failed", "go_to")
     assert "mission waits for go_to, which failed" in robot.do("ps")
-    robot.eventually(lambda: "all that moves is held" in robot.do("logs"))
+    robot.eventually(lambda: "all motion is held" in robot.do("logs"))
     robot.do("apply", "robots/turtlebot", "--yes")
     after = robot.ps()
     assert {one["state"] for one in after.values()} == {"active"}

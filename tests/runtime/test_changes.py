@@ -64,7 +64,7 @@ def test_what_has_failed_is_tried_again() -> None:
 
 def test_simulated_truth_never_restarts() -> None:
     [text] = between("base.process=robot").impossible
-    words = "'base' holds simulated truth, which would begin anew (process: world -> robot): it needs 'down' and 'up'"
+    words = "'base' holds simulated truth, which would be reset (process: world -> robot): it needs 'down' and 'up'"
     assert text == words
     assert between("battery.runtime=30 s", "base.max_speed=0.4 m/s").impossible == ()
 
@@ -100,7 +100,9 @@ def test_who_leaves_the_path_of_commands_is_on_it_too() -> None:
 def test_a_mission_that_runs_is_not_begun_anew() -> None:
     found = between("missions.patrol.with.rounds=3")
     assert fates(found) == {"mission": Fate.RESTARTED}
-    assert found.unsafe([], RUNS).startswith("mission patrol runs, and 'mission' would begin anew: 'rbxcompose mission")
+    assert found.unsafe([], RUNS).startswith(
+        "mission patrol runs, and 'mission' would restart: run 'rbxcompose mission"
+    )
     assert found.unsafe([], {}) == ""
 
 

@@ -180,13 +180,13 @@ def test_a_process_that_dies_while_it_retires_comes_back_with_the_new_plan() -> 
 def test_what_is_never_active_is_told_when_the_time_is_up() -> None:
     stage = Changed().apply(replace(robot(), instances=(*robot().instances, lamp())))
     stage.pass_time(25.0)
-    assert stage.done == [("only in part: after 20 s not active: lamp; 'rbxcompose ps' shows what runs", True)]
+    assert stage.done == [("only in part: not active after 20 s: lamp; 'rbxcompose ps' shows what runs", True)]
     assert stage.why_not(robot()) == ""
 
 
 def test_one_change_waits_for_another() -> None:
     stage = Changed().apply(with_settings(robot(), "go_to", speed=0.1))
-    assert stage.why_not(robot()) == "it is being changed already"
+    assert stage.why_not(robot()) == "it is already being changed"
 
 
 def test_a_robot_that_starts_goes_down_or_is_stepped_is_not_changed() -> None:
@@ -227,7 +227,7 @@ def test_a_robot_whose_path_of_commands_has_failed_is_held() -> None:
     assert stage.conductor.is_stopped
     assert (
         Level.ERROR,
-        "'mux' failed on the path of commands: all that moves is held until 'release'",
+        "'mux' failed on the path of commands: all motion is held until 'release'",
     ) in stage.records
 
 

@@ -104,7 +104,7 @@ def test_a_silent_publisher_is_told_until_it_speaks(process: Process) -> None:
     process.advance(2 * PERIOD)
     name, level, text = process.told[-1]
     assert (name, level) == ("charger: level", Level.WARN)
-    assert text.startswith("'charger' has heard nothing on /level for ")
+    assert text.startswith("'charger' has received nothing on /level for ")
     assert text.endswith(" s, though 'battery' publishes it")
     process.wire.arrived(Bytes(GOOD))
     process.advance(2 * PERIOD)

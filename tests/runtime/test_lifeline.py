@@ -1,4 +1,4 @@
-"""A session that carries nothing any more is noticed, opened anew, and has all that it had."""
+"""A session that carries nothing any more is noticed, opened again, and has all that it had."""
 
 from __future__ import annotations
 
@@ -231,7 +231,7 @@ def test_a_stuck_session_is_opened_anew_with_all_that_was_declared(port: int) ->
         until(lambda: not ring.is_available, robot, visitor)  # the lease of the link has passed
         for _ in range(MISSES + 1):
             robot.probe()
-        assert robot.log == ["the session on the bus carries nothing any more; it is opened anew"]
+        assert robot.log == ["the session on the bus no longer carries anything; opening it again"]
         latched(Float32(data=8.0))
         proxy.thaw()
         until(lambda: len(robot.log) == 2 and ring.is_available and tell.has_match, robot, visitor)

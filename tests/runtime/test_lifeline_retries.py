@@ -1,4 +1,4 @@
-"""A session that cannot be opened anew at once is tried again, ever more rarely, until it can."""
+"""A session that cannot be opened again at once is retried, less and less often, until it can."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rbxcompose.bus.transport import LONGEST_WAIT, NoTransport, Transport, Trans
 from rbxcompose.runtime.process_group.driver import BEAT
 from rbxcompose.runtime.process_group.lifeline import BEATS, FIRST_PAUSE, LONGEST_PAUSE, Lifeline
 
-OPENED_ANEW = "the session on the bus carries nothing any more; it is opened anew"
+OPENED_ANEW = "the session on the bus no longer carries anything; opening it again"
 
 
 class Deaf(NoTransport):
@@ -71,7 +71,7 @@ def test_it_is_tried_again_and_told_until_there_is_a_session() -> None:
     assert process.tries == 2
     process.beat()
     assert process.tries == 3
-    failed = "no session on the bus can be opened (OSError: too many open files); it is tried again in"
+    failed = "no session on the bus can be opened (OSError: too many open files); trying again in"
     first = FIRST_PAUSE * BEAT
     assert process.log == [
         OPENED_ANEW,

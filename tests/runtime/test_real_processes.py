@@ -248,7 +248,7 @@ def test_without_the_prefork_parent_the_robot_goes_down(robot: Robot) -> None:
     next(iter(titled(f"rbxcompose {robot.name}: parent"))).send_signal(signal.SIGKILL)
     output, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 4
-    assert "the pre-fork parent has gone" in output
+    assert "the pre-fork parent is gone" in output
     assert robot.last_words("first") == ["braking", "deactivated"]
 
 
@@ -275,7 +275,7 @@ def test_what_a_dead_supervisor_left_is_ended_by(who: str, robot: Robot) -> None
     robot.supervisor().send_signal(signal.SIGKILL)
     if who == "the next up":
         robot.up_detached()
-        assert robot.has_logged("the run before was not brought down, its supervisor has died")
+        assert robot.has_logged("the previous run was not shut down, its supervisor died")
     assert robot.do("down").returncode == 0
     assert wait_until_ended(before, 0.0) == []
 
@@ -301,7 +301,7 @@ def test_a_process_that_dies_again_and_again_fails_the_robot(robot: Robot) -> No
     process = robot.up(dies_at=0.01)
     output, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 4
-    assert "too often to go on" in output
+    assert "too often to continue" in output
 
 
 def test_a_component_that_cannot_be_configured_ends_the_start_with_its_reason(robot: Robot) -> None:

@@ -111,7 +111,7 @@ def test_stop_reaches_all_and_is_told() -> None:
     desk = Desk()
     assert desk.ask(StopRobot()) == ("stopped; 'release' allows motion again", False)
     assert desk.sent == [("mission", say.Stop())]
-    assert desk.texts == ["stop: all that moves is held until 'release'"]
+    assert desk.texts == ["stop: all motion is held until 'release'"]
     assert desk.conductor.is_stopped
 
 
@@ -168,9 +168,9 @@ def test_a_robot_that_goes_down_takes_no_more_commands_but_answers_questions() -
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        ({"verb": "stop"}, "this is no request of this version of rbxcompose"),
-        (["stop"], "this is no request of this version of rbxcompose"),
-        (7, "this is no request of this version of rbxcompose"),
+        ({"verb": "stop"}, "this version of rbxcompose has no such request"),
+        (["stop"], "this version of rbxcompose has no such request"),
+        (7, "this version of rbxcompose has no such request"),
         ({"type": "dance"}, "there is no request 'dance'"),
         ({"type": "robot.Dance"}, "there is no request 'robot.Dance'"),
         ({"type": "mission.Dance"}, "there is no request 'mission.Dance'"),
@@ -184,11 +184,11 @@ def test_a_robot_that_goes_down_takes_no_more_commands_but_answers_questions() -
         ),
         (
             {"type": "robot.ApplyPlan", "plan": 5, "generation": 0},
-            "the request 'robot.ApplyPlan' cannot be read: 'plan' is no text",
+            "the request 'robot.ApplyPlan' cannot be read: 'plan' is not text",
         ),
         (
             {"type": "mission.RunMission", "mission": "patrol", "inputs": {"rounds": [1]}},
-            "the request 'mission.RunMission' cannot be read: 'inputs.rounds' is no text",
+            "the request 'mission.RunMission' cannot be read: 'inputs.rounds' is not text",
         ),
     ],
 )
@@ -218,7 +218,7 @@ def test_another_plan_is_compared_first_and_taken_only_if_nobody_was_faster() ->
 
 def test_a_text_that_is_no_plan_is_refused() -> None:
     for request in (ComparePlan("{}"), ApplyPlan("{}", 0)):
-        assert Desk().ask(request) == ("this is no plan of version 1", True)
+        assert Desk().ask(request) == ("this is not a plan of version 1", True)
 
 
 def test_what_cannot_be_done_now_is_refused_with_the_reason() -> None:

@@ -138,14 +138,14 @@ def test_only_the_log_stays(folder: RobotFolder) -> None:
 def test_a_state_that_others_may_open_is_not_believed(folder: RobotFolder, mode: int) -> None:
     folder.write_state(state())
     (folder.path / folders.STATE).chmod(mode)
-    with pytest.raises(BrokenStateError, match="somebody else"):
+    with pytest.raises(BrokenStateError, match="another user"):
         folder.read_state()
 
 
 def test_a_state_of_somebody_else_is_not_believed(folder: RobotFolder, monkeypatch: pytest.MonkeyPatch) -> None:
     folder.write_state(state())
     monkeypatch.setattr(os, "getuid", lambda: 4711)
-    with pytest.raises(BrokenStateError, match="somebody else"):
+    with pytest.raises(BrokenStateError, match="another user"):
         folder.read_state()
     with pytest.raises(UnsafeFolderError, match="0700"):
         folders.all_folders()

@@ -298,7 +298,7 @@ def test_one_that_does_not_return_is_left_behind_when_the_robot_goes_down(proces
     process.send("work", 1.0)
     assert Planner.gate.entered.wait(PATIENCE)
     process.host.shutdown()
-    assert process.records[-1].text == "does not return from on_work: it is left behind in it"
+    assert process.records[-1].text == "does not return from on_work: it is left behind"
     Planner.gate.opened.set()
     for thread in threading.enumerate():
         if thread.name == "planner":

@@ -56,7 +56,7 @@ def test_what_its_model_does_not_take_is_a_finding(project: Project) -> None:
     project.check(BASE + "lamps:\n  front: {driver: base, aftr: []}\n  Rear: base\n")
     assert told(project) == [
         ("RBX1001", "unknown key 'aftr' in lamp 'front'", 7),
-        ("RBX1006", "'Rear' is no name", 8),
+        ("RBX1006", "'Rear' is not a valid name", 8),
     ]
 
 

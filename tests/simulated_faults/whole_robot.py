@@ -161,7 +161,7 @@ class SimulatedProcess(Turned):
 
     def _record(self, record: Record) -> None:
         self.robot.records.append(record)
-        if record.text == "restarted":  # a component began anew, which has forgotten what it knew
+        if record.text == "restarted":  # a component restarted, which has forgotten what it knew
             self._told("restart")
 
     def _say(self, word: say.ChannelWord) -> None:

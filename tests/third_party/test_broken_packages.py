@@ -55,7 +55,10 @@ def checked(folder: Path, type_: str) -> Checked:
         ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
         ("raise SystemExit(3)", "SystemExit: 3"),
         ("def broken(:", "SyntaxError: invalid syntax"),
-        ("from rbxcompose.sdk import component\n@component('odd')\nclass Odd: pass", "odd_module.Odd is no subclass"),
+        (
+            "from rbxcompose.sdk import component\n@component('odd')\nclass Odd: pass",
+            "odd_module.Odd is not a subclass",
+        ),
         ("", "declares no class by @component('odd')"),
         (LIKE_A_COMPONENT.format(name="odd") + "raise RuntimeError('too late')", "RuntimeError: too late"),
         (LIKE_A_COMPONENT.format(name="go_to"), "ValueError: two component types are named 'go_to'"),
@@ -103,8 +106,8 @@ def test_a_type_of_ours_stays_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     ("name", "module", "reason"),
     [
         ("odd", "import no_such_module", "No module named 'no_such_module'"),
-        ("odd", CHECK.format(code="RBX3001", body="return []"), "begins with RBX"),
-        ("odd", CHECK.format(code="odd one", body="return []"), "is no code"),
+        ("odd", CHECK.format(code="RBX3001", body="return []"), "starts with RBX"),
+        ("odd", CHECK.format(code="odd one", body="return []"), "is not a code"),
         ("odd", CHECK.format(code="ODD01", body="return [robot.no_such_name]"), "the check ODD01 of 'odd_module' has"),
         ("absurd_speed", CHECK.format(code="ODD01", body="return []"), "rbxcompose has one of this name"),
     ],

@@ -47,7 +47,7 @@ def keys(text: str) -> list[str]:
 
 
 def is_end(key: str) -> bool:
-    """Tell whether a key ends driving: q, or the end of input."""
+    """Return whether a key ends driving: q, or the end of input."""
     return key in _ENDS
 
 

@@ -21,10 +21,10 @@ Do = Callable[[Guest, argparse.Namespace], int]
 
 NO_NAME = kind(
     "RBX9022",
-    """Nothing of that name is on the bus
+    """Nothing on the bus has this name
 
-Topics, services and actions exist while somebody publishes, subscribes, serves or calls. `rbxcompose topic ls`,
-`service ls` and `action ls` list those that are there.
+Topics, services and actions exist while something publishes, subscribes, serves or calls. `rbxcompose topic ls`,
+`service ls` and `action ls` list those that exist.
 
 Bad: `rbxcompose topic echo /odometry`
 Good: `rbxcompose topic echo /odom`
@@ -32,9 +32,9 @@ Good: `rbxcompose topic echo /odom`
 )
 NOBODY = kind(
     "RBX9025",
-    """Nobody answers in time
+    """No answer in time
 
-Nobody subscribes to the topic with this type, or the server did not answer within the timeout.
+Nothing subscribes to the topic with this type, or the server did not answer within the timeout.
 
 Bad: `rbxcompose topic pub /nobody_listens std_msgs/Empty --timeout 1s`
 Good: `rbxcompose topic pub /cmd_vel/teleop geometry_msgs/Twist '{angular: {z: 0.5}}'`
@@ -44,9 +44,9 @@ SAID_NO = kind(
     "RBX9026",
     """The server refuses
 
-The request or the goal has reached its server, which did not carry it out; the message says why.
+The request or goal reached its server, which did not carry it out; the message says why.
 
-Bad: a goal outside of the map.
+Bad: a goal outside the map.
 Good: a goal that the robot can reach.
 """,
 )
@@ -120,9 +120,7 @@ def add_server_verbs(
     add_ls_options(ls)
     send = actions.add_parser(verb[0], help=verb[1])
     send.add_argument("name", metavar=noun.upper(), help=f"its name, such as {example}")
-    send.add_argument(
-        "content", metavar=content.upper(), nargs="?", default="", help="YAML; what it leaves out is zero"
-    )
+    send.add_argument("content", metavar=content.upper(), nargs="?", default="", help="YAML; missing fields are zero")
     add_timeout_option(send, "5s")
     add_json_option(send)
     for one, done in zip((ls, send), do, strict=True):
@@ -132,13 +130,13 @@ def add_server_verbs(
 
 def add_ls_options(parser: argparse.ArgumentParser) -> None:
     """Declare `--all` and `--json`."""
-    parser.add_argument("-a", "--all", action="store_true", help="also those that tools hide, such as parts of actions")
+    parser.add_argument("-a", "--all", action="store_true", help="also hidden ones, such as parts of actions")
     add_json_option(parser)
 
 
 def add_json_option(parser: argparse.ArgumentParser) -> None:
     """Declare `--json`."""
-    parser.add_argument("--json", action="store_true", help="answer in JSON, one line for each answer")
+    parser.add_argument("--json", action="store_true", help="answer in JSON, one line per answer")
 
 
 def add_timeout_option(parser: argparse.ArgumentParser, default: str) -> None:
@@ -151,7 +149,7 @@ def add_count_options(parser: argparse.ArgumentParser) -> None:
     """Declare `--once` and `-n`."""
     counts = parser.add_mutually_exclusive_group()
     counts.add_argument("--once", dest="count", action="store_const", const=1, help="end after one")
-    counts.add_argument("-n", "--count", type=count, metavar="N", help="end after so many")
+    counts.add_argument("-n", "--count", type=count, metavar="N", help="end after this many")
 
 
 def seconds(text: str) -> float:
@@ -172,7 +170,7 @@ def positive(dimension: Dimension) -> Callable[[str], float]:
 def count(text: str) -> int:
     """Read a number from 1 on."""
     if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 1 on")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
     return int(text)
 
 
@@ -182,7 +180,7 @@ def _positive(text: str, dimension: Dimension) -> float:
     except UnitError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
     if value <= 0:
-        raise argparse.ArgumentTypeError("must be more than nothing")
+        raise argparse.ArgumentTypeError("must be above zero")
     return value
 
 

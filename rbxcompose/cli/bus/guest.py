@@ -46,7 +46,7 @@ NO_ROUTER = kind(
     """No router answers
 
 The command reaches a robot's bus through its Zenoh router, at the endpoint that `rbxcompose ps` shows, or at the one
-that `--router` names. Nobody answers there.
+that `--router` names. Nothing answers there.
 
 Bad: `rbxcompose topic ls --router tcp/127.0.0.1:1`
 Good: `rbxcompose topic ls --router tcp/127.0.0.1:7447`
@@ -157,7 +157,7 @@ class Guest:
         self._selector.register(descriptor, selectors.EVENT_READ, ready)
 
     def run(self, until: Callable[[], bool], timeout: float = math.inf) -> bool:
-        """Let things happen until something holds, or for `timeout` [s], and tell whether it does."""
+        """Let things happen until something holds, or for `timeout` [s], and return whether it does."""
         deadline = self.clock.now() + timeout
         while True:
             self.scheduler.advance(self.clock.now())
@@ -197,7 +197,7 @@ class Guest:
         try:
             session = open_peer(router)
         except zenoh.ZError as error:  # a router that is not there yet is no error
-            raise NotDoneError(NO_ROUTER.at(None, f"'{router}' is no endpoint of a router")) from error
+            raise NotDoneError(NO_ROUTER.at(None, f"'{router}' is not a router endpoint")) from error
         deadline = self.clock.now() + PATIENCE
         while not session.info.routers_zid():
             if self.clock.now() > deadline:

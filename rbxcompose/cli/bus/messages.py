@@ -24,10 +24,10 @@ from rbxcompose.printable import FORBIDDEN
 
 NO_TYPE = kind(
     "RBX9021",
-    """A type that is not known here
+    """Unknown message type
 
 rbxcompose reads and writes the messages, services and actions whose definitions it has, and those of packages that are
-installed. Whatever has another type, or another definition of the same type, can be seen and measured, but not read.
+installed. Other types, or other definitions of the same type, can be listed and measured, but not read.
 
 Bad: `rbxcompose topic pub /word std_msgs/Strin 'data: hello'`
 Good: `rbxcompose topic pub /word std_msgs/String 'data: hello'`
@@ -129,7 +129,7 @@ def _known(name: str, category: str, look: Callable[[str], type[T]]) -> type[T]:
         return look(name)
     except KeyError:
         full = registry.full_name(name, category)
-        words = f"'{full}' is not a type that is known here"
+        words = f"unknown type '{full}'"
         raise NotDoneError(NO_TYPE.misspelt(None, words, full, registry.names(category), "known types")) from None
 
 

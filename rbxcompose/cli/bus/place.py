@@ -27,8 +27,8 @@ class BusPlace:
 def add_bus_options(parser: argparse.ArgumentParser) -> None:
     """Declare `--robot NAME`, `--router ENDPOINT` and `--domain N`."""
     add_robot_option(parser)
-    parser.add_argument("--router", metavar="ENDPOINT", help="any other bus, by its Zenoh router: tcp/192.168.1.7:7447")
-    parser.add_argument("--domain", type=int, metavar="N", help="the ROS domain, if it is not that of the robot, or 0")
+    parser.add_argument("--router", metavar="ENDPOINT", help="another bus, by its Zenoh router: tcp/192.168.1.7:7447")
+    parser.add_argument("--domain", type=int, metavar="N", help="the ROS domain (default: that of the robot, or 0)")
 
 
 def find_place(arguments: argparse.Namespace) -> BusPlace:
@@ -53,5 +53,5 @@ def place_of(folder: RobotFolder) -> BusPlace:
     if state is not None and not state.is_supervised:
         raise NotDoneError(no_answer(folder))  # its router has gone with it, or is about to
     if state is None or state.router is None:
-        raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' has no router that is known"))
+        raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' has no known router"))
     return BusPlace(state.router, state.domain)

@@ -54,7 +54,7 @@ class _Echo:
 
     @property
     def is_over(self) -> bool:
-        """Tell whether enough has been printed."""
+        """Return whether enough has been printed."""
         return self._arguments.count is not None and self._count >= self._arguments.count
 
     def heard(self, heard: HeardMessage) -> None:
@@ -76,6 +76,6 @@ def echo(guest: Guest, arguments: argparse.Namespace) -> int:
     dropped = 0
     while not guest.run(lambda: told.is_over, _PERIOD):
         if guest.dropped > dropped:
-            sys.stderr.write(f"left out: {guest.dropped - dropped} messages, they come too fast to be shown\n")
+            sys.stderr.write(f"left out: {guest.dropped - dropped} messages, which came too fast to show\n")
             dropped = guest.dropped
     return 0

@@ -18,7 +18,7 @@ from rbxcompose.qos import Qos
 
 
 def publish(guest: Guest, arguments: argparse.Namespace) -> int:
-    """Publish a message once somebody listens, and tell how often."""
+    """Publish a message once there is a subscriber, and report how often."""
     message = message_type(arguments.type)
     made = message_from(message, arguments.message)
     if made is None:
@@ -45,8 +45,8 @@ def publish(guest: Guest, arguments: argparse.Namespace) -> int:
 
 def _nobody(topic: GraphName | None, name: str, message: type[Message], of_type: list[WireType]) -> Finding:
     if topic is None or not topic.takers:
-        return NOBODY.at(None, f"nobody subscribes to '{name}'")
+        return NOBODY.at(None, f"nothing subscribes to '{name}'")
     others = ", ".join(topic.types)
     if not of_type:
         return NOBODY.at(None, f"'{name}' is not of type {message.TYPE}, but {others}")
-    return NOBODY.at(None, f"those who subscribe to '{name}' have another definition of {message.TYPE}")
+    return NOBODY.at(None, f"the subscribers of '{name}' have another definition of {message.TYPE}")

@@ -1,1 +1,1 @@
-"""What may stand at the end of a command line."""
+"""What may come at the end of a command line."""

@@ -1,4 +1,4 @@
-"""What may stand at the end of a command line: verbs, options and choices of the parsers, else `CandidateValues`."""
+"""What may come at the end of a command line: verbs, options and choices of the parsers, else `CandidateValues`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be completed beside words of the program: files, robots that are up, their components and topics."""
+"""What can be completed besides words of the program: files, robots that are up, their components and topics."""
 
 from __future__ import annotations
 

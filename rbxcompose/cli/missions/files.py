@@ -38,7 +38,7 @@ NO_MISSION = kind(
     "RBX9040",
     """The robot has no mission of this name
 
-Missions have the names that the section `missions` of the robot gives them. `rbxcompose mission ls` lists them.
+Missions have the names that the robot's section `missions` gives them. `rbxcompose mission ls` lists them.
 
 Bad: `rbxcompose mission show patrl robots/turtlebot`
 Good: `rbxcompose mission show patrol robots/turtlebot`

@@ -1,4 +1,4 @@
-"""A mission that runs, live: its nodes with how they stand, its data, its last transitions."""
+"""A running mission, live: its nodes with their states, its data, its last transitions."""
 
 from __future__ import annotations
 

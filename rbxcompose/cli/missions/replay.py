@@ -1,4 +1,4 @@
-"""`mission replay`: runs missions again from their log, and tells where they do something else than they did then."""
+"""`mission replay`: runs missions again from their log, and reports where they differ from the log."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _OWN = ("mission", "run")  # of a record, about which run it is
 
 NO_LOG = kind(
     "RBX9041",
-    """The file is no log of a mission
+    """The file is not the log of a mission
 
-`rbxcompose mission replay` reads what `rbxcompose mission log --all` has told: a JSON record a line, each run from its
-beginning. Without `--all`, what came in is not in it, and nothing can be run again.
+`rbxcompose mission replay` reads the output of `rbxcompose mission log --all`: one JSON record per line, each run from
+its start. Without `--all` the inputs are missing, and nothing can be run again.
 
 Bad: `rbxcompose mission log > patrol.log; rbxcompose mission replay patrol.log robots/turtlebot`
 Good: `rbxcompose mission log --all > patrol.log; rbxcompose mission replay patrol.log robots/turtlebot`
@@ -64,7 +64,7 @@ def runs_in(file: str) -> dict[tuple[str, int], list[LogRecord]]:
     except OSError as error:
         raise NotDoneError(NO_LOG.at(None, f"'{file}' cannot be read: {error.strerror}")) from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:
-        raise NotDoneError(NO_LOG.at(None, f"'{file}' is no log: each line is a record in JSON")) from error
+        raise NotDoneError(NO_LOG.at(None, f"'{file}' is not a log: each line must be a JSON record")) from error
     if not runs:
         raise NotDoneError(NO_LOG.at(None, f"'{file}' is empty"))
     return runs
@@ -78,7 +78,7 @@ def difference(records: Sequence[LogRecord], name: str, robot: Robot, file: str)
     except ReplayError as error:
         raise NotDoneError(NO_LOG.at(None, f"'{file}' cannot be replayed: {error}")) from error
     except LookupError:  # a result of a leaf that is not there any more
-        return "the log has results of nodes that the mission does not have: it was changed too much to go on"
+        return "the log has results of nodes that the mission does not have: it has changed too much to continue"
     now = [_told(record) for record in json.loads(json.dumps(again))]
     for number in range(max(len(then), len(now))):
         before, after = then[number : number + 1], now[number : number + 1]

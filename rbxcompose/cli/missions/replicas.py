@@ -1,4 +1,4 @@
-"""The missions of a robot as a visitor on its bus sees them: wholes that were asked for, and news since."""
+"""The missions of a robot as a visitor on its bus sees them: whole states from queries, and updates since."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class MissionsSeen:
 
     @property
     def is_complete(self) -> bool:
-        """Tell whether all answers have come."""
+        """Return whether all answers have come."""
         return self._is_listed and not self._asked
 
     def look(self) -> None:

@@ -68,14 +68,14 @@ def answered(in_json: bool) -> Iterator[None]:
 
 
 def misused(verb: str, problem: str) -> int:
-    """Tell that a command cannot be meant like this, and return the exit code for it."""
+    """Report that a command cannot be meant like this, and return the exit code for it."""
     output().misuse = problem
     sys.stderr.write(f"rbxcompose {verb}: {problem}\n")
     return USAGE
 
 
 def has_colour(stream: TextIO) -> bool:
-    """Tell whether colours help: on a terminal, unless `NO_COLOR` is set."""
+    """Return whether colours help: on a terminal, unless `NO_COLOR` is set."""
     return stream.isatty() and not os.environ.get("NO_COLOR")
 
 

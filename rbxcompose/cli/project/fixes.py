@@ -35,13 +35,13 @@ class CheckedTexts(Protocol):
 
 
 def fix(check: Callable[[], CheckedTexts], say: PrintLine) -> None:
-    """Check, apply what can safely be fixed, say it, and begin anew until nothing is left."""
+    """Check, apply what can safely be fixed, say it, and repeat until nothing is left."""
     for _ in range(ROUNDS):
         checked = check()
         fixes = safe_fixes(checked.report, checked.sources)
         if not fixes or not _apply(fixes, checked.sources, say):
             return
-    say(f"stopped after {ROUNDS} rounds: each fix makes room for another")
+    say(f"stopped after {ROUNDS} rounds: each fix leads to another")
 
 
 def only_ours(findings: Iterable[Finding], projects: Collection[Path]) -> Iterator[Finding]:
@@ -62,7 +62,7 @@ def _apply(fixes: list[Fix], sources: Sources, say: PrintLine) -> bool:
     for file in dict.fromkeys(edit.span.file for one in fixes for edit in one.edits):
         text = _unchanged_text(file, sources[file])
         if text is None:
-            say(f"left {plain(file)} as it is: it was changed since it was read, or cannot be read any more")
+            say(f"left {plain(file)} as it is: it has changed since it was read, or can no longer be read")
         else:
             texts[file] = text
     out = apply(fixes, texts)
@@ -71,7 +71,7 @@ def _apply(fixes: list[Fix], sources: Sources, say: PrintLine) -> bool:
         if all(edit.span.file in written for edit in one.edits):
             say(f"fixed {_told(one)}")
     for one in out.postponed:
-        say(f"not yet {_told(one)}: it meets another fix")
+        say(f"not yet {_told(one)}: it overlaps with another fix")
     return bool(written)
 
 

@@ -22,7 +22,7 @@ class MistakenRobotError(Exception):
     """Raised when a robot has mistakes of its own, with what the compiler made of it."""
 
     def __init__(self, compilation: Compilation) -> None:
-        super().__init__("the robot has mistakes")
+        super().__init__("the robot has errors")
         self.compilation = compilation
 
 
@@ -35,7 +35,7 @@ class MissionHome:
     project: Path
 
     def usual(self, name: str) -> MissionAnswers:
-        """Return what is to be known of a mission of this robot."""
+        """Return what must be known of a mission of this robot."""
         file = PurePosixPath(self.file.relative_to(self.project))
         places = tuple(self.robot.manifest.places.values())
         for skill in sorted(self.robot.skills) if places else ():
@@ -78,8 +78,10 @@ def find_home(written: str) -> MissionHome:
 
 def _file(written: str) -> Path:
     if written.startswith(PREFIX):
-        help_text = "write one of your own by 'rbxcompose new robot NAME'"
-        raise AnswerError(ANSWER.at(None, f"'{written}' is a robot of the library and stays as it is", help=help_text))
+        help_text = "create your own with 'rbxcompose new robot NAME'"
+        raise AnswerError(
+            ANSWER.at(None, f"'{written}' is a robot of the library, which stays as it is", help=help_text)
+        )
     path = find(written or _only())
     if isinstance(path, Path):
         return path
@@ -92,5 +94,5 @@ def _only() -> str:
         return str(files[0])
     if files:
         names = ", ".join(shown_name(file.parent) for file in files)
-        raise AnswerError(ANSWER.at(None, "which robot is the mission for?", help=f"name it by '--robot': {names}"))
-    raise AnswerError(ANSWER.at(None, "there is no robot below 'robots/'", help="name one by '--robot PATH'"))
+        raise AnswerError(ANSWER.at(None, "which robot is the mission for?", help=f"name it with '--robot': {names}"))
+    raise AnswerError(ANSWER.at(None, "there is no robot below 'robots/'", help="name one with '--robot PATH'"))

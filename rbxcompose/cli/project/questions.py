@@ -1,4 +1,4 @@
-"""Questions at the terminal; where nobody sits at one, every question has its default."""
+"""Questions at the terminal; without one, every question has its default."""
 
 from __future__ import annotations
 

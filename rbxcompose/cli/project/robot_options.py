@@ -22,12 +22,12 @@ class Layers(TypedDict):
 
 def add_layer_options(parser: argparse.ArgumentParser) -> None:
     """Declare `--profile`, `-f`, `--set` and `--real`."""
-    parser.add_argument("--profile", action="append", default=[], metavar="P", help="put this profile on top")
+    parser.add_argument("--profile", action="append", default=[], metavar="P", help="apply this profile")
     parser.add_argument(
-        "-f", "--file", action="append", default=[], dest="overlays", metavar="FILE", help="put this overlay on top"
+        "-f", "--file", action="append", default=[], dest="overlays", metavar="FILE", help="apply this overlay"
     )
     parser.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="change one value")
-    parser.add_argument("--real", action="store_true", help="for the real devices; without it they are simulated")
+    parser.add_argument("--real", action="store_true", help="use the real devices; without it, they are simulated")
 
 
 def layers_of(arguments: argparse.Namespace) -> Layers:

@@ -1,4 +1,4 @@
-"""Which robots `check` is asked about: by file, by folder, or because they use a file."""
+"""Which robots `check` looks at: by file, by folder, or because they use a file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ UNUSED = kind(
     "RBX9007",
     """No robot uses the file
 
-A mission or a part is checked together with the robots that use it. No robot of the project does, so that there is
+A mission or a part is checked together with the robots that use it. No robot of the project does, so there is
 nothing to check it against. An overlay does not say which robots it is for: `check ROBOT -f FILE` checks it on one.
 
 Bad: `rbxcompose check missions/draft.yaml`, which no robot has in its `missions:`.

@@ -1,4 +1,4 @@
-"""What `record` and `replay` share beside the bus: options, findings, tables."""
+"""What `record` and `replay` share besides the bus: options, findings, tables."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _class(text: str) -> Qos:
     try:
         return Qos(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"'{text}' is no class; there are {', '.join(Qos)}") from None
+        raise argparse.ArgumentTypeError(f"'{text}' is not a class; choose from {', '.join(Qos)}") from None
 
 
 def recover_in(folder: Path) -> None:
@@ -62,7 +62,7 @@ def recover_in(folder: Path) -> None:
 
 
 def warn(finding: Finding) -> None:
-    """Tell a finding that does not end the command."""
+    """Report a finding that does not end the command."""
     report = Report()
     report.add(finding)
     tell_report(report, {})

@@ -27,7 +27,7 @@ from rbxcompose.regular_files import open_regular
 from rbxcompose.replay.comparison import RunDifference
 from rbxcompose.replay.run import Rerun, missing_topics, rerun
 
-HOW = "'rbxcompose up PATH --rate max --record FILE' records all that is needed"
+HOW = "'rbxcompose up PATH --rate max --record FILE' records everything that is needed"
 
 
 def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> int:
@@ -49,18 +49,18 @@ def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader
 
 def _plan(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> Plan:
     if PLAN not in reader.attachments:
-        message = f"'{plain(str(path))}' was not recorded from within a stepped run"
+        message = f"'{plain(str(path))}' was not recorded within a stepped run"
         raise NotDoneError(NOT_ENOUGH.at(None, message, help=HOW))
     if arguments.robot is not None:
         compilation = compiled(arguments.robot, arguments)
         tell_report(compilation.report, compilation.sources)
         if compilation.plan is None:
-            raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(arguments.robot)}' has mistakes"))
+            raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(arguments.robot)}' has errors"))
         return compilation.plan
     try:
         return load(reader.attachments[PLAN].decode())
     except ValueError as error:
-        reason = str(error) if isinstance(error, PlanTextError) else "its plan is no text"
+        reason = str(error) if isinstance(error, PlanTextError) else "its plan is not text"
         raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(str(path))}': {plain(reason)}")) from error
 
 

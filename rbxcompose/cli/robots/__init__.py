@@ -1,1 +1,1 @@
-"""Robots that run: which one is meant, what it is asked, how it is watched and changed."""
+"""Running robots: which one is addressed, what it is asked, how it is watched and changed."""

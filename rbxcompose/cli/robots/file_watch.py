@@ -22,7 +22,7 @@ class FileWatch:
         self._seen = self._known
 
     def look(self) -> bool:
-        """Tell whether files are others than they were, and have not changed since the last look."""
+        """Return whether files are others than they were, and have not changed since the last look."""
         now = {path: _stamp(path) for path in self._known}
         is_settled, self._seen = now == self._seen, now
         if now == self._known or not is_settled:

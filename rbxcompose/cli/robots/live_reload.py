@@ -47,7 +47,7 @@ class LiveReload:
         self._is_pending = found.plan is not None
         self._next_try = 0.0
         if found.plan is None:
-            tell("the files have changed and have mistakes: the robot stays as it is")
+            tell("the files have changed and have errors: the robot stays as it is")
 
     def _take(self) -> None:
         """Show the difference and let the robot take it, or wait."""

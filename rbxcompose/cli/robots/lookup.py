@@ -41,7 +41,7 @@ REFUSED = kind(
     "RBX9004",
     """The robot refuses
 
-The command reached the robot, which cannot do it now; the message says why.
+The command reached the robot, which cannot carry it out now; the message says why.
 """,
 )
 NO_ANSWER = kind(
@@ -55,7 +55,7 @@ UNSAFE = kind(
     "RBX9006",
     """The robot's folder is not safe
 
-Lock, state and control socket of a robot lie in a folder that nobody else may open.
+Lock, state and control socket of a robot are in a folder that nobody else may open.
 """,
 )
 
@@ -70,7 +70,7 @@ class NotDoneError(Exception):
 
 def add_robot_option(parser: argparse.ArgumentParser) -> None:
     """Declare `--robot NAME`."""
-    parser.add_argument("--robot", metavar="NAME", help="the robot that is meant, when several are up")
+    parser.add_argument("--robot", metavar="NAME", help="the robot, if several are up")
 
 
 def find_robot(wanted: str | None) -> RobotFolder:
@@ -153,7 +153,7 @@ def no_answer(folder: RobotFolder) -> Finding:
     name, state = folder.path.name, known_state(folder)
     why = ""
     if state is not None and not state.is_supervised:
-        why = ": its supervisor has died, without which it brakes and ends"
+        why = ": its supervisor has died, so it brakes and ends"
     elif state is not None and state.supervisor.is_stopped:
         why = ": its supervisor is suspended"
     return NO_ANSWER.at(

@@ -43,7 +43,7 @@ class Proposal:
 
     @property
     def is_empty(self) -> bool:
-        """Tell whether there is nothing to do."""
+        """Return whether there is nothing to do."""
         return not self.found.impossible and all(one.fate is Fate.KEPT for one in self.found.components)
 
     @property

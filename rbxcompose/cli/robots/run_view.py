@@ -1,4 +1,4 @@
-"""Running a plan and telling it as it goes: the log is followed as `logs -f` does, the rest the supervisor reports."""
+"""Running a plan and showing the run: follows the log as `logs -f` does; the supervisor reports the rest."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class _Watch:
                     return exit_code
         except EOFError:
             self._tell_story(self._records())
-            sys.stderr.write("rbxcompose up: the supervisor was killed; its processes come to rest by themselves\n")
+            sys.stderr.write("rbxcompose up: the supervisor was killed; its processes stop by themselves\n")
             self._started.wait()
             return ROBOT_FAILED
         finally:
@@ -83,7 +83,7 @@ class _Watch:
                 tell(self._story.line(record))
 
     def _tell(self, report: LaunchReport) -> int | None:
-        """Tell a report and return the exit code if it is the last."""
+        """Print a report and return the exit code if it is the last."""
         name = self._plan.robot
         match report:
             case Begun():

@@ -57,7 +57,7 @@ class Sampler:
 
     @property
     def is_complete(self) -> bool:
-        """Tell whether diagnostics and batteries have been heard and the missions seen, if there are any."""
+        """Return whether diagnostics and batteries have been heard and the missions seen, if there are any."""
         is_healthy = _HEALTH not in self._listened or bool(self._statuses)
         is_charged = self._charges.keys() >= self._gauges.keys() & self._listened
         return is_healthy and is_charged and (self._missions is None or self._missions.is_complete)

@@ -1,4 +1,4 @@
-"""The commands: found by the names of their files, and only imported when asked for."""
+"""The commands: found by the names of their files, and imported only when needed."""
 
 from __future__ import annotations
 

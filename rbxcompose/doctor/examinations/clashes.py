@@ -30,6 +30,6 @@ def clashes(facts: HostFacts) -> Iterator[str | Finding]:
         names = [*graph.topics, *graph.services, *graph.actions] if graph else []
         for name in (name for name in names if name.clash):
             words = f"{plain(name.name)} of '{one.name}' has {plain(name.clash, 400)}"
-            yield CLASH.at(None, words, help=f"'rbxcompose topic show {plain(name.name)}' tells who has which")
+            yield CLASH.at(None, words, help=f"'rbxcompose topic show {plain(name.name)}' shows which end has which")
         if not any(name.clash for name in names):
             yield f"{one.name}: all ends of {len(names)} names agree in their types"

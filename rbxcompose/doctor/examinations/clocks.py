@@ -1,4 +1,4 @@
-"""Whether clocks tell the same time."""
+"""Whether clocks agree."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ WRONG_CLOCK = kind(
     "RBX9404",
     """The clock of this machine is wrong
 
-Robots move by the monotonic clock, which nobody sets. But stamps of messages, recordings and ROS 2 use the wall clock.
+Robots move by the monotonic clock, which is never set. But stamps of messages, recordings and ROS 2 use the wall clock.
 
 Bad: a computer without a battery for its clock, and without a time server.
 Good: `timedatectl set-ntp true`
@@ -24,9 +24,9 @@ Good: `timedatectl set-ntp true`
 )
 OTHER_CLOCK = kind(
     "RBX9405",
-    """Somebody on the bus has another time
+    """A node on the bus has another time
 
-The stamps of its messages lie in the future, or long ago. Whatever compares stamps from several publishers, such as
+The stamps of its messages are in the future, or long ago. Whatever compares stamps from several publishers, such as
 transforms and recordings, is then wrong. A robot that runs with `--rate` counts its own time from zero, and so do its
 stamps.
 
@@ -51,13 +51,13 @@ def clocks(facts: HostFacts) -> Iterator[str | Finding]:
             None, f"the clock of this machine moved by {clock.step:+.3f} s while we looked", help=_HELP
         )
     else:
-        yield f"the wall clock goes evenly{_server(clock.is_synchronised)}"
+        yield f"the wall clock runs evenly{_server(clock.is_synchronised)}"
     for one in facts.running:
         ages = one.bus.ages if one.bus else {}
         wrong = {node: age for node, age in ages.items() if not -MOST_AHEAD <= age <= MOST_BEHIND}
         for node, age in sorted(wrong.items()):
             words = f"{-age:.2f} s in the future" if age < 0 else f"{age:.2f} s in the past"
-            yield OTHER_CLOCK.at(None, f"the stamps of '{node}' of '{one.name}' lie {words}", help=_HELP)
+            yield OTHER_CLOCK.at(None, f"the stamps of '{node}' of '{one.name}' are {words}", help=_HELP)
         if ages and not wrong:
             yield f"{one.name}: the stamps of {len(ages)} nodes agree with this clock"
 

@@ -38,12 +38,12 @@ def devices(facts: HostFacts) -> Iterator[str | Finding]:
         path, shown = Path(device), plain(device)
         if not path.exists():
             yield NO_DEVICE.at(
-                place, f"'{component}' names {shown}, which is not there", help="plug it in, or look below /dev"
+                place, f"'{component}' names {shown}, which does not exist", help="plug it in, or look below /dev"
             )
         elif not path.is_char_device():
-            yield NO_DEVICE.at(place, f"'{component}' names {shown}, which is no device", help="look below /dev")
+            yield NO_DEVICE.at(place, f"'{component}' names {shown}, which is not a device", help="look below /dev")
         elif not os.access(path, os.R_OK | os.W_OK):
-            todo = f"sudo usermod -aG {_group(path)} $USER, then log in anew"
+            todo = f"sudo usermod -aG {_group(path)} $USER, then log in again"
             yield NO_DEVICE.at(place, f"'{component}' names {shown}, which this user may not open", help=todo)
         else:
             yield f"{shown} of '{component}' can be opened"

@@ -1,4 +1,4 @@
-"""Who may open what is this user's alone."""
+"""Whether others may open what is private to this user."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rbxcompose.printable import plain
 
 OPEN_TO_OTHERS = kind(
     "RBX9410",
-    """Others may open what is this user's alone
+    """Others may open what is private
 
 The folder of a robot contains the socket that commands it. A secret is read only if nobody else may read it. `up`
 refuses both.
@@ -35,7 +35,7 @@ def permissions(facts: HostFacts) -> Iterator[str | Finding]:
     wrong = [*_wrong(folders, "700"), *_wrong(secrets, "600")]
     yield from wrong
     if not wrong:
-        yield f"{len(folders)} folders of robots and {len(secrets)} secrets are this user's alone"
+        yield f"{len(folders)} folders of robots and {len(secrets)} secrets are private"
 
 
 def _secret_folders(facts: HostFacts) -> list[Path]:

@@ -1,4 +1,4 @@
-"""Who listens at the ports of routers."""
+"""What listens at the ports of routers."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ Good: `bus: {port: 7460}`, or `bus: {router: tcp/127.0.0.1:7447}` to use that ro
 )
 NO_LISTENER = kind(
     "RBX9403",
-    """Nobody listens at the port of a running robot's router
+    """Nothing listens at the port of a running robot's router
 
-Its processes still talk to each other, but nobody new finds them. The supervisor restarts a router that has ended; if
-it cannot, another program may have taken the port.
+Its processes still talk to each other, but new ones cannot find them. The supervisor restarts a router that has ended;
+if it cannot, another program may have taken the port.
 
 Bad: the router was killed together with the supervisor.
 Good: `rbxcompose down`, then `rbxcompose up`
@@ -67,7 +67,7 @@ def _router(one: RunningRobot, facts: HostFacts) -> Iterator[str | Finding]:
     if taken is not None and taken.pid == router.pid:
         yield f"port {port}: router of {one.name}"
         return
-    words = "nobody listens there" if taken is None else f"{_who(taken)} listens there"
+    words = "nothing listens there" if taken is None else f"{_who(taken)} listens there"
     yield NO_LISTENER.at(
         None,
         f"the router of '{one.name}' should listen at port {port}, but {words}",

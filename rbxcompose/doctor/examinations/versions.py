@@ -15,7 +15,7 @@ OTHER_VERSION = kind(
 `requirements.lock` lists the versions with which rbxcompose is tested. Others mostly work, too. When something odd
 happens, check this first.
 
-Bad: `pip install rbxcompose` over an environment that is years old.
+Bad: `pip install rbxcompose` into an environment that is years old.
 Good: `pip install -r requirements.lock`
 """,
     Severity.WARNING,

@@ -13,7 +13,7 @@ from rbxcompose.sdk.ports import In
 
 NOBODY_PUBLISHES = kind(
     "RBX9407",
-    """Somebody subscribes to a topic that nobody publishes
+    """A topic has subscribers but no publisher
 
 The subscriber waits for ever. Inputs that the robot leaves open to the outside, such as `teleop` of a mux, are not
 reported.
@@ -28,7 +28,7 @@ _MOST = 8  # names
 
 @examination
 def wires(facts: HostFacts) -> Iterator[str | Finding]:
-    """Tell which ends of wires are alone on the bus of each robot."""
+    """Report which ends of wires are alone on the bus of each robot."""
     for one in facts.running:
         if one.bus is not None:
             yield from _of(one, [topic for topic in one.bus.graph.topics if not topic.is_hidden])
@@ -40,9 +40,9 @@ def _of(one: RunningRobot, topics: list[GraphName]) -> Iterator[str | Finding]:
     alone = [topic for topic in topics if topic.takers and not topic.givers and topic.name not in open_inputs]
     for topic in alone:
         nodes = ", ".join(sorted({end.node for end in topic.takers}))
-        words = f"{plain(nodes)} of '{one.name}' subscribes to {plain(topic.name)}, which nobody publishes"
+        words = f"{plain(nodes)} of '{one.name}' subscribes to {plain(topic.name)}, which has no publisher"
         yield NOBODY_PUBLISHES.at(None, words, help="'rbxcompose topic ls' shows what is published")
     unheard = [plain(topic.name) for topic in topics if topic.givers and not topic.takers]
     more = f" and {len(unheard) - _MOST} more" if len(unheard) > _MOST else ""
-    heard = f"; published, and nobody listens: {', '.join(unheard[:_MOST])}{more}" if unheard else ""
+    heard = f"; published without a subscriber: {', '.join(unheard[:_MOST])}{more}" if unheard else ""
     yield f"{one.name}: {len(topics) - len(alone)} topics are published or open to the outside{heard}"

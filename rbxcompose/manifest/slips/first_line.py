@@ -1,4 +1,4 @@
-"""A file without the line with which every manifest begins."""
+"""A file without the first line of every manifest."""
 
 from __future__ import annotations
 

@@ -41,5 +41,5 @@ def key_in_line(trouble: Trouble) -> Finding | None:
     edit = Edit(place, found[0][start + len(outer) :], text)
     # Only where more keys follow below it, it can be no text.
     fix = Fix((edit,), goes_on and bool(_KEY_LINE.match(below)), f"'{outer}: {inner}' on {len(pairs) + 1} lines")
-    message = f"two keys stand in one line: '{outer}' and '{pairs[0].partition(':')[0]}'"
+    message = f"two keys are on one line: '{outer}' and '{pairs[0].partition(':')[0]}'"
     return NOT_YAML.at(place._replace(column=found.start("inner") + 1), message, help=help_text, fix=fix)

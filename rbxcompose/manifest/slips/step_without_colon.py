@@ -22,7 +22,7 @@ def step_without_colon(trouble: Trouble) -> Finding | None:
     word, value = step["word"], (step["value"] or "").strip()
     span = trouble.span(line, step.start("word"), step.end("word"))
     fix = replacement(span, word, f"{word}:", is_safe=not value)  # with a value, it may be a text as well
-    message = "with settings below it, a step needs a colon"
+    message = "a step with settings below it needs a colon"
     help_text = f"write '{word}: {value}'" if value else f"write '{word}:'"
-    below = (Related(trouble.here, "this stands below it"),)
+    below = (Related(trouble.here, "this is below it"),)
     return NOT_YAML.at(span, message, label="put a colon here", help=help_text, related=below, fix=fix)

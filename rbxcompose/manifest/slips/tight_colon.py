@@ -1,4 +1,4 @@
-"""A colon without a space behind it: `name:one`."""
+"""A colon without a space after it: `name:one`."""
 
 from __future__ import annotations
 
@@ -25,5 +25,5 @@ def tight_colon(trouble: Trouble) -> Finding | None:
     found = _TIGHT.match(text, column)
     if found is None:
         return None
-    span, message = trouble.span(line, column, found.end()), "a space is missing behind this colon"
+    span, message = trouble.span(line, column, found.end()), "a space is missing after this colon"
     return NOT_YAML.at(span, message, help="write 'key: value'", fix=replacement(span, found[0], f"{found[0]} "))

@@ -1,4 +1,4 @@
-"""Dashes without a space behind them: `-name: one`."""
+"""Dashes without a space after them: `-name: one`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def tight_dashes(trouble: Trouble) -> Finding | None:
     ]
     first = edits[0]
     fix = Fix(tuple(edits), True, f"'{first.old}' -> '{first.text}'")
-    message = "a space is missing behind this dash"
+    message = "a space is missing after this dash"
     return NOT_YAML.at(first.span, message, help=f"write '{first.text}'", fix=fix)
 
 

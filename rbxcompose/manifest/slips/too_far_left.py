@@ -1,4 +1,4 @@
-"""A line that stands further left than its neighbours."""
+"""A line that is further left than its neighbours."""
 
 from __future__ import annotations
 
@@ -38,4 +38,4 @@ def _outlier(trouble: Trouble, line: int) -> Finding | None:
     beside = lines[before].lstrip(" -").partition(":")[0].strip()
     how_far = f"{column - start} {'column' if column - start == 1 else 'columns'}"
     help_text = f"move it {how_far} to the right, into the column of '{beside}'"
-    return NOT_YAML.at(trouble.span(above, start, start + len(key)), f"'{key}' stands too far left", help=help_text)
+    return NOT_YAML.at(trouble.span(above, start, start + len(key)), f"'{key}' is too far left", help=help_text)

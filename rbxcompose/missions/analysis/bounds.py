@@ -1,4 +1,4 @@
-"""What can be known of a condition before it is asked: whether it holds always, never, or now and then."""
+"""What is known about a condition before it is evaluated: whether it holds always, never, or sometimes."""
 
 from __future__ import annotations
 

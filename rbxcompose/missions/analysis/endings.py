@@ -1,4 +1,4 @@
-"""How the nodes of a mission may end, as far as the text tells: what machines must have transitions for."""
+"""How the nodes of a mission may end, as far as the text shows: what machines must have transitions for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a mission will do, as far as its text alone tells: constants, steps that cannot fail, steps that never end."""
+"""What a mission will do, as far as its text shows: constants, steps that cannot fail, steps that never end."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def items_of(node: MissionNode, constants: Constants, places: Mapping[str, Place
 
 
 def never_skipped(program: Program, node: MissionNode) -> bool:
-    """Tell whether a node is always done, so that its result is success or failure."""
+    """Return whether a node is always done, so that its result is success or failure."""
     if node.may_be_left_out:
         return False
     if node.step.skipped is Skipped.WITH_ALL_INSIDE:
@@ -95,14 +95,14 @@ def never_skipped(program: Program, node: MissionNode) -> bool:
 
 
 def is_simple(node: MissionNode) -> bool:
-    """Tell whether the conditions of a node can always be asked."""
+    """Return whether the conditions of a node can always be asked."""
     # An item that is not there, or a division by zero, would be a failure.
     trees = (asked.expression.tree for asked in node.asked)
     return not any(isinstance(part, Index | FieldAccess | Arithmetic) for tree in trees for part, _ in walk(tree))
 
 
 def is_sure(node: MissionNode, program: Program) -> bool:
-    """Tell whether a node reads only what is there from the start, in ways that cannot go wrong."""
+    """Return whether a node reads only what is there from the start, in ways that cannot go wrong."""
     read = {name.name for asked in node.asked for name in asked.expression.names}
     others = read - program.inputs.keys() - program.data.keys()
     if others and not others <= {one.item for one in program.nodes}:
@@ -116,7 +116,7 @@ def _divides(part: ExpressionNode) -> bool:
 
 
 def takes_time(pause: Expression | None) -> bool:
-    """Tell whether a time is there and not written out as none."""
+    """Return whether a time is there and not written out as none."""
     return pause is not None and not (isinstance(pause.tree, Number) and pause.tree.value == 0)
 
 

@@ -1,4 +1,4 @@
-"""Nodes that stand in a mission's data: which ones a `run` may meet, and the values that stand for them."""
+"""Nodes in a mission's data: which ones a `run` may meet, and the values that represent them."""
 
 from __future__ import annotations
 

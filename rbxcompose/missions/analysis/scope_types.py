@@ -54,7 +54,7 @@ class View:
 
     @property
     def waits(self) -> bool:
-        """Tell whether the node, or any below it, takes time by itself."""
+        """Return whether the node, or any below it, takes time by itself."""
         return any(below.step.waits for below in self.program.below(self.node.number))
 
     def typed(self, expression: Expression, wanted: Type, scalar: ScalarNode, kind: FindingKind) -> Iterator[Finding]:

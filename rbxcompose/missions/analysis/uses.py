@@ -13,7 +13,7 @@ CIRCLE = kind(
     "RBX4146",
     """Missions use each other in a circle
 
-A mission with all that it uses is run as one. One that uses itself, at once or by way of others, would never end.
+A mission runs as one with all that it uses. One that uses itself, directly or through others, would never end.
 To do something again, write `repeat` or a machine.
 
 Bad: `patrol` has `use: rest`, and `rest` has `use: patrol`.
@@ -33,8 +33,8 @@ TOO_MUCH = kind(
     "RBX4147",
     """A mission is too large with all that it uses
 
-Each `use` has nodes of its own. Twenty thousand nodes, and missions within sixteen others, are enough for every robot;
-more is mostly a mistake, as of missions that use two others each, which use two others each.
+Each `use` has its own nodes. Twenty thousand nodes, and missions within sixteen others, are enough for every robot;
+more is usually a mistake, such as missions that use two others each, which use two others each.
 
 Use a mission in a loop instead of many times.
 """,
@@ -82,14 +82,14 @@ class Using:
         return self._sizes[name]
 
     def _circle(self, names: list[str]) -> None:
-        """Tell a circle once, at its first mission, with the place of each step."""
+        """Report a circle once, at its first mission, with the place of each step."""
         if names[0] in self.broken:
             return
         self.broken.update(names)
         steps = [(one, other, self._uses[one][other]) for one, other in pairwise(names)]
         message = f"missions use each other in a circle: {' -> '.join(names)}"
         related = [Related(span, f"'{one}' uses '{other}'") for one, other, span in steps[1:]]
-        help_text = "take one of the steps out; to do it again, write 'repeat' around it"
+        help_text = "remove one of the steps; to do it again, write 'repeat' around it"
         self.findings.append(CIRCLE.at(steps[0][2], message, help=help_text, related=related))
 
     def _too_large(self) -> Iterator[Finding]:
@@ -101,6 +101,6 @@ class Using:
             if any(one in self.broken for one in self._uses[name]):
                 continue
             span = next(iter(self._uses[name].values()), self._missions[name].nodes[0].span)
-            size = f"{nodes:,} nodes" if nodes > MOST_NODES else f"missions {depth} deep within each other"
+            size = f"{nodes:,} nodes" if nodes > MOST_NODES else f"missions are nested {depth} deep"
             most = f"{MOST_NODES:,}" if nodes > MOST_NODES else str(DEEPEST)
             yield TOO_MUCH.at(span, f"mission '{name}' has {size} with all that it uses; {most} are allowed")

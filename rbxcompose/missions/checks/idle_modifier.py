@@ -52,7 +52,7 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
 
 
 def _comes_again(program: Program, node: MissionNode) -> bool:
-    """Tell whether anything in the mission can start a node a second time."""
+    """Return whether anything in the mission can start a node a second time."""
     if any(one.afterwards != CONTINUE for one in program.interrupts):
         return True
     parent = node.parent

@@ -70,7 +70,7 @@ def impossible_result(mission: Examined) -> Iterator[Finding]:
                     yield impossible_result.at(
                         inner_span(outcome.asked.scalar, tree.start, tree.end),
                         f"the branch '{branch}' never ends with '{result}'",
-                        help=f"it ends with {' or '.join(ends[branch].words) or 'nothing: it goes on for ever'}",
+                        help=f"it ends with {' or '.join(ends[branch].words) or 'nothing: it runs for ever'}",
                     )
 
 

@@ -56,6 +56,6 @@ def _branches(node: MissionNode, program: Program, robot: RobotNames) -> Iterato
 def _item(view: View) -> Iterator[Finding]:
     item, node = view.node.item, view.node
     if item and item in view.scope.names:
-        yield NAME_CLASH.at(node.span, f"the item '{item}' has the name of something that the loop sees already")
+        yield NAME_CLASH.at(node.span, f"the item '{item}' has a name that the loop already uses")
     elif item and (item in kinds() or item in view.robot.skills):
         yield NAME_CLASH.at(node.span, f"the item '{item}' is named like a kind or a skill")

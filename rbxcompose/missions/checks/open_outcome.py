@@ -62,7 +62,7 @@ def _open(state: MissionNode, leads_to: Next | None, ends: Outcomes) -> Iterator
             yield open_outcome.at(state.span, message, help=f"it can end with {listed}")
     elif "" in leads_to.to:
         if ends.counting_as(FAILS):
-            message = f"the state '{state.name}' can fail, so that one word after 'next' is not enough"
+            message = f"the state '{state.name}' can fail, so one word after 'next' is not enough"
             yield open_outcome.at(leads_to.spans[""], message, help=ONE_WORD)
     else:
         for word, counts_as in ends.words.items():

@@ -37,7 +37,7 @@ def pointless_number(mission: Examined) -> Iterator[Finding]:
             if value is not None and value < least:
                 yield pointless_number.at(
                     place_in_text(node, expression),
-                    f"{what} must be above zero to have a meaning",
+                    f"{what} must be above zero to have an effect",
                     help="write a larger number, or leave it out",
                 )
 

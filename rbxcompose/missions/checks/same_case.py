@@ -83,7 +83,7 @@ def _constant(expression: Expression) -> object:
 
 
 def _can_be(case: Expression, chosen: Type) -> bool:
-    """Tell whether a value of the type `chosen` can be equal to what is written out as a case."""
+    """Return whether a value of the type `chosen` can be equal to what is written out as a case."""
     if chosen.kind not in (*WORDS, *NUMBERS, TypeKind.FLAG):
         return True
     match case.tree:

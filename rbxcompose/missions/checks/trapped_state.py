@@ -61,8 +61,8 @@ def trapped_state(mission: Examined) -> Iterator[Finding]:
             if state.name in used and state.name not in free:
                 yield trapped_state.at(
                     state.span,
-                    f"from the state '{state.name}' no way leads to an end",
-                    help="lead one of its outcomes, or of the states behind it, back or to an end",
+                    f"no path leads from the state '{state.name}' to an end",
+                    help="let one of its outcomes, or of the states after it, lead back or to an end",
                 )
 
 

@@ -35,6 +35,6 @@ def unknown_skill(mission: Examined) -> Iterator[Finding]:
         if node.skill and node.skill not in skills:
             close = nearest(node.skill, (*skills, *kinds()))
             if close or mission.robot.is_complete:
-                message = f"mission '{mission.program.name}' uses a skill that nobody provides: '{node.skill}'"
+                message = f"mission '{mission.program.name}' uses a skill that the robot does not have: '{node.skill}'"
                 known = (*skills, *kinds()) if close else skills
                 yield unknown_skill.misspelt(node.span, message, node.skill, known, "skills of this robot")

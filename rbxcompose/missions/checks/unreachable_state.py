@@ -56,4 +56,4 @@ def unreachable_state(mission: Examined) -> Iterator[Finding]:
         used = reached(machine.start, leads)
         for state in states if machine.start in leads else ():
             if state.name not in used:
-                yield unreachable_state.at(state.span, f"no way leads to the state '{state.name}'")
+                yield unreachable_state.at(state.span, f"no path leads to the state '{state.name}'")

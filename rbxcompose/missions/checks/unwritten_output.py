@@ -47,6 +47,6 @@ def unwritten_output(mission: Examined) -> Iterator[Finding]:
             yield unwritten_output.at(
                 asked.scalar.span,
                 f"the output '{name}' is always the same: nothing sets '{first}'",
-                help=f"set '{first}' where it is found out, or keep a result by 'save: {first}'",
+                help=f"set '{first}' where its value is known, or keep a result with 'save: {first}'",
                 related=[Related(program.data[first].span, "its only value")],
             )

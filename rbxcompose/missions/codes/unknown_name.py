@@ -1,4 +1,4 @@
-"""A `$name` that stands for nothing."""
+"""A `$name` that means nothing."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The engine that runs a mission: pure, told the time."""
+"""The engine that runs a mission: pure, with time as an argument."""

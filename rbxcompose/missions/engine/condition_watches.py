@@ -1,4 +1,4 @@
-"""Conditions that something waits for: which names wake it, and whether it has to be asked at the mission's rate."""
+"""Conditions that something waits for: which names wake it, and whether to evaluate it at the mission's rate."""
 
 from __future__ import annotations
 

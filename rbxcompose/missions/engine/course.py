@@ -28,7 +28,7 @@ class Course:
         return now - self.lost
 
     def tick(self) -> int:
-        """Start the root or go on with it; a reaction without a root is done at once."""
+        """Start the root or continue with it; a reaction without a root is done at once."""
         root = self.root
         if root is None:
             return SUCCESS
@@ -47,7 +47,7 @@ class Course:
             self.current = None
 
     def resume(self, now: float) -> None:
-        """Let the clock go on."""
+        """Let the clock run on."""
         if self.left is not None:
             self.lost += now - self.left
             self.left = None

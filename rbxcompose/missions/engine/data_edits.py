@@ -18,7 +18,7 @@ def without(target: ExpressionNode, item: Value, data: dict[str, Value], scope: 
     path = _path(target, scope)
     name = path[0]
     if name not in data:
-        raise NodeFailed(f"'{name}' is not in the data, so that nothing can leave it")
+        raise NodeFailed(f"'{name}' is not in the data, so nothing can be removed from it")
     data[str(name)] = _removed(data[str(name)], path[1:], item)
 
 
@@ -30,7 +30,7 @@ def _path(tree: ExpressionNode, scope: MissionScope) -> list[Value]:
             return [*_path(of, scope), name]
         case Index(of=of, index=index):
             return [*_path(of, scope), evaluate(Expression("", index), scope)]
-    raise NodeFailed("'remove_done' needs data that are named, such as '$chores'")
+    raise NodeFailed("'remove_done' needs named data, such as '$chores'")
 
 
 def _removed(value: Value, path: list[Value], item: Value) -> Value:

@@ -1,4 +1,4 @@
-"""The engine runs one mission: single-threaded, pure, told the time, silent while nothing is to be done."""
+"""The engine runs one mission: single-threaded, pure, with time as an argument, idle while there is nothing to do."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Engine(EngineBase):
         self.arrived.append((leaf, result))
 
     def tick(self, now: float) -> int:
-        """Do all that is to be done at `now` [s], and return the mission's status."""
+        """Do everything that is due at `now` [s], and return the mission's status."""
         self.now = now
         if self.status not in (IDLE, RUNNING) or self.is_paused or self._is_held(now):
             return self.status
@@ -94,7 +94,7 @@ class Engine(EngineBase):
             self.main.stack[-1].suspend(now, anew=False)
 
     def resume(self, now: float) -> None:
-        """Go on; the skills that were halted are asked again at the next tick."""
+        """Continue; the skills that were halted are asked again at the next tick."""
         if self.is_paused:
             self.is_paused = False
             self.lost += now

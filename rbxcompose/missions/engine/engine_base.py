@@ -1,4 +1,4 @@
-"""The engine as its tasks see it: time, statuses, what wakes it, who is told."""
+"""The engine as its tasks see it: time, statuses, what wakes it, who observes it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class EngineBase:
         self.lost = 0.0  # [s] for which the mission was paused; while it is, less the time at which that began
         self.because = ""  # why leaves are being halted
         self.cut_short: list[int] = []  # leaves that were halted by the latest suspension
-        self.restarting: tuple[Target, ...] = ()  # what begins anew after the suspension that is going on
+        self.restarting: tuple[Target, ...] = ()  # what starts again after the current suspension
         self.is_aborting = False  # the mission as a whole is ended from outside
         self.places = ResumePoints()
         self.reasons: dict[int, str] = {}  # why a node failed the last time
@@ -60,11 +60,11 @@ class EngineBase:
         self.wants_again = by
 
     def is_past(self, time: float) -> bool:
-        """Tell whether a time of this course [s] has come."""
+        """Return whether a time of this course [s] has come."""
         return time - self.time <= ROUNDING
 
     def has_gone_by(self, seconds: float, since: float) -> bool:
-        """Tell whether so much time has gone by since a time without the pauses of the mission."""
+        """Return whether so much time has gone by since a time without the pauses of the mission."""
         return seconds - (self.unpaused - since) <= ROUNDING
 
     def chance(self) -> Random:
@@ -73,7 +73,7 @@ class EngineBase:
         return Random(f"{self.settings.seed}/{self.draws}")  # noqa: S311 - no secret, and to be drawn again
 
     def is_due(self, deadline: float) -> bool:
-        """Tell whether a time of this course [s] has come; if not, the engine wakes then."""
+        """Return whether a time of this course [s] has come; if not, the engine wakes then."""
         if self.is_past(deadline):
             return True
         self.wake_at(deadline + (self.now - self.time))
@@ -95,5 +95,5 @@ class EngineBase:
         self.arrived = [result for result in self.arrived if result[0] != leaf]
 
     def say(self, event: MissionEvent) -> None:
-        """Tell the world what happens."""
+        """Report to the world what happens."""
         self.world.say(event)

@@ -1,4 +1,4 @@
-"""Where a mission begins: in the first states of its machines, or in others that a person names."""
+"""Where a mission starts: in the first states of its machines, or in others that a user names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an engine says while a mission runs: typed events, of which a shell makes the robot's story."""
+"""What an engine reports while a mission runs: typed events, from which a shell writes the log."""
 
 from __future__ import annotations
 
@@ -86,9 +86,9 @@ class InterruptStarted:
 
 @dataclass(frozen=True, slots=True)
 class InterruptEnded:
-    """The reaction is done; `afterwards` tells how it goes on, `back_to` are the leaves that it halted.
+    """The reaction is done; `afterwards` says how it continues, `back_to` are the leaves that it halted.
 
-    `anew` is the name of what begins again. If nothing of that name was running, it goes on as by `continue`.
+    `anew` is the name of what begins again. If nothing of that name was running, it continues as with `continue`.
     """
 
     name: str

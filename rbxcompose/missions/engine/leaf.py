@@ -1,4 +1,4 @@
-"""A leaf that asks something of the robot and waits for the answer: a skill, a call of a service."""
+"""A leaf that requests something of the robot and waits for the response: a skill, a call of a service."""
 
 from __future__ import annotations
 

@@ -196,7 +196,7 @@ def replay(records: Iterable[LogRecord], program: Program, robot: RobotNames) ->
             start_at = {int(number): state for number, state in record["start_at"].items()}
             engine = Engine(program, robot, inputs, world, Settings(record["seed"], start_at))
         elif engine is None:
-            raise ReplayError("the log does not begin with the beginning of the mission")
+            raise ReplayError("the log does not start with the start of the mission")
         elif what in INPUTS:
             for leaf, result in record.get("results", ()):
                 engine.ended(leaf, from_plain(result))

@@ -1,4 +1,4 @@
-"""Tasks around a node that change nothing: they count messages from its start, tell its name, let others look."""
+"""Tasks around a node that change nothing: they count messages from its start, report its name, let others look."""
 
 from __future__ import annotations
 
@@ -37,29 +37,29 @@ class Since(Decorator):
 
 
 class Around(Decorator):
-    """Hears when its node starts, ends or is halted; a node that begins anew after an interrupt is halted."""
+    """Hears when its node starts, ends or is halted; a node that starts again after an interrupt is halted."""
 
     __slots__ = ()
 
     def begin(self) -> int:
-        """Tell that it starts."""
+        """Report that it starts."""
         self.started()
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on, and tell if it ends."""
+        """Continue, and report if it ends."""
         status = self.advance(self.inner)
         if status != RUNNING:
             self.ended(status)
         return status
 
     def halt(self) -> None:
-        """Tell that it is halted."""
+        """Report that it is halted."""
         super().halt()
         self.ended(IDLE)
 
     def suspend(self, anew: bool) -> bool:
-        """Tell that it is halted, if it begins anew."""
+        """Report that it is halted, if it starts again."""
         is_anew = super().suspend(anew)
         if is_anew:
             self.ended(IDLE)
@@ -124,9 +124,9 @@ class Observed(Around):
         self.observer = options
 
     def started(self) -> None:
-        """Tell it."""
+        """Report it."""
         self.observer.started(self.number)
 
     def ended(self, status: int) -> None:
-        """Tell it."""
+        """Report it."""
         self.observer.ended(self.number, status, self.engine.outcome)

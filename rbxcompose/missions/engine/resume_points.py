@@ -30,7 +30,7 @@ class ResumePoints:
             self.kept.add(task)
 
     def take_up(self, task: ResumableTask) -> bool:
-        """Tell whether a task that starts has a place to start at; it is told once."""
+        """Return whether a task that starts has a place to start at; it is told once."""
         if task in self.kept:
             self.kept.remove(task)
             return True

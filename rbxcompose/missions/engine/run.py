@@ -54,7 +54,7 @@ class Run(RunBase):
             reaction.scope.mark()
 
     def tick(self, now: float) -> int:
-        """Look at the interrupts, then go on with the course on top; return the status of the mission."""
+        """Look at the interrupts, then continue with the course on top; return the status of the mission."""
         self._look(now)
         course, outer = self.stack[-1], self.engine.time
         self.engine.time = course.time(now)
@@ -161,7 +161,7 @@ class Run(RunBase):
         return has_begun
 
     def _forget_place_of(self, number: int) -> None:
-        """Forget where a node was that is to begin anew; those inside it keep the places of histories of their own."""
+        """Forget the place of a node that starts again; those inside it keep the places of their own histories."""
         node = self.engine.program.nodes[number]
         is_deep = node.step.history == DEEP
         self.engine.places.forget(number, node.end if is_deep else number + 1)

@@ -59,7 +59,7 @@ class RunBase(ABC):
 
     @abstractmethod
     def tick(self, now: float) -> int:
-        """Look at the interrupts, then go on with the course on top; return the status of the mission."""
+        """Look at the interrupts, then continue with the course on top; return the status of the mission."""
 
     @abstractmethod
     def halt(self) -> None:

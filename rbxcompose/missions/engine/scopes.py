@@ -42,7 +42,7 @@ class MissionScope(Protocol):
         ...
 
     def is_new(self, name: str, /) -> bool:
-        """Tell whether a message of `$name` came since this node started."""
+        """Return whether a message of `$name` came since this node started."""
         ...
 
     def count(self, name: str, /) -> int:
@@ -78,7 +78,7 @@ class RunScope:
         return self._values.age(name)
 
     def is_new(self, name: str, /) -> bool:
-        """Tell whether any message has come since the mission started."""
+        """Return whether any message has come since the mission started."""
         return self.count(name) > 0
 
     def count(self, name: str, /) -> int:
@@ -139,7 +139,7 @@ class SinceScope(Inner):
         self.seen = {name: self.outer.count(name) for name in self._names}
 
     def is_new(self, name: str, /) -> bool:
-        """Tell whether a message came since `mark`."""
+        """Return whether a message came since `mark`."""
         return self.outer.count(name) > self.seen.get(name, 0)
 
 

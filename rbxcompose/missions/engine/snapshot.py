@@ -1,4 +1,4 @@
-"""The state of an engine as plain data, and back: what was saved at a tick goes on from there in the same way.
+"""The state of an engine as plain data, and back: what was saved at a tick continues from there in the same way.
 
 An engine is restored into one that was made from the same program, robot and settings. What runs outside (skills that
 were asked) is the business of its world.

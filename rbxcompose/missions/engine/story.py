@@ -99,7 +99,7 @@ def _usual_first(result: str) -> tuple[int, str]:
 
 def _afterwards(afterwards: str, back: str, anew: str) -> str:
     if afterwards == RESTART:
-        return f", {anew or 'the mission'} begins anew"
+        return f", {anew or 'the mission'} starts again"
     return f", back to {back}" if back else ""
 
 

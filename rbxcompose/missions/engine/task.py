@@ -39,7 +39,7 @@ class Task(ABC):
     """The running side of a node; kinds fill in `begin` and, if they take time, `proceed`.
 
     `current` is the task below that runs now. A task without one goes on by starting the child that it was at, so
-    that a child which was suspended to begin anew needs no further bookkeeping. `saved` are the names of what else
+    that a child which was suspended to start again needs no further bookkeeping. `saved` are the names of what else
     makes up its state.
     """
 
@@ -70,7 +70,7 @@ class Task(ABC):
         return status
 
     def tick(self) -> int:
-        """Go on, and return the status; only for a task that runs."""
+        """Continue, and return the status; only for a task that runs."""
         try:
             status = self.proceed()
         except Exception as error:
@@ -92,7 +92,7 @@ class Task(ABC):
             child.halt()
 
     def suspend(self, anew: bool) -> bool:
-        """Stop the leaves that run, keep the place, and tell whether this task is to be started again for that.
+        """Stop the leaves that run, keep the place, and return whether this task is to be started again for that.
 
         With `anew`, a leaf and its modifiers begin again from the start, as after an interrupt; without it, as after
         a pause, a leaf repeats only what it asked of the robot.
@@ -129,7 +129,7 @@ class Task(ABC):
         raise NotImplementedError(f"{type(self).__name__} ends with its first tick")
 
     def advance(self, child: Task) -> int:
-        """Start the child or go on with it, and return its status."""
+        """Start the child or continue with it, and return its status."""
         status = child.start() if self.current is None else child.tick()
         self.current = child if status == RUNNING else None
         return status
@@ -147,11 +147,11 @@ class Task(ABC):
         """
         value = evaluate(expression, self.scope)
         if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
-            raise NodeFailed(f"{what} must be a number from 0 on, not {self.run.show('', value)}")
+            raise NodeFailed(f"{what} must be a number, at least 0, not {self.run.show('', value)}")
         return value
 
     def count_of(self, expression: Expression, what: str) -> int:
-        """Return the value of an expression that must be a whole number from 0 on.
+        """Return the value of an expression that must be a whole number, at least 0.
 
         Raises:
             NodeFailed: if it is none.
@@ -174,7 +174,7 @@ class Task(ABC):
         engine.because = engine.outcome = ""
 
     def report(self, error: Exception) -> None:
-        """Tell why this task cannot go on."""
+        """Say why this task cannot continue."""
         message = words(error)
         self.engine.reasons[self.number] = message
         self.engine.say(Reported(self.path, message))

@@ -19,7 +19,7 @@ class World(RobotValues, Protocol):
         ...
 
     def halt(self, leaf: int, /) -> None:
-        """Stop the skill or the call of a leaf; nothing is to be told of it any more."""
+        """Stop the skill or the call of a leaf; it is not reported any more."""
         ...
 
     def pause(self, leaf: int, /) -> None:
@@ -27,7 +27,7 @@ class World(RobotValues, Protocol):
         ...
 
     def resume(self, leaf: int, /) -> None:
-        """Let the skill of a leaf go on that was held."""
+        """Let the skill of a leaf continue that was held."""
         ...
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:

@@ -1,4 +1,4 @@
-"""`call`: ask a service and wait for its answer."""
+"""`call`: call a service and wait for its response."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class CallTask(Leaf):
 @kind("call", CallTask, {"request": "The fields of the request; a single value stands for the only field."})
 @dataclass(frozen=True, slots=True)
 class CallStep(LeafStep):
-    """Call a service of the robot; an answer that says `success: false` is a failure.
+    """CallStep a service of the robot; a response with `success: false` is a failure.
 
     Example:
         do:

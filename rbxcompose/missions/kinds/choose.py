@@ -37,7 +37,7 @@ class ChooseTask(Task):
         return SKIPPED if self.index < 0 else self.proceed()
 
     def proceed(self) -> int:
-        """Go on with what was chosen."""
+        """Continue with what was chosen."""
         return self.advance(self.chosen[self.index])
 
     def _choose(self) -> int:
@@ -52,7 +52,7 @@ class ChooseTask(Task):
 @kind("choose", ChooseTask, {"cases": "What is done for which value.", "else": "What is done for all other values."})
 @dataclass(frozen=True, slots=True)
 class ChooseStep(Choosing):
-    """Do the case of a value, which is asked once; without a match it is skipped.
+    """Do the case that matches a value, which is read once; skipped without a match.
 
     Example:
         data:

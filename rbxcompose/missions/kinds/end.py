@@ -32,16 +32,16 @@ class EndTask(Task):
         if self.run.ending is None or (status, self.run.ending) == (FAILURE, SUCCESS):
             self.run.ending, self.run.message = status, message
             if status == FAILURE:
-                self.engine.reasons[self.number] = message or "the mission was to end in failure"
+                self.engine.reasons[self.number] = message or "the mission ended itself in failure"
         return RUNNING
 
 
-@kind("end", EndTask, {"message": "What is told about it."})
+@kind("end", EndTask, {"message": "A message for the log."})
 @dataclass(frozen=True, slots=True)
 class EndStep(Deed):
-    """End the mission in which this is written, in `success` or in `failure`; what runs is halted.
+    """EndStep the mission that contains this node, in `success` or `failure`; what runs is halted.
 
-    Where two branches of a parallel end it at one tick, failure beats success.
+    If two branches of a parallel end it in one tick, failure beats success.
 
     Example:
         do:

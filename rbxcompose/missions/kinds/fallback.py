@@ -23,7 +23,7 @@ class FallbackTask(InTurnTask):
 
 @kind("fallback", FallbackTask, OPTIONS)
 class FallbackStep(InTurn):
-    """Try the nodes of a list in order; the first success is the fallback's own, a skipped one is passed over.
+    """Try the nodes of a list in order, until one succeeds; skipped ones are passed over.
 
     Example:
         do:

@@ -68,7 +68,7 @@ class ForTask(Task):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on with this item; the next one is for another tick."""
+        """Continue with this item; the next one is for another tick."""
         status = self.advance(self.body)
         if status == RUNNING:
             return RUNNING
@@ -99,7 +99,7 @@ class ForTask(Task):
         return {"done": list(self.done), "failed": list(self.failed)}
 
     def _decides(self, status: int) -> bool:
-        """Note the result of an item, and tell whether it is that of the loop."""
+        """Note the result of an item, and return whether it is that of the loop."""
         if status == FAILURE:
             self.failed.append(self.taken)
             self.did = FAILURE
@@ -149,12 +149,12 @@ class ForTask(Task):
     "for",
     ForTask,
     {
-        "in": "What it goes through: a list, or a map, of which it takes the keys; it is read once, at the start.",
+        "in": "A list, or a map, whose keys it takes; it is read once, at the start.",
         "do": "What is done for each item.",
-        "order": "In which order: as `written`, `random` (drawn anew at each start), or the `nearest` place first.",
-        "if_one_fails": "`stop` fails at once; `next` does the rest and fails at the end.",
-        "succeed_when": "`all` must succeed, or `any`: it goes on after a failure and ends at the first success.",
-        "remove_done": "Whether an item that has succeeded leaves the data that `in` names.",
+        "order": "The order: as `written`, `random` (a new draw at each start), or the `nearest` place first.",
+        "if_one_fails": "`stop` fails at once; `next` does the other items and fails at the end.",
+        "succeed_when": "`all` must succeed, or `any`: it continues after a failure and ends at the first success.",
+        "remove_done": "Whether an item that succeeded is removed from the data that `in` names.",
     },
 )
 @dataclass(frozen=True, slots=True)
@@ -211,7 +211,7 @@ class ForStep(Loop):
         return Outcomes(fails=endings.of(node.children[0]).plain.fails)
 
     def _is_read(self, program: Program) -> bool:
-        """Tell whether what it goes through is there whatever happens."""
+        """Return whether what it goes through is there whatever happens."""
         if isinstance(self.items, tuple):
             return not any(item.names for item in self.items)
         written = self.items.tree.name if isinstance(self.items.tree, Variable) else ""

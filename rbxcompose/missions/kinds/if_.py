@@ -36,14 +36,14 @@ class IfTask(Task):
         return self.proceed() if self.index < len(self.branches) else SKIPPED
 
     def proceed(self) -> int:
-        """Go on with what was chosen."""
+        """Continue with what was chosen."""
         return self.advance(self.branches[self.index])
 
 
 @kind("if", IfTask, {"then": "What is done if the condition holds.", "else": "What is done if it does not."})
 @dataclass(frozen=True, slots=True)
 class IfStep(Choosing):
-    """Ask the condition once, then do `then` or `else`; without a match it is skipped.
+    """Evaluate a condition once, then do `then` or `else`; skipped without a match.
 
     Example:
         do:

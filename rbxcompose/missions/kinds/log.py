@@ -1,4 +1,4 @@
-"""`log`: say something in the robot's story."""
+"""`log`: write a line to the robot's log."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class LogTask(Task):
         return SUCCESS
 
 
-@kind("log", LogTask, {"level": "How bad it is."})
+@kind("log", LogTask, {"level": "Its severity."})
 @dataclass(frozen=True, slots=True)
 class LogStep(Deed):
     """Write one line; `$name` in it is filled in.

@@ -51,7 +51,7 @@ class MachineTask(WithHistory):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on with the state; the next one is for another tick."""
+        """Continue with the state; the next one is for another tick."""
         self.engine.outcome = ""
         status = self.advance(self.states[self.index])
         if status == RUNNING:
@@ -86,9 +86,9 @@ class MachineTask(WithHistory):
 @kind("machine", MachineTask)
 @dataclass(frozen=True, slots=True)
 class MachineStep(Loop):
-    """Be in one state after the other; how a state's body ends decides which is next.
+    """Run one state after another; the outcome of a state decides which is next.
 
-    Below it stand `start`, `states`, and perhaps `ends` and `history`. A state has `do` or `machine`, modifiers,
+    It has `start`, `states`, and perhaps `ends` and `history`. A state has `do` or `machine`, modifiers,
     `on_enter`, `on_exit`, and `next`. `finished` and `failed` are ends that always exist.
 
     Example:
@@ -158,7 +158,7 @@ class StateTask(Task):
         return self.advance(self.body)
 
     def proceed(self) -> int:
-        """Go on with the body."""
+        """Continue with the body."""
         return self.advance(self.body)
 
     def result(self) -> Value:

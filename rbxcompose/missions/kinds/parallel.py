@@ -145,13 +145,13 @@ class ParallelTask(Task):
         "succeed_when": "How many branches must succeed: `all`, `any` or a number.",
         "fail_when": "How many branches must fail for the whole to fail: `any`, `all` or a number.",
         "ends_with": "The branch whose result is the result; failures of others do not count.",
-        "wait_for_all": "Whether it goes on until all branches have ended, also when it is decided.",
+        "wait_for_all": "Whether it waits for all branches to end, even when the result is decided.",
         "outcomes": "Of a state's body: outcome by condition over the results of the branches; the first one wins.",
     },
 )
 @dataclass(frozen=True, slots=True)
 class ParallelStep(Straight):
-    """Do several nodes at the same time; at each tick all that have not ended are ticked, then it is judged.
+    """Do several nodes at the same time. Each tick ticks all that have not ended, then decides the result.
 
     Example:
         do:

@@ -35,7 +35,7 @@ class PublishTask(Task):
 @kind("publish", PublishTask, {"message": "The fields of the message; a single value stands for the only field."})
 @dataclass(frozen=True, slots=True)
 class PublishStep(Deed):
-    """Publish a message on a topic of the robot; fields that are left out are zero or empty.
+    """PublishStep a message on a topic of the robot; missing fields are zero or empty.
 
     Example:
         do:

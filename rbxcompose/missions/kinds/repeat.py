@@ -54,7 +54,7 @@ class RepeatTask(Task):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on with this round; the next one is for another tick."""
+        """Continue with this round; the next one is for another tick."""
         if self.is_between:
             if not self.engine.is_due(self.due):
                 return RUNNING
@@ -84,13 +84,13 @@ class RepeatTask(Task):
     RepeatTask,
     {
         "do": "What is done in each round.",
-        "until": "A condition that ends the loop; it is asked after each round and never cuts one.",
+        "until": "A condition that ends the loop; it is evaluated after each round and never cuts one short.",
         "every": "Time from the start of one round to the start of the next.",
     },
 )
 @dataclass(frozen=True, slots=True)
 class RepeatStep(Loop):
-    """Do the body again and again; a round that fails fails it, a number that is used up succeeds.
+    """Do the body repeatedly. It fails with the first round that fails, and succeeds after the last.
 
     Example:
         do:
@@ -124,7 +124,7 @@ class RepeatStep(Loop):
         return Outcomes(fails=body.fails) if self._is_counted(node) else ANY
 
     def _is_counted(self, node: MissionNode) -> bool:
-        """Tell whether the number of rounds and the time of one are written out, and `until` can always be asked."""
+        """Return whether the number of rounds and the time of one are written out, and `until` can always be asked."""
         if not any(asked.expression.names for asked in node.asked):
             return True
         return is_simple(node) and all(one is None or isinstance(one.tree, Number) for one in (self.rounds, self.every))
@@ -136,7 +136,7 @@ class RepeatStep(Loop):
 
     @property
     def waits(self) -> bool:
-        """Tell that it waits between its rounds if they have a period."""
+        """Return that it waits between its rounds if they have a period."""
         return takes_time(self.every)
 
     @property

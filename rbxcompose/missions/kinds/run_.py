@@ -44,14 +44,14 @@ class RunTask(Task):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on with it."""
+        """Continue with it."""
         return self.advance(self.children[self.index])
 
 
 @kind("run", RunTask)
 @dataclass(frozen=True, slots=True)
 class RunStep(Straight):
-    """Do a node that stands in the data: a chore of a list, a step that was chosen before.
+    """Do a node that is stored in the data: a chore of a list, a step chosen earlier.
 
     Example:
         data:

@@ -20,7 +20,7 @@ class SequenceTask(InTurnTask):
 
 @kind("sequence", SequenceTask, OPTIONS)
 class SequenceStep(InTurn):
-    """Do the nodes of a list in order; the first failure is the sequence's own.
+    """Do the nodes of a list in order, until one fails.
 
     Example:
         do:

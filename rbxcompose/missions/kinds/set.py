@@ -36,7 +36,7 @@ class SetTask(Task):
 @kind("set", SetTask)
 @dataclass(frozen=True, slots=True)
 class SetStep(Deed):
-    """Compute all right sides first, then set them.
+    """Compute all right-hand sides first, then set them.
 
     Example:
         data:

@@ -1,4 +1,4 @@
-"""A skill of the robot: its arguments are computed, the world is asked, and the result comes later."""
+"""A skill of the robot: computes its arguments, sends a request to the world, and gets the result later."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class SkillTask(Leaf):
         return status, outcome, result.message or outcome
 
     def suspend(self, anew: bool) -> bool:
-        """Hold the skill if it can pause and is to go on, else stop it."""
+        """Hold the skill if it can pause and will continue, else stop it."""
         if self.is_asked and self.skill.pausable and not self._begins_anew():
             if not self.is_held:
                 self.is_held = True

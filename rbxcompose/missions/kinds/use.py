@@ -50,13 +50,13 @@ class UseTask(WithHistory):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on with the mission."""
+        """Continue with the mission."""
         status = self.inner.tick(self.engine.time)
         if status != RUNNING:
             self.forget_places()
             self.outputs = self._outputs()
             if self.inner.ending == FAILURE:
-                self.engine.reasons[self.number] = self.inner.message or "its mission was to end in failure"
+                self.engine.reasons[self.number] = self.inner.message or "its mission ended itself in failure"
         return status
 
     def halt(self) -> None:

@@ -41,7 +41,7 @@ class WaitTask(Task):
 @kind("wait", WaitTask)
 @dataclass(frozen=True, slots=True)
 class WaitStep(LeafStep):
-    """Succeed after a time; it goes on with the rest when the mission was cut short meanwhile.
+    """Succeed after a time; after an interrupt it continues with the rest.
 
     Example:
         do:

@@ -40,7 +40,7 @@ class WaitForTask(Task):
         return RUNNING
 
     def suspend(self, anew: bool) -> bool:
-        """Nothing is to be stopped; after an interrupt it starts again."""
+        """There is nothing to stop; after an interrupt it starts again."""
         if anew:
             self.statuses[self.number] = IDLE
         return anew
@@ -49,7 +49,7 @@ class WaitForTask(Task):
 @kind("wait_for", WaitForTask)
 @dataclass(frozen=True, slots=True)
 class WaitForStep(LeafStep):
-    """Succeed as soon as the condition holds; `timeout` bounds it.
+    """Succeed as soon as the condition holds; `timeout` limits the wait.
 
     Example:
         do:

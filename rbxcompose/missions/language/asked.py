@@ -1,4 +1,4 @@
-"""What stands in a node as it was written: expressions with their types, what is set, what is given."""
+"""The contents of a node as written: expressions with their types, what is set, what is given."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The places of a mission's grammar: what may stand at each, for the slips that are recognised there."""
+"""The places of a mission's grammar: what may be at each, for the slips that are recognised there."""
 
 from __future__ import annotations
 
@@ -71,11 +71,11 @@ class Words:
     skills: Collection[str] = ()
 
     def is_step(self, word: str) -> bool:
-        """Tell whether a word is that of a kind, or a skill of the robot."""
+        """Return whether a word is that of a kind, or a skill of the robot."""
         return word in self.kinds or word in self.skills
 
     def is_option(self, key: str) -> bool:
-        """Tell whether some kind has a key of this name beside its word."""
+        """Return whether some kind has a key of this name beside its word."""
         return bool(self.owners(key))
 
     def owners(self, key: str) -> str:
@@ -115,7 +115,7 @@ def long_form(step: TreeNode) -> MappingNode:
 
 
 def is_empty(node: TreeNode) -> bool:
-    """Tell whether nothing was written: `do:` with no value."""
+    """Return whether nothing was written: `do:` with no value."""
     return isinstance(node, ScalarNode) and node.plain and not node.text
 
 
@@ -131,7 +131,7 @@ def without_word(step: MappingNode, words: Words) -> MappingNode:
 
 
 def is_told(node: TreeNode | None) -> bool:
-    """Tell whether all was said of a value, or of the word of a step."""
+    """Return whether all was said of a value, or of the word of a step."""
     if isinstance(node, MappingNode) and "" in node:
         node = node.entries[""].key
     return isinstance(node, ScalarNode) and node.filled is BROKEN

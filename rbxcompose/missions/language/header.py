@@ -1,4 +1,4 @@
-"""What stands beside the nodes of a mission: its inputs, its data, its rate."""
+"""What a mission has besides its nodes: its inputs, its data, its rate."""
 
 from __future__ import annotations
 

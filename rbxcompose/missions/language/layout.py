@@ -1,4 +1,4 @@
-"""What the keys of steps take: the code that reads a kind is run on a reader that writes down what it asks for."""
+"""What the keys of steps take: runs the code that reads a kind on a reader that records what it reads."""
 
 from __future__ import annotations
 

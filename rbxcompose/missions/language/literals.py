@@ -74,7 +74,7 @@ def _scalar(scalar: ScalarNode, wanted: Type) -> Value:
     if wanted.kind is TypeKind.COUNT:
         count = value.value if isinstance(value, Quantity) else value
         if isinstance(count, bool) or not isinstance(count, int | float) or count < 0 or count != int(count):
-            raise WrongValue("must be a whole number from 0 on", label=label)
+            raise WrongValue("must be a whole number, at least 0", label=label)
         return float(count)
     if wanted.kind is TypeKind.FLAG:
         if not isinstance(value, bool):
@@ -82,7 +82,7 @@ def _scalar(scalar: ScalarNode, wanted: Type) -> Value:
         return value
     text = scalar.text if scalar.filled is None else str(scalar.filled)
     if wanted.kind is TypeKind.CHOICE and text not in wanted.choices:
-        raise WrongValue(f"is none of the choices: '{text}'", help=suggest(text, wanted.choices, "choices"))
+        raise WrongValue(f"is not one of the choices: '{text}'", help=suggest(text, wanted.choices, "choices"))
     return text
 
 

@@ -42,7 +42,7 @@ def read_machine(reader: NodeReader) -> tuple[MachineStates, str]:
     ends = _ends(inner, names)
     start = inner.scalar("start", "the name of a state") if "start" in value else None
     if "start" not in value:
-        reader.add(codes.MISSING.at(reader.span, "a machine needs 'start': the state in which it begins"))
+        reader.add(codes.MISSING.at(reader.span, "a machine needs 'start': the state in which it starts"))
     history = read_history(inner)
     return MachineStates(start.text if start else "", names, ends, start.span if start else None), history
 
@@ -59,11 +59,9 @@ def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:
     for name, entry in value.entries.items():
         inner.check_name(entry.key)
         if name in ENDS:
-            inner.add(codes.NAME_CLASH.at(entry.key.span, f"the end '{name}' exists already"))
+            inner.add(codes.NAME_CLASH.at(entry.key.span, f"the end '{name}' already exists"))
         elif name in states or name in RESULTS:
-            inner.add(
-                codes.NAME_CLASH.at(entry.key.span, f"an end cannot be named '{name}': that means something else")
-            )
+            inner.add(codes.NAME_CLASH.at(entry.key.span, f"an end cannot be named '{name}': that has another meaning"))
         word = entry.value.text if isinstance(entry.value, ScalarNode) else ""
         if word not in RESULTS:
             message = f"the end '{name}' must count as 'success' or 'failure'"

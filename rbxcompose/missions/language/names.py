@@ -9,7 +9,7 @@ from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
-NAME_HELP = "names begin with a small letter; small letters, digits and underscores follow"
+NAME_HELP = "names start with a lower-case letter; lower-case letters, digits and underscores follow"
 _BETWEEN = re.compile(r"[\s-]+")
 
 
@@ -22,5 +22,5 @@ def cure(text: str) -> str:
 def no_name(scalar: ScalarNode, fix: Fix | None = None) -> Finding:
     """Return the finding about a text that stands where a name should."""
     meant = cure(scalar.text)
-    help_text = f"write '{meant}': names have small letters, digits and underscores" if meant else NAME_HELP
-    return codes.WRONG_SHAPE.at(scalar.span, f"'{scalar.text}' is no name", help=help_text, fix=fix)
+    help_text = f"write '{meant}': names have lower-case letters, digits and underscores" if meant else NAME_HELP
+    return codes.WRONG_SHAPE.at(scalar.span, f"'{scalar.text}' is not a valid name", help=help_text, fix=fix)

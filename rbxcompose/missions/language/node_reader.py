@@ -1,4 +1,4 @@
-"""Reads the values and options of one mission node; each kind asks for what belongs to it."""
+"""Reads the values and options of one mission node; each kind reads what belongs to it."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class NodeReader(ValueReader):
         return Moments({key: self._deeds(key) for key in keys if self.has(key)})
 
     def _deeds(self, key: str) -> Deeds:
-        what = "something small to do: 'set', 'log' or 'publish' below it, without a dash"
+        what = "an action: 'set', 'log' or 'publish' below it, without a dash"
         value = self.map_of(key, what, Takes.HOOK)
         if value is None:
             return Deeds()
@@ -145,7 +145,7 @@ class NodeReader(ValueReader):
         value = self.take(key, Takes.STEP)
         if value is None or (isinstance(value, ScalarNode) and value.plain and not value.text):
             span = self.key_span(key) if value else self.span
-            self.nodes.add(codes.MISSING.at(span, f"'{self.key}' needs '{key}': what is to be done"))
+            self.nodes.add(codes.MISSING.at(span, f"'{self.key}' needs '{key}': what to do"))
             return
         self.children.append(self.nodes.child(value, key, self.number))
 

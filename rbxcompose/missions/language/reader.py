@@ -1,4 +1,4 @@
-"""From the located tree of a mission file to its program; every mistake becomes a finding with its place."""
+"""From the located tree of a mission file to its program; every error becomes a finding with its place."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _body(root: MappingNode, report: Report) -> TreeNode | None:
     """Return what a mission does: the node under `do`, or a machine."""
     bodies = [key for key in BODIES if root.get(key) is not None]
     if not bodies:
-        report.add(codes.MISSING.at(root.span, "a mission needs 'do' (or 'machine'): what is to be done"))
+        report.add(codes.MISSING.at(root.span, "a mission needs 'do' (or 'machine'): what to do"))
         return None
     if len(bodies) == len(BODIES):
         span = root.entries["machine"].key.span
@@ -215,7 +215,7 @@ class _Reader:
         if value is None:
             return ""
         if not isinstance(value, ScalarNode):
-            self.add(codes.WRONG_SHAPE.at(value.span, "this is no name", help=NAME_HELP))
+            self.add(codes.WRONG_SHAPE.at(value.span, "this is not a name", help=NAME_HELP))
             return ""
         if not NAME.fullmatch(value.text):
             self.add(no_name(value))
@@ -269,7 +269,7 @@ class _Reader:
         return Interrupt(name, reader.asked[0], root, afterwards, entry.key.span, restarts)
 
     def afterwards(self, reader: NodeReader) -> tuple[str, ScalarNode | None]:
-        """Read what comes after a reaction: a word, or `restart` with the name of what begins anew."""
+        """Read what comes after a reaction: a word, or `restart` with the name of what starts again."""
         value = reader.take("afterwards", Takes.AFTERWARDS)
         if not isinstance(value, MappingNode):
             return reader.choice("afterwards", AFTERWARDS), None

@@ -1,4 +1,4 @@
-"""The pass before a mission is read: what was a slip is reported, and stands as it was meant in the tree it returns."""
+"""The pass before a mission is read: reports slips, and returns a tree in which they are corrected."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ class ValueReader:
         return self.key_span(self.key)
 
     def has(self, key: str) -> bool:
-        """Tell whether an option was written."""
+        """Return whether an option was written."""
         return key in self.mapping
 
     def key_span(self, key: str) -> Span:
@@ -169,7 +169,7 @@ class ValueReader:
         return scalar if scalar and self.check_name(scalar) else ScalarNode("", self.key_span(key))
 
     def check_name(self, scalar: ScalarNode) -> bool:
-        """Tell whether a word may be a name; a finding says it if not."""
+        """Return whether a word may be a name; a finding says it if not."""
         if not NAME.fullmatch(scalar.text):
             self.add(no_name(scalar))
             return False
@@ -191,7 +191,7 @@ class ValueReader:
         return scalar.text if scalar else ""
 
 
-_FLOW_HELP = "inside '{}', commas and colons divide: put quotes round the condition, or write it in block style"
+_FLOW_HELP = "inside '{}', commas and colons separate: put quotes around the condition, or write it in block style"
 
 
 def _part_of(scalar: ScalarNode, slot: TextSlot) -> ScalarNode:

@@ -33,7 +33,7 @@ class HooksTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on, and do what belongs to the end."""
+        """Continue, and do what belongs to the end."""
         status = self.advance(self.inner)
         if status in _ON:
             act(self.moments, _ON[status], self)
@@ -45,7 +45,7 @@ class HooksTask(Decorator):
         act_safely(self.moments, ON_HALT, self)
 
     def suspend(self, anew: bool) -> bool:
-        """A node that begins anew is halted."""
+        """A node that starts again is halted."""
         is_anew = super().suspend(anew)
         if is_anew:
             act_safely(self.moments, ON_HALT, self)
@@ -63,7 +63,7 @@ class HooksTask(Decorator):
 )
 @dataclass(frozen=True, slots=True)
 class Hooks(Plain):
-    """Do something small when the node starts or ends: `set`, `log`, `publish`.
+    """Act when the node starts or ends: `set`, `log` or `publish`.
 
     They run once per node, not per attempt, and see its result before `optional` and `invert`.
 

@@ -27,7 +27,7 @@ class SaveTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on, and keep the result at the end."""
+        """Continue, and keep the result at the end."""
         status = self.advance(self.inner)
         if status != RUNNING and self.name:
             self.run.data[self.name] = self.inner.result()
@@ -37,9 +37,9 @@ class SaveTask(Decorator):
 @modifier("save", SaveTask)
 @dataclass(frozen=True, slots=True)
 class Save(Plain):
-    """Keep what a skill or a `call` answered, the outputs of a `use`, or `{done, failed}` of a `for`.
+    """Keep the result of a skill or a `call`, the outputs of a `use`, or `{done, failed}` of a `for`.
 
-    It is kept also after a failure.
+    It is also kept after a failure.
 
     Example:
         do:

@@ -49,7 +49,7 @@ class AsLongAsTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Ask, then go on."""
+        """Evaluate it, then continue."""
         if not holds(self.watched.condition, self.scope):
             self.cut(f"not as long as {self.watched.condition.text}")
             return FAILURE
@@ -98,7 +98,7 @@ class TimeoutTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on, unless the deadline has come."""
+        """Continue, unless the deadline has come."""
         status = self.advance(self.inner)
         if status != RUNNING or not self.engine.is_due(self.deadline):
             return status
@@ -109,7 +109,7 @@ class TimeoutTask(Decorator):
 @modifier("timeout", TimeoutTask)
 @dataclass(frozen=True, slots=True)
 class Timeout(Cutting):
-    """Fail when the node takes longer, all its attempts together; a result of the same instant is in time.
+    """Fail when the node takes longer, counting all attempts; a result of the same instant is in time.
 
     Example:
         do:
@@ -156,7 +156,7 @@ class AttemptsTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on with this attempt, or begin the next one."""
+        """Continue with this attempt, or begin the next one."""
         if self.is_between:
             if not self.engine.is_due(self.deadline):
                 return RUNNING
@@ -194,7 +194,7 @@ class AttemptsTask(Decorator):
 )
 @dataclass(frozen=True, slots=True)
 class Attempts(Modifier):
-    """Try again after a failure, at the next tick or after a pause.
+    """Retry after a failure, at the next tick or after a pause.
 
     Example:
         do:
@@ -240,7 +240,7 @@ class Attempts(Modifier):
     @property
     def endless(self) -> Advice | None:
         """Say what attempts for ever need."""
-        advice = Advice("what is tried for ever never waits", "give it a number of attempts, or an 'attempt_pause'")
+        advice = Advice("this retries for ever without waiting", "give it a number of attempts, or an 'attempt_pause'")
         return advice if self.value is None and not takes_time(self.pause) else None
 
     @property

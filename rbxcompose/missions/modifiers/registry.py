@@ -1,4 +1,4 @@
-"""How a modifier is declared, and in which order modifiers stand around a node."""
+"""How a modifier is declared, and in which order modifiers surround a node."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ class Decorator(Task):
         self.inner = inner
 
     def suspend(self, anew: bool) -> bool:
-        """Begin anew together with a leaf that begins anew."""
+        """Start again together with a leaf that starts again."""
         if self.current is not None and self.inner.suspend(anew):
             self.current = None
             return True
         return False
 
     def proceed(self) -> int:
-        """Go on with the task inside."""
+        """Continue with the task inside."""
         return self.advance(self.inner)
 
 

@@ -28,7 +28,7 @@ class TurningTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on, and turn the result."""
+        """Continue, and turn the result."""
         status = self.advance(self.inner)
         turned = self.turned.get(status, status)
         if turned != status:
@@ -79,13 +79,13 @@ class Optional(Turning):
 
     @property
     def forgives(self) -> bool:
-        """Tell that it may: one that could not be read is not held against its node."""
+        """Return that it may: one that could not be read is not held against its node."""
         return True
 
 
 @modifier("invert", TurningTask)
 class Invert(Turning):
-    """Turn success into failure, and failure into success.
+    """Swap success and failure.
 
     Example:
         do:

@@ -31,14 +31,14 @@ class ConditionalTask(Decorator):
 
 
 class OnlyIfTask(ConditionalTask):
-    """Goes on if it holds."""
+    """Continues if it holds."""
 
     __slots__ = ()
     skips_if = False
 
 
 class SkipIfTask(ConditionalTask):
-    """Goes on if it does not hold."""
+    """Continues if it does not hold."""
 
     __slots__ = ()
     skips_if = True
@@ -98,11 +98,11 @@ class CountingTask(Decorator):
 
     @property
     def has_ended(self) -> bool:
-        """Tell whether the node has ended in this run of the mission."""
+        """Return whether the node has ended in this run of the mission."""
         return self.ended_in == self.run.begun
 
     def proceed(self) -> int:
-        """Go on, and note when it ends."""
+        """Continue, and note when it ends."""
         status = self.advance(self.inner)
         if status not in (RUNNING, SKIPPED):
             self.ended_at, self.ended_in = self.engine.unpaused, self.run.begun
@@ -126,7 +126,7 @@ class OnceTask(CountingTask):
 @modifier("once", OnceTask)
 @dataclass(frozen=True, slots=True)
 class Once(Skipping):
-    """Be done once within a run of the mission, whether it succeeds or fails; then be skipped.
+    """Run once per run of the mission, whether it succeeds or fails; then be skipped.
 
     Example:
         do:
@@ -173,7 +173,7 @@ class CooldownTask(CountingTask):
 @modifier("cooldown", CooldownTask)
 @dataclass(frozen=True, slots=True)
 class Cooldown(Skipping):
-    """Be skipped for a time after it has ended; the time of interrupts counts, that of pauses does not.
+    """Be skipped for a time after it ends; interrupts count towards it, pauses do not.
 
     Example:
         do:

@@ -31,14 +31,14 @@ class EnteringTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Go on, and do what belongs to leaving."""
+        """Continue, and do what belongs to leaving."""
         status = self.advance(self.inner)
         if status != RUNNING:
             act(self.moments, ON_EXIT, self)
         return status
 
     def suspend(self, anew: bool) -> bool:
-        """An interrupt halts leaves, not states: the state stays entered, what is in it begins anew."""
+        """An interrupt halts leaves, not states: the state stays entered, what is in it starts again."""
         if self.current is not None and self.inner.suspend(anew):
             self.current = None
         return False
@@ -55,7 +55,7 @@ class EnteringTask(Decorator):
 )
 @dataclass(frozen=True, slots=True)
 class Entering(Plain):
-    """Do something small when a state is entered and when it is left: `set`, `log`, `publish`.
+    """Act when a state is entered and left: `set`, `log` or `publish`.
 
     Leaving also counts when something inside the mission halts the state, entering also when its history brings the
     machine back to it.

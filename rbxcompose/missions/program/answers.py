@@ -1,4 +1,4 @@
-"""Words in which kinds of nodes and modifiers answer what is asked of them before a mission runs."""
+"""The words in which kinds of nodes and modifiers answer questions about them before a mission runs."""
 
 from __future__ import annotations
 

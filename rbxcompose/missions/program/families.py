@@ -61,7 +61,7 @@ class GroupStep(Step):
 
     @property
     def only_asks(self) -> bool:
-        """Tell that it decides more than an answer."""
+        """Return that it decides more than an answer."""
         return False
 
     def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
@@ -70,7 +70,7 @@ class GroupStep(Step):
 
     @property
     def waits(self) -> bool:
-        """Tell that only those inside take time."""
+        """Return that only those inside take time."""
         return False
 
     @property
@@ -80,7 +80,7 @@ class GroupStep(Step):
 
     @property
     def has_result(self) -> bool:
-        """Tell that only those inside have one."""
+        """Return that only those inside have one."""
         return False
 
 
@@ -91,7 +91,7 @@ class Straight(GroupStep):
 
     @property
     def comes_again(self) -> bool:
-        """Tell that it does not."""
+        """Return that it does not."""
         return False
 
     def endless(self, ends: Outcomes) -> None:

@@ -1,4 +1,4 @@
-"""Actions, services and topics as skills: arguments, the goal that they make, what a result tells."""
+"""Actions, services and topics as skills: arguments, the goal that they make, what a result means."""
 
 from __future__ import annotations
 

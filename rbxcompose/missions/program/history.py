@@ -8,7 +8,7 @@ from rbxcompose.missions.engine.resume_points import DEEP, HISTORIES, NO_HISTORY
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.language.node_reader import NodeReader
 
-HISTORY = "Where it starts again after it was halted: `last` at the child it was in, `deep` also inside that child."
+HISTORY = "Where it restarts after it was halted: `last` at the child it was in, `deep` also inside that child."
 
 
 def read_history(reader: NodeReader) -> str:

@@ -18,9 +18,9 @@ from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED
 
 WRITTEN, RANDOM = "written", "random"
 OPTIONS: Mapping[str, str] = {
-    "reactive": "Whether earlier conditions (`check`, `wait_for`, lists of only those) are asked again at each tick.",
+    "reactive": "Whether earlier conditions (`check`, `wait_for`, lists of only those) are evaluated at each tick.",
     "history": HISTORY,
-    "order": "In which order the nodes are done: as `written`, or `random`, drawn anew at each start.",
+    "order": "The order of the nodes: as `written`, or `random` (a new draw at each start).",
 }
 
 
@@ -54,7 +54,7 @@ class InTurn(Straight):
 
     @property
     def comes_again(self) -> bool:
-        """Tell that an earlier condition may let it go back."""
+        """Return that an earlier condition may let it go back."""
         return self.reactive
 
 
@@ -101,7 +101,7 @@ class InTurnTask(WithHistory):
             self.children = tuple(self.all[index] for index in self.order)
 
     def proceed(self) -> int:
-        """Go on with the child that runs, and with those behind it as far as they end at once."""
+        """Continue with the child that runs, and with those behind it as far as they end at once."""
         if self.conditions and self.index:
             self.ask_again()
         children, index, child, decides = self.children, self.index, self.current, self.decides

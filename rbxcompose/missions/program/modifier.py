@@ -34,7 +34,7 @@ class Modifier(ABC):
     @property
     @abstractmethod
     def may_skip(self) -> bool:
-        """Tell whether it may keep the node from starting."""
+        """Return whether it may keep the node from starting."""
 
     @property
     @abstractmethod
@@ -53,7 +53,7 @@ class Modifier(ABC):
 
     @property
     def repeats(self) -> bool:
-        """Tell whether it may start what is inside more than once."""
+        """Return whether it may start what is inside more than once."""
         return False
 
     @property
@@ -73,7 +73,7 @@ class Modifier(ABC):
 
     @property
     def forgives(self) -> bool:
-        """Tell whether a failure may count as success."""
+        """Return whether a failure may count as success."""
         return False
 
     @property

@@ -37,7 +37,7 @@ class Outcomes:
         return Outcomes(self.succeeds and word == SUCCEEDS, self.fails and word == FAILS, named)
 
     def counting_as(self, word: str) -> bool:
-        """Tell whether any of them counts as success, or as failure."""
+        """Return whether any of them counts as success, or as failure."""
         return word in self.words.values()
 
     @property

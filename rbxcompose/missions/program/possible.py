@@ -1,4 +1,4 @@
-"""What a mission may do, so that tests can say which of it they saw: each has a key, under which a run tells it."""
+"""What a mission may do, so that tests can say which of it they saw: each has a key that a run reports."""
 
 from __future__ import annotations
 

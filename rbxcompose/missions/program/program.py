@@ -1,4 +1,4 @@
-"""A mission that was read: a flat, frozen tuple of nodes, and what stands beside them in its file."""
+"""A mission that was read: a flat, frozen tuple of nodes, and the rest of its file."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class RobotNames:
 
     `topics` and `services` have the ROS names of their types; `unread` are missions whose files could not be read;
     `removed` are places that a layer has taken away, each with where it did so.
-    It is not complete if a part of the robot has mistakes: then a skill that is missing may be that part's.
+    It is not complete if a part of the robot has errors: then a skill that is missing may be that part's.
     """
 
     values: Mapping[str, Type] = field(default_factory=dict)
@@ -150,17 +150,17 @@ class Step(ABC):
     @property
     @abstractmethod
     def only_asks(self) -> bool:
-        """Tell whether all that it does by itself is to ask conditions, which may be done again at any time."""
+        """Return whether all that it does by itself is to ask conditions, which may be done again at any time."""
 
     @property
     @abstractmethod
     def waits(self) -> bool:
-        """Tell whether it takes time by itself."""
+        """Return whether it takes time by itself."""
 
     @property
     @abstractmethod
     def comes_again(self) -> bool:
-        """Tell whether what is inside may be done more than once."""
+        """Return whether what is inside may be done more than once."""
 
     @property
     @abstractmethod
@@ -170,7 +170,7 @@ class Step(ABC):
     @property
     @abstractmethod
     def has_result(self) -> bool:
-        """Tell whether it has something that `save` keeps."""
+        """Return whether it has something that `save` keeps."""
 
     @property
     @abstractmethod
@@ -306,12 +306,12 @@ class MissionNode:
 
     @property
     def may_be_left_out(self) -> bool:
-        """Tell whether a modifier may keep it from starting."""
+        """Return whether a modifier may keep it from starting."""
         return any(one.may_skip for one in self.modifiers.values())
 
     @property
     def is_forgiven(self) -> bool:
-        """Tell whether its failure may count as success."""
+        """Return whether its failure may count as success."""
         return any(one.forgives for one in self.modifiers.values())
 
 

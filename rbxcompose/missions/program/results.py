@@ -1,4 +1,4 @@
-"""How a skill or a call ended, as its server tells it; and that a node cannot go on."""
+"""How a skill or a call ended, as its server reports it; and that a node cannot continue."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Result:
 
 
 class NodeFailed(Exception):  # noqa: N818 - it ends a node, as a failure would; it is no error of ours
-    """Raised by a task whose node cannot go on; the text is the reason that is reported."""
+    """Raised by a task whose node cannot continue; the text is the reason that is reported."""
 
 
 def words(error: Exception) -> str:

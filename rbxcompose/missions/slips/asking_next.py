@@ -22,5 +22,5 @@ def asking_next(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     help_text = (
         "let a 'check' be the last step of this state, and write below 'next' where 'success' and 'failure' lead"
     )
-    message = f"'next' cannot ask: there is no '{asking[0].text}' in it"
+    message = f"'next' takes no conditions: there is no '{asking[0].text}' in it"
     return Repair(told(node.span), (codes.WRONG_SHAPE.at(asking[0].span, message, help=help_text),))

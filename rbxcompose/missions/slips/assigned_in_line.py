@@ -31,13 +31,13 @@ def assigned_in_line(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | 
         return Repair(told(node.span), (codes.WRONG_SHAPE.at(key.span, message, help=help_text),))
     name, sign, value = found["name"], found["sign"].strip(), found["value"]
     if node.span.line != node.span.end_line:
-        message = f"below '{key.text}', each name stands on a line of its own, with a colon behind it"
+        message = f"below '{key.text}', write each name on a line of its own, followed by a colon"
         finding = codes.WRONG_SHAPE.at(node.span, message, help=f"write {_EXAMPLE}, such as '{name}: 1'")
         return Repair(told(node.span), (finding,))
     if sign in ("+=", "-="):
         value = f"${name} {sign[0]} {value}" if value.split() == [value] else f"${name} {sign[0]} ({value})"
     meant = f"{name}: {value}"
-    message = "a space is missing behind the colon" if sign == ":" else f"'{key.text}' takes a colon, not '{sign}'"
+    message = "a space is missing after the colon" if sign == ":" else f"'{key.text}' takes a colon, not '{sign}'"
     is_below = node.span.line > key.span.line
     where = "" if is_below else f" on the line below '{key.text}:', further right"
     fix = replacement(node.span, node.text, meant) if is_below else None

@@ -1,4 +1,4 @@
-"""A number in words, one with a word behind it, and another word for `forever`."""
+"""A number in words, a number followed by a word, and another word for `forever`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def count_in_words(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | No
     if forever in place.choices:
         meant, told = forever, codes.NOT_A_CHOICE.at(node.span, f"'{key}' cannot be '{node.text}'")
     elif meant := _digits(node):
-        told = codes.WRONG_TYPE.at(node.span, f"'{key}' takes a number in digits and nothing else")
+        told = codes.WRONG_TYPE.at(node.span, f"'{key}' takes only a number in digits")
     else:
         return None
     fix = replacement(node.span, node.text, meant)

@@ -35,7 +35,7 @@ def dashes_below_a_hook(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode]
     is_once = len(entries) == sum(len(item.entries) for item in maps)
     word = next(iter(maps[0].entries))
     what = f"the dash before '{word}'" if len(maps) == 1 else "the dashes"
-    help_text = f"take {what} away" + ("" if is_once else "; each word can stand there once")
+    help_text = f"remove {what}" + ("" if is_once else "; each word can be used there once")
     fix = Fix(tuple(edits), True, f"'- {word}' -> '{word}'") if is_once else None
-    message = f"what stands below '{hook}' has no dashes"
+    message = f"the entries below '{hook}' have no dashes"
     return Repair(meant, (codes.WRONG_SHAPE.at(edits[0].span, message, help=help_text, fix=fix),))

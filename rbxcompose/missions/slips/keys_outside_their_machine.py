@@ -1,4 +1,4 @@
-"""Keys of a machine that stand beside it, or at the very left: `ends` in the column of `machine`."""
+"""Keys of a machine outside it, or at the very left: `ends` in the column of `machine`."""
 
 from __future__ import annotations
 

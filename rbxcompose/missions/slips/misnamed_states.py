@@ -1,4 +1,4 @@
-"""States whose names are none: each is read under the name that was meant, wherever its machine names it."""
+"""States with invalid names: each is read under the name that was meant, wherever its machine names it."""
 
 from __future__ import annotations
 

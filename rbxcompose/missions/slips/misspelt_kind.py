@@ -1,4 +1,4 @@
-"""The word of a kind, nearly written, beside a key that belongs to kinds: `repeet: 3` with `do`."""
+"""The word of a kind, misspelt, beside a key that belongs to kinds: `repeet: 3` with `do`."""
 
 from __future__ import annotations
 

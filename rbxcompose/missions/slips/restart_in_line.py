@@ -24,7 +24,7 @@ def restart_in_line(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | N
     if not found or not isinstance(node, ScalarNode):
         return None
     meant = f"{RESTART}: {found['name']}"
-    message = f"'{RESTART}' and what begins anew stand on a line of their own"
+    message = f"'{RESTART}' and what it restarts need a line of their own"
     help_text = f"write '{meant}' on the line below '{place.key.text}:', further right"
     fix = _on_a_line_below(place.key, node, meant)
     key = ScalarNode(RESTART, inner_span(node, 0, len(RESTART)))

@@ -1,4 +1,4 @@
-"""A second step beside the first one, without a dash of its own."""
+"""A second step beside the first one, without its own dash."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Settings of a `parallel` that stand among its branches."""
+"""Settings of a `parallel` among its branches."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def settings_among_branches(place: GrammarPlace, node: TreeNode) -> Repair[TreeN
 
 
 def _among(parallel: ScalarNode, setting: Entry, *, is_last: bool) -> Finding:
-    message = f"'{setting.key.text}' stands among the branches"
+    message = f"'{setting.key.text}' is among the branches"
     help_text = f"move it left, into the column of '{parallel.text}'"
     fix = _moved_left(setting, parallel) if is_last else None
     return codes.WRONG_SHAPE.at(setting.key.span, message, help=help_text, fix=fix)

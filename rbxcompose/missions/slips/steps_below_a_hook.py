@@ -40,7 +40,7 @@ def steps_below_a_hook(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] 
 
 
 def is_step(word: str, words: Words) -> bool:
-    """Tell whether a word below a hook is a step; without the skills of a robot, any odd one may be."""
+    """Return whether a word below a hook is a step; without the skills of a robot, any odd one may be."""
     if word in _KEYS or not word:
         return False
     return words.is_step(word) if words.skills else word in words.kinds or not nearest(word, _KEYS)

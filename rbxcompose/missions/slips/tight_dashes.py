@@ -1,4 +1,4 @@
-"""Dashes without a space behind them: `-go_to: dock`."""
+"""Dashes without a space after them: `-go_to: dock`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def tight_dashes(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None
     if not tight or not isinstance(node, MappingNode):
         return None
     is_list = len(tight) == len(entries)  # else something stands there that is no item of a list
-    message = "a space is missing behind this dash"
+    message = "a space is missing after this dash"
     findings = (
         codes.WRONG_SHAPE.at(key.span, message, help=f"write '- {key.text[1:]}'", fix=_spaced(key) if is_list else None)
         for key in tight

@@ -1,4 +1,4 @@
-"""Keys beside a step that are none of its settings: words of another language, and settings of other steps."""
+"""Keys beside a step that are not among its settings: words of another language, and settings of other steps."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def unknown_in(step: MappingNode, words: Words) -> set[str]:
 
 
 def _is_stray(step: MappingNode, key: str, settings: Iterable[str], words: Words) -> bool:
-    """Tell whether a key beside a step is a setting that there is not, rather than a second step."""
+    """Return whether a key beside a step is a setting that there is not, rather than a second step."""
     if key in words.skills or (key in words.kinds and key not in FOREIGN):
         return False
     return key in FOREIGN or bool(nearest(key, settings)) or is_setting(step.entries[key].value)
@@ -87,7 +87,7 @@ def _finding(step: MappingNode, kind: str, key: str, words: Words) -> Finding:
 
 
 def is_setting(node: TreeNode) -> bool:
-    """Tell whether a value looks like that of a setting: a number, a flag, a quantity or something with `$`."""
+    """Return whether a value looks like that of a setting: a number, a flag, a quantity or something with `$`."""
     if not isinstance(node, ScalarNode) or not node.plain or not node.text:
         return False
     if not isinstance(plain_value(node), str) or "$" in node.text:

@@ -29,13 +29,13 @@ def _told(key: ScalarNode) -> Finding | None:
     words = key.text.split()
     if _TIGHT_COLON.fullmatch(key.text):
         name, _, value = key.text.partition(":")
-        meant, message = f"{name}: {value}", "a space is missing behind the colon"
+        meant, message = f"{name}: {value}", "a space is missing after the colon"
         fix = replacement(key.span, key.text, meant)
         return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{meant}'", fix=fix)
     if len(words) < 2:
         return None
     if key.span.line != key.span.end_line:
-        message = "with settings below it, a step needs a colon"
+        message = "a step with settings below it needs a colon"
         return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{words[0]}:'")
-    message, meant = f"'{key.text}' is no step and no skill", f"{words[0]}: {' '.join(words[1:])}"
+    message, meant = f"'{key.text}' is neither a step nor a skill", f"{words[0]}: {' '.join(words[1:])}"
     return codes.WRONG_SHAPE.at(key.span, message, help=f"write '{meant}'")

@@ -1,4 +1,4 @@
-"""A mission as a picture: rows of nodes with what stands in each, for text, diagrams and pages alike."""
+"""A mission as a picture: rows of nodes with their contents, for text, diagrams and pages alike."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What a viewer in another process knows of a mission: a whole that it asked for, and all news since, in their order.
+"""What a viewer in another process knows of a mission: a whole state from a query, and all updates since, in order.
 
 Messages are those of `bus/window.py`. News that come before the whole wait for it; when some are missing, or the
-mission's process was started again, the whole has to be asked for anew.
+mission's process was started again, the whole has to be queried again.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What code prints, or tells Python's `logging`, becomes lines of the robot's log."""
+"""What code prints, or sends to Python's `logging`, becomes lines of the robot's log."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class _Lines(io.TextIOBase):
         return len(text)
 
     def end(self) -> None:
-        """Tell what was begun and will not be ended."""
+        """Log what was started and will not be ended."""
         while self._begun:
             self._say(self._begun.popitem()[1])
 

@@ -1,4 +1,4 @@
-"""Opening the bus of a process, over a session that is opened anew when it is stuck."""
+"""Opening the bus of a process, over a session that is opened again when it is stuck."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def open_bus(
         return ZenohTransport(open_peer(router), inbox.put)
 
     if reason := shared_memory.problem():
-        log("robot", f"large messages do without shared memory: {reason}")
+        log("robot", f"large messages are sent without shared memory: {reason}")
     transport = RenewableTransport(opened())
     bus = Bus(
         scheduler,

@@ -1,4 +1,4 @@
-"""What turns the scheduler of a process: a driver for each way in which time goes, one thread each."""
+"""What runs the scheduler of a process: a driver for each kind of time, one thread each."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Driven(Protocol):
 
     @property
     def is_over(self) -> bool:
-        """Tell whether the process is to end."""
+        """Return whether the process is to end."""
         ...
 
 
@@ -66,7 +66,7 @@ class Driver:
         raise NotImplementedError
 
     def _advance(self) -> None:
-        """Let time go on and run what is due."""
+        """Advance time and run what is due."""
         raise NotImplementedError
 
     def _run_present(self) -> None:

@@ -47,13 +47,13 @@ STEPPED_REST_BOUND = 2.0  # [s] of robot time to come to rest on a stepped clock
 CLOCK_TOPIC = "/clock"
 CLOCK_STATUS = "bus.clock"  # what diagnostics call it: no component has a dot in its name
 _TOLD = {
-    Turn.GOES: (Level.OK, f"{CLOCK_TOPIC} goes: robot time goes with it, and each deadline counts anew"),
-    Turn.STANDS: (Level.STALE, f"{CLOCK_TOPIC} does not go on: robot time stands still, only rest is commanded"),
-    Turn.JUMPED: (Level.WARN, f"{CLOCK_TOPIC} has jumped: robot time goes on from here, each deadline counts anew"),
+    Turn.GOES: (Level.OK, f"{CLOCK_TOPIC} runs: robot time follows it, and each deadline starts over"),
+    Turn.STANDS: (Level.STALE, f"{CLOCK_TOPIC} stands still: so does robot time; only stops are commanded"),
+    Turn.JUMPED: (Level.WARN, f"{CLOCK_TOPIC} has jumped: robot time continues from here, each deadline starts over"),
     Turn.DISPUTED: (
         Level.ERROR,
-        f"{CLOCK_TOPIC} jumps back and forth: more than one source must be telling it; robot time stands still, only "
-        f"rest is commanded, until there has been no jump for {DISPUTE:g} s",
+        f"{CLOCK_TOPIC} jumps back and forth: more than one source must be publishing it; robot time stands still "
+        f"and only stops are commanded, until there has been no jump for {DISPUTE:g} s",
     ),
 }
 
@@ -150,7 +150,7 @@ class ProcessGroup:
         self._is_settled = self._is_settled or self._host is None
 
     def beat(self) -> None:
-        """Tell the supervisor, and the watchdog, that the loop turns."""
+        """Report to the supervisor and the watchdog that the loop runs."""
         self._watch(HANG)
         if self._taping is not None:
             self._taping.keep()
@@ -305,7 +305,7 @@ class ProcessGroup:
         driver.follow(MonotonicClock())
 
     def _turned(self, turn: Turn) -> None:
-        """Hold, or go on, with a time that is told from outside; one process tells it for all."""
+        """Hold or continue, with a time from outside; one process logs it for all."""
         if self._host is None:
             return
         if turn is not Turn.GOES:

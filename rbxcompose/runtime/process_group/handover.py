@@ -145,7 +145,7 @@ class HandedOver:
 
     @property
     def is_stopped(self) -> bool:
-        """Tell whether the robot is held by a stop."""
+        """Return whether the robot is held by a stop."""
         return self._context.is_stopped
 
     def log(self, level: Level, text: str) -> None:
@@ -153,7 +153,7 @@ class HandedOver:
         self._worker.send(lambda: self._context.log(level, text))
 
     def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
-        """Tell diagnostics how the component is."""
+        """Report the component's state to diagnostics."""
         self._worker.send(lambda: self._context.status(level, message, values))
 
     def wake_at(self, time: float) -> None:
@@ -161,7 +161,7 @@ class HandedOver:
         self._worker.send(lambda: self._context.wake_at(time))
 
     def notify(self, event: RobotEvent) -> None:
-        """Tell the supervisor of something that concerns the whole robot."""
+        """Report something that concerns the whole robot to the supervisor."""
         self._worker.send(lambda: self._context.notify(event))
 
     def repeat(self, requests: Sequence[Command]) -> None:

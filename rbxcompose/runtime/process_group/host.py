@@ -1,4 +1,4 @@
-"""The host of a process: carries its components through their lifecycle and keeps their mistakes apart."""
+"""The host of a process: carries its components through their lifecycle and isolates their faults."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Host:
     # Lifecycle of the whole process
 
     def configure(self) -> None:
-        """Configure all components; one that raises is restarted later, the others go on."""
+        """Configure all components; one that raises is restarted later, the others continue."""
         for name in self.hosted:
             self._guarded(name, self.hosted[name].configure)
         self.statuses.publish()
@@ -143,7 +143,7 @@ class Host:
         self._each_active("hold")
 
     def go_on(self) -> None:
-        """Allow commands again, each deadline anew."""
+        """Allow commands again; each deadline starts over."""
         self.is_held = False
         self._each_active("go_on")
 
@@ -156,7 +156,7 @@ class Host:
         self._each_active("brake")
 
     def lost(self, names: Sequence[str], cause: str) -> None:
-        """Tell the components that those of another process have gone."""
+        """Tell the components that those of another process are gone."""
         self._told("lost", cause, *names)
         self._each_active("lost", tuple(names), cause)
 
@@ -263,7 +263,7 @@ class Host:
 
     @property
     def is_at_rest(self) -> bool:
-        """Tell whether nothing moves that a component of this process moves."""
+        """Return whether nothing moves that a component of this process moves."""
         return all(one.component.is_at_rest for one in self.hosted.values() if one.component)
 
     def summary(self) -> dict[str, dict[str, str]]:
@@ -284,7 +284,7 @@ class Host:
         self._log(Record(self.clock.now(), level, source, text, detail))
 
     def changed(self, name: str) -> None:
-        """Tell the supervisor of a new state."""
+        """Report a new state to the supervisor."""
         self.notify(States({name: self.states()[name]}))
 
     # Who works

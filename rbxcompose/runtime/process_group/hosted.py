@@ -205,7 +205,7 @@ class Hosted:
             return True
         label, _ = self.worker.busy_for()
         if not self.worker.close(LONGEST_GOODBYE):
-            self.host.log(self.instance.name, Level.WARN, f"does not return from {label}: it is left behind in it")
+            self.host.log(self.instance.name, Level.WARN, f"does not return from {label}: it is left behind")
             return False
         self.worker, component.context, component.bound = None, self, self._ends
         return True
@@ -228,7 +228,7 @@ class Hosted:
 
     @property
     def is_busy(self) -> bool:
-        """Tell whether the component is in a call in its own thread, so that no other may use it."""
+        """Return whether the component is in a call in its own thread, so that no other may use it."""
         return self.worker is not None and self.worker.is_busy
 
     @property
@@ -274,7 +274,7 @@ class Hosted:
 
     @property
     def is_stopped(self) -> bool:
-        """Tell whether the robot is held by a stop."""
+        """Return whether the robot is held by a stop."""
         return self.host.is_stopped
 
     def log(self, level: Level, text: str) -> None:
@@ -282,7 +282,7 @@ class Hosted:
         self.host.log(self.instance.name, level, text)
 
     def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
-        """Tell diagnostics how the component is."""
+        """Report the component's state to diagnostics."""
         self.host.statuses.set(self.instance.name, level, message, values)
 
     def wake_at(self, time: float) -> None:
@@ -297,7 +297,7 @@ class Hosted:
         self.do("wake", self._made().wake)
 
     def notify(self, event: RobotEvent) -> None:
-        """Tell the supervisor of something that concerns the whole robot."""
+        """Report something that concerns the whole robot to the supervisor."""
         self.host.notify(event)
 
     def repeat(self, requests: Sequence[Command]) -> None:

@@ -1,4 +1,4 @@
-"""Proves that the session of a process still carries data, and opens it anew when it does not.
+"""Proves that the session of a process still carries data, and opens it again when it does not.
 
 A session can be stuck for hours while Zenoh takes it for sound. So each process asks the nearest of the others over the
 bus, after a miss all of them and the router of the robot, and answers them. Questions are answered in Zenoh's own
@@ -94,7 +94,7 @@ class Lifeline:
         return True
 
     def _renew(self) -> None:
-        self._log("the session on the bus carries nothing any more; it is opened anew")
+        self._log("the session on the bus no longer carries anything; opening it again")
         self._is_changing, self._sent = True, None
         old = self._transport.detach()
         Thread(target=self._replace, args=(old,), name="renewal", daemon=True).start()
@@ -116,7 +116,7 @@ class Lifeline:
             self._post("", lambda: self._attach(new))
 
     def _put_off(self, words: str) -> None:
-        self._log(f"no session on the bus can be opened ({words}); it is tried again in {self._pause * BEAT:g} s")
+        self._log(f"no session on the bus can be opened ({words}); trying again in {self._pause * BEAT:g} s")
         self._retry, self._pause = self._pause, min(2 * self._pause, LONGEST_PAUSE)
 
     def _look_whether_to_try(self) -> None:
@@ -128,7 +128,7 @@ class Lifeline:
     def _attach(self, new: Transport) -> None:
         self._is_changing, self._pause = False, FIRST_PAUSE
         self._transport.attach(new)
-        self._log(f"the session on the bus is new{', the old one hangs in closing' if self._has_hung else ''}")
+        self._log(f"the session on the bus is new{', the old one hangs while closing' if self._has_hung else ''}")
 
 
 def _close(old: Transport) -> None:

@@ -1,4 +1,4 @@
-"""Parameters on the bus: the six services of each component, and the events that tell of changes."""
+"""Parameters on the bus: the six services of each component, and the events that report changes."""
 
 from __future__ import annotations
 

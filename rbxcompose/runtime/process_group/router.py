@@ -54,7 +54,7 @@ class Router:
         self.is_over = True
 
     def beat(self) -> None:
-        """Tell the supervisor, and the watchdog, that the loop turns."""
+        """Report to the supervisor and the watchdog that the loop runs."""
         self._watchdog.feed()
         self._channel.flush()
         if not self._channel.is_behind:

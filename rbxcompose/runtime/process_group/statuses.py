@@ -53,7 +53,7 @@ class Statuses:
             self._publish_soon()
 
     def forget(self, name: str) -> None:
-        """Tell nothing more of a component that is there no more."""
+        """Report nothing more about a component that no longer exists."""
         for known in (self._statuses, self._busy, self._slow):
             known.pop(name, None)
 

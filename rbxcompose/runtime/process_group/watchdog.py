@@ -1,4 +1,4 @@
-"""A watchdog within a process: it ends the process if its loop does not turn, and tells where it hung.
+"""A watchdog within a process: it ends the process if its loop does not run, and reports where it hung.
 
 It counts its own wakings, not time: a process that was suspended, or a machine that slept, has hung nowhere.
 """
@@ -14,7 +14,7 @@ import time
 
 HANG = 2.0  # [s] without a turn of the loop after which the process ends itself
 PERIOD = 0.25  # [s] between two wakings
-MARK = "the loop did not turn for "
+MARK = "the loop did not run for "
 """What the process prints before the places where its threads are."""
 
 

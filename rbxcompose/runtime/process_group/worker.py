@@ -51,7 +51,7 @@ class Worker:
 
     @property
     def is_busy(self) -> bool:
-        """Tell whether the component belongs to the thread now."""
+        """Return whether the component belongs to the thread now."""
         return bool(self._label)
 
     def submit(self, label: str, call: Call, depth: int | None = None) -> None:

@@ -38,12 +38,12 @@ class Fated:
 
     @property
     def stops(self) -> bool:
-        """Tell whether it is stopped."""
+        """Return whether it is stopped."""
         return self.fate in (Fate.RESTARTED, Fate.REMOVED)
 
     @property
     def starts(self) -> bool:
-        """Tell whether it is started."""
+        """Return whether it is started."""
         return self.fate in (Fate.RESTARTED, Fate.ADDED)
 
 
@@ -58,7 +58,7 @@ class Changes:
 
     @property
     def is_empty(self) -> bool:
-        """Tell whether the plans do the same."""
+        """Return whether the plans do the same."""
         return not self.impossible and all(one.fate is Fate.KEPT for one in self.fated)
 
     def names(self, fate: Fate) -> list[str]:
@@ -83,7 +83,7 @@ class Changes:
         """
         cut = next((name for name in runs if name in self.stopping), None)
         if cut is not None:
-            return f"{runs[cut]}, and '{cut}' would begin anew: 'rbxcompose mission pause' first, or wait for its end"
+            return f"{runs[cut]}, and '{cut}' would restart: run 'rbxcompose mission pause' first, or wait for its end"
         if not moves or not (commanding := self.commanding):
             return ""
         return (
@@ -153,4 +153,4 @@ def _impossible(old: Mapping[str, Instance], fated: list[Fated], plan: tuple[Cha
         processes = {one.instance.process, old[name].process} if name in old else set()
         if one.stops and WORLD in processes:
             because = f" ({one.reasons[0]})" if one.reasons else ""
-            yield f"'{name}' holds simulated truth, which would begin anew{because}: it {DOWN_AND_UP}"
+            yield f"'{name}' holds simulated truth, which would be reset{because}: it {DOWN_AND_UP}"

@@ -1,4 +1,4 @@
-"""What the supervisor decides, pure: which process is started, told or ended when, and how the robot ends.
+"""What the supervisor decides, pure: when each process is started, informed or ended, and how the robot ends.
 
 The shell around it (`supervisor.py`) carries out the `ConductorEffects` and tells what happened; time comes from a
 scheduler.
@@ -142,8 +142,9 @@ class Conductor:
                 self._mission_over(message)
             case say.TimeIsUp():
                 self.go_down(FINE, "the time is up")
-            case say.StoppedByBus():
-                self._stopped_by_bus()
+            case say.StoppedByBus() if not self.is_stopped:
+                self._effects.log(Level.WARN, "stop over the bus: everything that moves is held until 'release'")
+                self.stop()
             case say.AtRest():
                 member.is_at_rest = True
                 if self._closing:
@@ -207,9 +208,9 @@ class Conductor:
         elif is_for_good:
             self._give_up(member, how, detail)
         elif delay is None:
-            self.go_down(ROBOT_FAILED, f"process '{name}' {how}, too often to go on", Level.ERROR, detail)
+            self.go_down(ROBOT_FAILED, f"process '{name}' {how}, too often to continue", Level.ERROR, detail)
         else:
-            self._effects.log(Level.ERROR, f"process '{name}' {how}; it is started again", detail)
+            self._effects.log(Level.ERROR, f"process '{name}' {how}; restarting it", detail)
             self._tell_lost(member, how)
             member.restarts += 1
             self._scheduler.at(self._scheduler.now + delay, _OWNER, lambda: self._fork_again(member))
@@ -251,7 +252,7 @@ class Conductor:
         self._look_who_is_blocked()
         commanding = [one.name for one in self.plan.instances if one.name in new and is_commanding(one)]
         if commanding and not self.is_stopped and self.phase is Phase.RUNNING:
-            text = f"'{commanding[0]}' failed on the path of commands: all that moves is held until 'release'"
+            text = f"'{commanding[0]}' failed on the path of commands: all motion is held until 'release'"
             self._effects.log(Level.ERROR, text)
             self.stop()
 
@@ -305,11 +306,6 @@ class Conductor:
         """Hold everything that moves until `release`."""
         self._set_stopped(True)
 
-    def _stopped_by_bus(self) -> None:
-        if not self.is_stopped:
-            self._effects.log(Level.WARN, "stop over the bus: everything that moves is held until 'release'")
-            self.stop()
-
     def release(self) -> None:
         """Allow motion again."""
         self._set_stopped(False)
@@ -334,11 +330,11 @@ class Conductor:
     def why_not(self, changes: Changes) -> str:
         """Return why changes cannot be made now, or nothing if they can."""
         if self._options.is_stepped:
-            return "it runs on a stepped clock, where a change would end what makes two runs the same"
+            return "it runs on a stepped clock, where a change would make two runs differ"
         if self.phase is not Phase.RUNNING:
             return "it is not up yet" if self.phase is Phase.STARTING else "it is going down"
         if self._changing:
-            return "it is being changed already"
+            return "it is already being changed"
         if changes.impossible:
             return changes.impossible[0]
         moves = [text for member in self.members.values() for text in member.moves]
@@ -375,7 +371,7 @@ class Conductor:
 
     @property
     def is_going_down(self) -> bool:
-        """Tell whether the end has begun."""
+        """Return whether the end has begun."""
         return self._closing is not None
 
     def go_down(self, exit_code: int, reason: str, level: Level = Level.OK, detail: str = "") -> None:

@@ -1,4 +1,4 @@
-"""Who cannot do its work without whom, from the wires of a plan; and who is on the path of commands."""
+"""Which components cannot work without which, from the wires of a plan; and which are on the path of commands."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _feeds(other: Instance, wanted: Wire) -> bool:
 
 
 def is_commanding(one: Instance) -> bool:
-    """Tell whether commands leave, pass or arrive at an instance: whoever drives, a mux, a base."""
+    """Return whether commands leave, pass or arrive at an instance: whoever drives, a mux, a base."""
     ports = component_type(one.type).ports(one.config).values()
     return any(isinstance(port, In | Out) and port.qos is Qos.COMMAND for port in ports)
 

@@ -1,4 +1,4 @@
-"""Where a robot's batteries tell how full they are."""
+"""Where a robot's batteries publish their levels."""
 
 from __future__ import annotations
 

@@ -190,7 +190,7 @@ def _not_brought_down(folder: RobotFolder) -> Iterator[str]:
     """Yield that the run before has left its state, which a supervisor that ends takes away."""
     with contextlib.suppress(BrokenStateError):  # which is told where the leftovers are ended
         if folder.read_state() is not None:
-            yield "the run before was not brought down, its supervisor has died: what it had left is cleared away"
+            yield "the previous run was not shut down, its supervisor died: cleaning up"
 
 
 def _supervisor_of(folder: RobotFolder) -> int | None:

@@ -1,4 +1,4 @@
-"""Ending what a dead or deaf supervisor has left behind."""
+"""Ending what a dead or unresponsive supervisor has left behind."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ class ConductorEffects(Protocol):
         ...
 
     def is_suspended(self, process: str) -> bool:
-        """Tell whether a signal keeps a process from running."""
+        """Return whether a signal keeps a process from running."""
         ...
 
     def log(self, level: Level, text: str, detail: str = "") -> None:
@@ -40,7 +40,7 @@ class ConductorEffects(Protocol):
         ...
 
     def is_up(self) -> None:
-        """Tell who waits that all is active."""
+        """Tell those who wait that everything is active."""
         ...
 
     def states_changed(self) -> None:

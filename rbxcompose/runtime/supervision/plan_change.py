@@ -1,4 +1,4 @@
-"""A change of a running robot, carried out step by step. Pure: the conductor leads it and hears how it went.
+"""A change of a running robot, carried out step by step. Pure: the conductor leads it and learns how it went.
 
 What stops is retired in reverse start order; processes that hold nothing any more end; then the new plan holds: new
 processes are forked, new components configured and, as at the start of the robot, activated in start order.
@@ -106,13 +106,13 @@ class Changing:
     # What comes back
 
     def retired(self, process: str) -> None:
-        """Go on: a process has retired what it was to, or has gone."""
+        """Continue: a process has retired what it was to, or has gone."""
         if self._waited_for == process:
             self._waited_for = ""
             self.proceed()
 
     def exited(self, process: str) -> None:
-        """Go on without a process."""
+        """Continue without a process."""
         self._setting.discard(process)
         self.retired(process)
 
@@ -140,7 +140,7 @@ class Changing:
     def time_is_up(self, states: Mapping[str, tuple[str, int]]) -> None:
         """End it, as far as it has come."""
         late = sorted(name for name in self.changes.starting if states.get(name, ("",))[0] != "active")
-        self.cut_off(f"after {LONGEST:g} s not active: {', '.join(late)}")
+        self.cut_off(f"not active after {LONGEST:g} s: {', '.join(late)}")
 
     def cut_off(self, reason: str) -> None:
         """End it before its time."""

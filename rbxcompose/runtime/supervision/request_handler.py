@@ -95,7 +95,7 @@ class RequestHandler:
             raise Refused("the robot is going down")
 
     def _stop(self) -> str:
-        self._tell("stop: all that moves is held until 'release'")
+        self._tell("stop: all motion is held until 'release'")
         self._supervisor.conductor.stop()
         return "stopped; 'release' allows motion again"
 
@@ -104,7 +104,7 @@ class RequestHandler:
             raise Refused("the robot is not stopped")
         self._tell("release: motion is allowed again")
         self._supervisor.conductor.release()
-        return "released; 'mission resume' goes on"
+        return "released; 'mission resume' continues"
 
     def _bring_down(self) -> str:
         if not self._supervisor.conductor.is_going_down:
@@ -133,12 +133,12 @@ class RequestHandler:
         about, dot, _ = name.partition(".")
         if dot and about not in abouts:
             raise Refused(f"this robot has no component of type '{about}'")
-        raise Refused(f"there is no request '{name}'" if name else "this is no request of this version of rbxcompose")
+        raise Refused(f"there is no request '{name}'" if name else "this version of rbxcompose has no such request")
 
     # Another plan
 
     def _compare(self, plan: str) -> PlanComparison:
-        """Tell what another plan would change, and what speaks against it now; nothing happens."""
+        """Report what another plan would change, and what prevents it now; nothing happens."""
         found, conductor = self._changes(plan), self._supervisor.conductor
         why_not = "" if found.is_empty else conductor.why_not(found)
         return PlanComparison.of(found, conductor.generation, why_not)

@@ -1,4 +1,4 @@
-"""Who says nothing any more: told to the others first, ended later. Pure: time comes from a scheduler."""
+"""Silent processes: first reported to the others, later ended. Pure: time comes from a scheduler."""
 
 from __future__ import annotations
 

@@ -165,7 +165,7 @@ class Supervisor:
             signal_descriptor(child.descriptor, number)
 
     def is_suspended(self, process: str) -> bool:
-        """Tell whether a signal keeps a process from running."""
+        """Return whether a signal keeps a process from running."""
         child = self._children.get(process)
         return child is not None and child.process is not None and child.process.is_stopped
 
@@ -175,7 +175,7 @@ class Supervisor:
         self._launch.log.write(Record(time, level, "robot", text, detail))
 
     def is_up(self) -> None:
-        """Tell who waits that all is active."""
+        """Tell those who wait that everything is active."""
         self._write_state()
         self._on_up()
 
@@ -251,12 +251,12 @@ class Supervisor:
             self._restore_folder()
 
     def _restore_folder(self) -> None:
-        """Put back what somebody has removed from the folder of this robot, so that `stop` and `down` find it."""
+        """Restore what was removed from the folder of this robot, so that `stop` and `down` find it."""
         try:
             self._folder.make()
             lock = self._folder.lock() if self._folder.has_lost_lock(self._lock) else self._lock
             if lock is None:
-                raise OSError("somebody else holds the lock")
+                raise OSError("another supervisor holds the lock")
             if lock != self._lock:
                 os.close(self._lock)
                 self._lock = lock
@@ -266,7 +266,7 @@ class Supervisor:
             self._complain(f"files of the robot were removed and cannot be restored: {error}")
         else:
             self._complained = ""
-            self.log(Level.WARN, "somebody removed files of the running robot; they are restored")
+            self.log(Level.WARN, "files of the running robot were removed; they are restored")
 
     def _complain(self, text: str) -> None:
         """Warn of something that is tried again and again, once for each reason."""
@@ -285,7 +285,7 @@ class Supervisor:
             self._parent.process.send_signal(signal.SIGKILL)
 
     def _lose_parent(self) -> None:
-        """Go on without the pre-fork parent: its processes are ours now, and have been asked to stop."""
+        """Continue without the pre-fork parent: its processes are ours now, and have been asked to stop."""
         if self._parent is None:
             return
         self._selector.unregister(self._parent)
@@ -297,7 +297,7 @@ class Supervisor:
             else:
                 pid, descriptor = child.process.pid, child.descriptor
                 self._selector.register(descriptor, selectors.EVENT_READ, self._reaper(name, pid, descriptor))
-        self.conductor.go_down(ROBOT_FAILED, "the pre-fork parent has gone", Level.ERROR)
+        self.conductor.go_down(ROBOT_FAILED, "the pre-fork parent is gone", Level.ERROR)
 
     def _reaper(self, name: str, pid: int, descriptor: int) -> Callable[[], None]:
         def reap() -> None:
