@@ -54,7 +54,7 @@ def test_a_lock_named_like_an_input_is_told_at_both_places(tmp_path: Path) -> No
 
 def test_a_component_is_not_told_to_listen_to_itself(tmp_path: Path) -> None:
     robot = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  relay: {type: toy_relay}\n"
-    assert only(robot, tmp_path).help == "add the component that gives it"
+    assert only(robot, tmp_path).help == "add the component that provides it"
     other = "  other: {type: toy_relay, connect: {taken: given, given: level}}\n"
     assert only(robot + other, tmp_path).help == "connect it: 'connect: {taken: level}'"
 
