@@ -90,10 +90,10 @@ def test_a_later_parent_replaces_the_earlier_one_and_says_so() -> None:
 @pytest.mark.parametrize(
     ("parent", "child", "transform", "reason"),
     [
-        ("camera", "odom", at(0.0), "hangs on it"),
+        ("camera", "odom", at(0.0), "is below it"),
         ("base", "base", at(0.0), "itself"),
         ("base", "", at(0.0), "needs a name"),
-        ("base", "new", at(math.nan), "not a finite number"),
+        ("base", "new", at(math.nan), "number that is not finite"),
         ("base", "new", Transform3(rotation=(0.0, 0.0, 0.0, 0.0)), "not a unit quaternion"),
     ],
     ids=["cycle", "itself", "nameless", "nan", "zero rotation"],
