@@ -39,5 +39,5 @@ def world_group(robot: Robot) -> Iterator[Finding]:
         if component.cls.process == WORLD:
             message = f"'{component.name}' is simulated and belongs in the group 'world', not in '{component.process}'"
         else:
-            message = f"'{component.name}' is not component of the simulated world, but runs in its group"
+            message = f"'{component.name}' is not part of the simulated world, but runs in its group"
         yield world_group.at(robot.value(*component.path, "process"), message, help="remove 'process'")

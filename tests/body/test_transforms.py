@@ -93,7 +93,7 @@ def test_a_later_parent_replaces_the_earlier_one_and_says_so() -> None:
         ("camera", "odom", at(0.0), "is below it"),
         ("base", "base", at(0.0), "itself"),
         ("base", "", at(0.0), "needs a name"),
-        ("base", "new", at(math.nan), "not finite"),
+        ("base", "new", at(math.nan), "number that is not finite"),
         ("base", "new", Transform3(rotation=(0.0, 0.0, 0.0, 0.0)), "not a unit quaternion"),
     ],
     ids=["cycle", "itself", "nameless", "nan", "zero rotation"],

@@ -49,7 +49,7 @@ class CallTask(Leaf):
 @kind("call", CallTask, {"request": "The fields of the request; a single value stands for the only field."})
 @dataclass(frozen=True, slots=True)
 class CallStep(LeafStep):
-    """CallStep a service of the robot; a response with `success: false` is a failure.
+    """Call a service of the robot; a response with `success: false` is a failure.
 
     Example:
         do:

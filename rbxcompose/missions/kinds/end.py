@@ -39,7 +39,7 @@ class EndTask(Task):
 @kind("end", EndTask, {"message": "A message for the log."})
 @dataclass(frozen=True, slots=True)
 class EndStep(Deed):
-    """EndStep the mission that contains this node, in `success` or `failure`; what runs is halted.
+    """End the mission that contains this node, in `success` or `failure`; what runs is halted.
 
     If two branches of a parallel end it in one tick, failure beats success.
 

@@ -35,7 +35,7 @@ class PublishTask(Task):
 @kind("publish", PublishTask, {"message": "The fields of the message; a single value stands for the only field."})
 @dataclass(frozen=True, slots=True)
 class PublishStep(Deed):
-    """PublishStep a message on a topic of the robot; missing fields are zero or empty.
+    """Publish a message on a topic of the robot; missing fields are zero or empty.
 
     Example:
         do:
