@@ -22,6 +22,7 @@ from rbxcompose.cli.bus.guest import Guest
 from rbxcompose.cli.bus.place import add_bus_options, find_place
 from rbxcompose.cli.output.console import misused, refuse, tell
 from rbxcompose.cli.project.robot_options import add_layer_options
+from rbxcompose.cli.recordings.component_replay import run_again
 from rbxcompose.cli.recordings.options import (
     add_selection_options,
     count_table,
@@ -29,7 +30,6 @@ from rbxcompose.cli.recordings.options import (
     selection_of,
     warn,
 )
-from rbxcompose.cli.recordings.rerun import run_again
 from rbxcompose.cli.recordings.tap import Player
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.findings import MOST_NAMES, Finding

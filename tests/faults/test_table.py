@@ -36,7 +36,7 @@ ROWS = {
     "the router is killed": (REAL, "a_killed_router_comes_again_where_it_was"),
     "the session on the bus is stuck": (
         "runtime/test_lifeline.py",
-        "a_stuck_session_is_opened_anew_with_all_that_was_declared",
+        "a_stuck_session_is_opened_again_with_all_that_was_declared",
     ),
     "no session can be opened": (
         "runtime/test_lifeline_retries.py",

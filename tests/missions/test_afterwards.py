@@ -287,7 +287,7 @@ def test_what_is_restarted_may_be_in_a_later_reaction_or_below_it(name: str, res
     assert skills(simulated) == ["0 a", "1 b", "2 c", "2.5 second", "3.5 react", "4 first", *rest]
 
 
-def test_restart_arms_the_other_interrupts_anew() -> None:
+def test_restart_arms_the_other_interrupts_again() -> None:
     text = """
     interrupts:
       open:

@@ -63,7 +63,7 @@ def test_every_goes_on_with_the_rest() -> None:
     assert skills(simulated) == ["0 a", "1.5 recharge", "15 a"]
 
 
-def test_the_modifiers_of_the_leaf_begin_anew_and_those_around_it_go_on() -> None:
+def test_the_modifiers_of_the_leaf_start_again_and_those_around_it_go_on() -> None:
     own = low("- a:\n  timeout: 2 s", takes={"a": 1.9})
     assert own.advance(20) == "success"
     around = low("sequence:\n  - a\ntimeout: 2.8 s", takes={"a": 1.9})
@@ -71,7 +71,7 @@ def test_the_modifiers_of_the_leaf_begin_anew_and_those_around_it_go_on() -> Non
     assert around.told[-2] == "3.8 a: halted (1.3 s): timeout of 2.8 s"
 
 
-def test_attempts_of_the_leaf_begin_anew() -> None:
+def test_attempts_of_the_leaf_start_again() -> None:
     simulated = low("a:\nattempts: 2", fails={"a": fails(1, 3)})
     assert simulated.advance(20) == "success"
     assert simulated.calls["a"] == 4

@@ -56,7 +56,7 @@ def test_a_halt_has_a_hook_of_its_own() -> None:
     assert logged(simulated) == ["0.5 stopped"]
 
 
-def test_an_interrupt_halts_the_leaf_and_what_begins_anew_starts_again() -> None:
+def test_an_interrupt_halts_the_leaf_and_what_was_interrupted_starts_again() -> None:
     text = "interrupts:\n  open:\n    when: $door\ndo:\n  a:\n  on_start: {log: start}\n  on_halt: {log: halt}"
     simulated = simulate(text)
     simulated.at(0.5, lambda: simulated.set("door", True))

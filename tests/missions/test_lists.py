@@ -20,7 +20,7 @@ def test_earlier_conditions_of_a_reactive_sequence_are_asked_again(reactive: str
     assert ("0.5 a: halted (0.5 s)" in simulated.told) == (reactive == "true")
 
 
-def test_what_runs_is_halted_and_begins_anew_when_the_condition_comes_back() -> None:
+def test_what_runs_is_halted_and_starts_again_when_the_condition_comes_back() -> None:
     text = "do:\n  sequence:\n    - wait_for: $door\n    - a\n    - b\n  reactive: true"
     simulated = simulate(text, takes={"b": 2.0})
     for time, is_open in ((0.0, True), (1.5, False), (4.0, True)):
@@ -71,7 +71,7 @@ def test_a_condition_that_reads_an_age_is_asked_at_the_rate() -> None:
 
 
 @pytest.mark.parametrize("kind", ["sequence", "fallback"])
-def test_a_random_order_is_drawn_anew_at_each_start_and_is_the_same_for_the_same_seed(kind: str) -> None:
+def test_a_random_order_is_drawn_again_at_each_start_and_is_the_same_for_the_same_seed(kind: str) -> None:
     text = f"do:\n  repeat: 6\n  do:\n    {kind}: [a, b, c]\n    order: random\n    optional: true"
     orders = []
     for seed in (1, 1, 2):

@@ -66,7 +66,7 @@ def test_a_random_order_has_all_items_and_is_the_same_for_the_same_seed() -> Non
     assert len(set(orders)) > 1
 
 
-def test_a_random_order_is_drawn_anew_at_each_start() -> None:
+def test_a_random_order_is_drawn_again_at_each_start() -> None:
     text = "do:\n  repeat: 8\n  do:\n    for: n\n    in: [1, 2, 3]\n    order: random\n    do:\n      say: $n"
     simulated = simulate(text)
     assert simulated.advance(40) == "success"

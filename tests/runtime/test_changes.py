@@ -97,7 +97,7 @@ def test_who_leaves_the_path_of_commands_is_on_it_too() -> None:
     assert changes(before, after).unsafe(MOVES, {}) != ""
 
 
-def test_a_mission_that_runs_is_not_begun_anew() -> None:
+def test_a_mission_that_runs_is_not_started_again() -> None:
     found = between("missions.patrol.with.rounds=3")
     assert fates(found) == {"mission": Fate.RESTARTED}
     assert found.unsafe([], RUNS).startswith(

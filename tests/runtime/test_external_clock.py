@@ -119,7 +119,7 @@ def test_while_time_stands_still_only_rest_is_commanded(robot: Bench) -> None:
     assert out == [REST]
 
 
-def test_when_time_goes_again_each_deadline_counts_anew(robot: Bench) -> None:
+def test_when_time_goes_again_each_deadline_counts_again(robot: Bench) -> None:
     robot.publish("/cmd_vel/door", Empty())
     robot.publish("/cmd_vel/teleop", FORWARD)
     robot.advance(0.3)

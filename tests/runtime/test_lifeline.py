@@ -213,7 +213,7 @@ def test_a_session_that_is_sound_is_left_alone(port: int) -> None:
     robot.bus.close()
 
 
-def test_a_stuck_session_is_opened_anew_with_all_that_was_declared(port: int) -> None:
+def test_a_stuck_session_is_opened_again_with_all_that_was_declared(port: int) -> None:
     with closing(Proxy(port)) as proxy:
         robot, visitor = Probed(proxy.port), Visitor(port)
         heard: list[float] = []

@@ -36,14 +36,14 @@ class Course:
         self.current = root if status == RUNNING else None
         return status
 
-    def suspend(self, now: float, anew: bool) -> None:
+    def suspend(self, now: float, from_start: bool) -> None:
         """Stop what runs, keep the place and stop the clock."""
         self.left = now
-        self.cut(anew)
+        self.cut(from_start)
 
-    def cut(self, anew: bool) -> None:
+    def cut(self, from_start: bool) -> None:
         """Stop what runs and keep the place; who calls this stops the clock, if it is to be stopped."""
-        if self.current is not None and self.current.suspend(anew):
+        if self.current is not None and self.current.suspend(from_start):
             self.current = None
 
     def resume(self, now: float) -> None:
@@ -52,7 +52,7 @@ class Course:
             self.lost += now - self.left
             self.left = None
 
-    def begin_anew(self, target: Target) -> bool:
+    def start_over(self, target: Target) -> bool:
         """Let what is named begin again, if it runs here; tell whether it does."""
         current = self.current
         if current is None:

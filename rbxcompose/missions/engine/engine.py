@@ -91,7 +91,7 @@ class Engine(EngineBase):
             self._take_results()
             self.is_paused = True
             self.lost -= now
-            self.main.stack[-1].suspend(now, anew=False)
+            self.main.stack[-1].suspend(now, from_start=False)
 
     def resume(self, now: float) -> None:
         """Continue; the skills that were halted are asked again at the next tick."""

@@ -88,13 +88,13 @@ class InterruptStarted:
 class InterruptEnded:
     """The reaction is done; `afterwards` says how it continues, `back_to` are the leaves that it halted.
 
-    `anew` is the name of what begins again. If nothing of that name was running, it continues as with `continue`.
+    `restarted` is the name of what begins again. If nothing of that name was running, it continues as with `continue`.
     """
 
     name: str
     afterwards: str
     back_to: tuple[int, ...]
-    anew: str = ""
+    restarted: str = ""
 
 
 @dataclass(frozen=True, slots=True)

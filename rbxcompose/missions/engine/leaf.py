@@ -69,11 +69,11 @@ class Leaf(Task):
             self.engine.forget_result(self.number)
             self.engine.world.halt(self.number)
 
-    def suspend(self, anew: bool) -> bool:
+    def suspend(self, from_start: bool) -> bool:
         """Ask the world to stop it, to be started or asked again; a result that has come already stays."""
         if not self.is_asked:
             return False
         self.stop()
         self.statuses[self.number] = IDLE
         self.engine.cut_short.append(self.number)
-        return anew
+        return from_start

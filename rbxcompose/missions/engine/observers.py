@@ -58,12 +58,12 @@ class Around(Decorator):
         super().halt()
         self.ended(IDLE)
 
-    def suspend(self, anew: bool) -> bool:
+    def suspend(self, from_start: bool) -> bool:
         """Report that it is halted, if it starts again."""
-        is_anew = super().suspend(anew)
-        if is_anew:
+        starts_over = super().suspend(from_start)
+        if starts_over:
             self.ended(IDLE)
-        return is_anew
+        return starts_over
 
     def started(self) -> None:
         """Hear that the node starts."""

@@ -76,9 +76,9 @@ class Run(RunBase):
             course.halt()
         self.stack[:], self.returns[:] = [self.mission], []
 
-    def suspend(self, anew: bool) -> None:
+    def suspend(self, from_start: bool) -> None:
         """Stop the leaves that run, and keep the place."""
-        self.stack[-1].cut(anew)
+        self.stack[-1].cut(from_start)
 
     def main_tasks(self) -> list[WithHistory]:
         """Return the tasks of the main node that can keep a place."""
@@ -117,7 +117,7 @@ class Run(RunBase):
         reaction.restart()
         self.engine.cut_short = []
         self.engine.restarting = reaction.targets
-        self.stack[-1].suspend(now, anew=True)
+        self.stack[-1].suspend(now, from_start=True)
         self.engine.restarting = ()
         self.stack.append(reaction)
         self.returns.append(tuple(self.engine.cut_short))
@@ -130,11 +130,11 @@ class Run(RunBase):
         if reaction.afterwards == END:
             return self._finish(self.mission, SUCCESS)
         self.stack.pop()
-        back, afterwards, anew = self.returns.pop(), reaction.afterwards, ""
+        back, afterwards, restarted = self.returns.pop(), reaction.afterwards, ""
         if afterwards == CONTINUE or reaction.targets:
             self.stack[-1].resume(now)
-            if self._begin_anew(reaction.targets):
-                anew = reaction.restarts
+            if self._start_over(reaction.targets):
+                restarted = reaction.restarts
             else:
                 afterwards = CONTINUE
         else:
@@ -143,18 +143,18 @@ class Run(RunBase):
                 self.engine.places.forget(root, self.engine.program.nodes[root].end)
             self.begin(dict(self.inputs))
             reaction.is_armed = False
-        self.engine.say(InterruptEnded(reaction.name, afterwards, back, anew))
+        self.engine.say(InterruptEnded(reaction.name, afterwards, back, restarted))
         if not reaction.is_armed and self._holds(reaction):
             self.engine.say(Reported(reaction.path, STILL_HOLDS))
         self.engine.again(reaction)
         return RUNNING
 
-    def _begin_anew(self, targets: tuple[Target, ...]) -> bool:
+    def _start_over(self, targets: tuple[Target, ...]) -> bool:
         """Let what is named begin again wherever it runs; tell whether it runs anywhere."""
         has_begun = False
         for target in targets:
             for course in self.stack:
-                if course.begin_anew(target):
+                if course.start_over(target):
                     has_begun = True
                     if not target.is_round:
                         self._forget_place_of(target.number)

@@ -66,7 +66,7 @@ class RunBase(ABC):
         """Stop what runs, for good."""
 
     @abstractmethod
-    def suspend(self, anew: bool) -> None:
+    def suspend(self, from_start: bool) -> None:
         """Stop the leaves that run, and keep the place."""
 
     @abstractmethod

@@ -53,9 +53,9 @@ class MissionStory:
             case InterruptStarted(name=name, condition=condition, shown=shown):
                 values = ", ".join(f"{name} {value}" for name, value in shown.items())
                 return Level.OK, f"interrupt {name}: {condition}" + (f" ({values})" if values else "")
-            case InterruptEnded(name=name, afterwards=afterwards, back_to=leaves, anew=anew):
+            case InterruptEnded(name=name, afterwards=afterwards, back_to=leaves, restarted=restarted):
                 back = " and ".join(self._labels[leaf] for leaf in leaves if leaf in self._labels)
-                return Level.OK, f"interrupt {name} done" + _afterwards(afterwards, back, anew)
+                return Level.OK, f"interrupt {name} done" + _afterwards(afterwards, back, restarted)
             case NodeStarted(name=name, is_state=is_state):
                 return Level.OK, f"state {name}" if is_state else f"{name} begins"
             case NodeEnded(name=name, result=result, is_state=is_state):
@@ -97,9 +97,9 @@ def _usual_first(result: str) -> tuple[int, str]:
     return (usual.index(result) if result in usual else len(usual), result)
 
 
-def _afterwards(afterwards: str, back: str, anew: str) -> str:
+def _afterwards(afterwards: str, back: str, restarted: str) -> str:
     if afterwards == RESTART:
-        return f", {anew or 'the mission'} starts again"
+        return f", {restarted or 'the mission'} starts again"
     return f", back to {back}" if back else ""
 
 

@@ -91,14 +91,14 @@ class Task(ABC):
             self.current = None
             child.halt()
 
-    def suspend(self, anew: bool) -> bool:
+    def suspend(self, from_start: bool) -> bool:
         """Stop the leaves that run, keep the place, and return whether this task is to be started again for that.
 
-        With `anew`, a leaf and its modifiers begin again from the start, as after an interrupt; without it, as after
+        With `from_start`, a leaf and its modifiers begin again, as after an interrupt; without it, as after
         a pause, a leaf repeats only what it asked of the robot.
         """
         child = self.current
-        if child is not None and child.suspend(anew):
+        if child is not None and child.suspend(from_start):
             self.current = None
         return False
 

@@ -78,10 +78,10 @@ class ParallelTask(Task):
                 self.runs[index] = False
                 child.halt()
 
-    def suspend(self, anew: bool) -> bool:
+    def suspend(self, from_start: bool) -> bool:
         """Suspend all branches that run."""
         for index, child in enumerate(self.children):
-            if self.runs[index] and child.suspend(anew):
+            if self.runs[index] and child.suspend(from_start):
                 self.runs[index] = False
         return False
 

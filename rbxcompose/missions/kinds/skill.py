@@ -75,16 +75,16 @@ class SkillTask(Leaf):
         status = SUCCESS if self.skill.outcomes[outcome] == SUCCEEDS else FAILURE
         return status, outcome, result.message or outcome
 
-    def suspend(self, anew: bool) -> bool:
+    def suspend(self, from_start: bool) -> bool:
         """Hold the skill if it can pause and will continue, else stop it."""
-        if self.is_asked and self.skill.pausable and not self._begins_anew():
+        if self.is_asked and self.skill.pausable and not self._starts_over():
             if not self.is_held:
                 self.is_held = True
                 self.engine.world.pause(self.number)
             return False
-        return super().suspend(anew)
+        return super().suspend(from_start)
 
-    def _begins_anew(self) -> bool:
+    def _starts_over(self) -> bool:
         nodes = self.engine.program.nodes
         return any(one.number <= self.number < nodes[one.number].end for one in self.engine.restarting)
 

@@ -70,9 +70,9 @@ class UseTask(WithHistory):
         """Stop what runs in the mission."""
         self.inner.halt()
 
-    def suspend(self, anew: bool) -> bool:
+    def suspend(self, from_start: bool) -> bool:
         """Suspend the leaves of the mission."""
-        self.inner.suspend(anew)
+        self.inner.suspend(from_start)
         return False
 
     def restart(self, target: Target) -> bool:

@@ -39,11 +39,11 @@ class WaitForTask(Task):
         self.engine.watch(self.watched)
         return RUNNING
 
-    def suspend(self, anew: bool) -> bool:
+    def suspend(self, from_start: bool) -> bool:
         """There is nothing to stop; after an interrupt it starts again."""
-        if anew:
+        if from_start:
             self.statuses[self.number] = IDLE
-        return anew
+        return from_start
 
 
 @kind("wait_for", WaitForTask)

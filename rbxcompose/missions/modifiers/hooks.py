@@ -44,12 +44,12 @@ class HooksTask(Decorator):
         super().halt()
         act_safely(self.moments, ON_HALT, self)
 
-    def suspend(self, anew: bool) -> bool:
+    def suspend(self, from_start: bool) -> bool:
         """A node that starts again is halted."""
-        is_anew = super().suspend(anew)
-        if is_anew:
+        starts_over = super().suspend(from_start)
+        if starts_over:
             act_safely(self.moments, ON_HALT, self)
-        return is_anew
+        return starts_over
 
 
 @modifier(

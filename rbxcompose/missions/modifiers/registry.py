@@ -25,9 +25,9 @@ class Decorator(Task):
         super().__init__(site)
         self.inner = inner
 
-    def suspend(self, anew: bool) -> bool:
+    def suspend(self, from_start: bool) -> bool:
         """Start again together with a leaf that starts again."""
-        if self.current is not None and self.inner.suspend(anew):
+        if self.current is not None and self.inner.suspend(from_start):
             self.current = None
             return True
         return False

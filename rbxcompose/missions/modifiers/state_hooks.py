@@ -37,9 +37,9 @@ class EnteringTask(Decorator):
             act(self.moments, ON_EXIT, self)
         return status
 
-    def suspend(self, anew: bool) -> bool:
+    def suspend(self, from_start: bool) -> bool:
         """An interrupt halts leaves, not states: the state stays entered, what is in it starts again."""
-        if self.current is not None and self.inner.suspend(anew):
+        if self.current is not None and self.inner.suspend(from_start):
             self.current = None
         return False
 
