@@ -12,6 +12,7 @@ from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.zenoh_session import open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import MonotonicClock
+from rbxcompose.endpoints import tcp_endpoint
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
@@ -132,7 +133,7 @@ def _serve(types: tuple[str, ...], results: Any) -> None:
 def _measured(*groups: tuple[str, ...]) -> Samples:
     """Run groups, one process each, and return how late the fast topic was [s]."""
     context = multiprocessing.get_context("spawn")
-    router = open_router(PORT)
+    router = open_router(tcp_endpoint(PORT))
     results = context.Queue()
     processes = [context.Process(target=_serve, args=(types, results)) for types in groups]
     processes.append(context.Process(target=_feed))

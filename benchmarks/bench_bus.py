@@ -18,6 +18,7 @@ from benchmarks.bus_ends import FLOOD, OUR_FLOOD
 from benchmarks.measuring import ROOT, Row, Samples
 from benchmarks.peers import ROS_PYTHON, Ros, free_port
 from rbxcompose.bus.zenoh_session import open_router
+from rbxcompose.endpoints import tcp_endpoint
 
 ROUNDS = 5
 HOPS = 200  # per round
@@ -74,7 +75,7 @@ class End:
 @contextmanager
 def _ends(*roles: str) -> Iterator[list[End]]:
     port = free_port()
-    router = open_router(port)
+    router = open_router(tcp_endpoint(port))
     try:
         commands = [[sys.executable, "-m", "benchmarks.bus_ends", role, str(port)] for role in roles]
         with _started(commands, {}) as ends:

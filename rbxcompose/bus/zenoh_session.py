@@ -6,15 +6,20 @@ Nothing is left to Zenoh's defaults, which look for strangers on every network.
 from __future__ import annotations
 
 import errno
+import itertools
 import json
+import os
 from collections.abc import Mapping
 
 import zenoh
 
 from rbxcompose.bus import shared_memory
+from rbxcompose.endpoints import folder_of, is_private, tcp_endpoint, unix_endpoint
 
 LEASE = 2000  # [ms] until a link that went silent counts as lost
 PATIENCE = 1000  # [ms] of a visitor with a router that does not answer
+_TAKEN = ("os error 98", "Unable to acquire lock")  # what Zenoh says of an endpoint in use
+_session_numbers = itertools.count()
 
 
 def _common() -> dict[str, object]:
@@ -36,7 +41,7 @@ def peer_settings(router: str) -> dict[str, object]:
     return {
         **_common(),
         "mode": "peer",
-        "listen/endpoints": ["tcp/127.0.0.1:0"],  # other peers connect to it once they know of each other
+        "listen/endpoints": [_endpoint_beside(router)],  # other peers connect to it once they know of each other
         "connect/endpoints": [router],
         "connect/retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2},
         "connect/timeout_ms": -1,  # goes on trying for ever, in the background; 0 would mean once
@@ -44,12 +49,19 @@ def peer_settings(router: str) -> dict[str, object]:
     }
 
 
-def router_settings(port: int) -> dict[str, object]:
-    """Return the configuration of a router on the loopback interface."""
+def _endpoint_beside(router: str) -> str:
+    if not is_private(router):
+        return tcp_endpoint(0)
+    # A session that is opened again must not wait until the stuck one lets go of its socket.
+    return unix_endpoint(folder_of(router), f"{os.getpid()}-{next(_session_numbers)}")
+
+
+def router_settings(endpoint: str) -> dict[str, object]:
+    """Return the configuration of a router that listens at `endpoint`."""
     return {
         **_common(),
         "mode": "router",
-        "listen/endpoints": [f"tcp/127.0.0.1:{port}"],
+        "listen/endpoints": [endpoint],
         "listen/timeout_ms": 0,
         "listen/exit_on_failure": True,
         "connect/endpoints": [],
@@ -85,18 +97,18 @@ def open_client(router: str) -> zenoh.Session:
         raise OSError(errno.ECONNREFUSED, f"no router answers at {router}") from error
 
 
-def open_router(port: int) -> zenoh.Session:
+def open_router(endpoint: str) -> zenoh.Session:
     """Open a router.
 
     Raises:
-        OSError: if `port` is taken.
+        OSError: if `endpoint` is taken.
     """
     try:
-        return zenoh.open(_config(router_settings(port)))
+        return zenoh.open(_config(router_settings(endpoint)))
     except zenoh.ZError as error:
-        if "os error 98" not in str(error):
+        if not any(cause in str(error) for cause in _TAKEN):
             raise
-        raise OSError(errno.EADDRINUSE, f"port {port} is taken") from error
+        raise OSError(errno.EADDRINUSE, f"{endpoint} is taken") from error
 
 
 def _config(settings: Mapping[str, object]) -> zenoh.Config:

@@ -35,7 +35,8 @@ def _lines(plan: Plan) -> Iterator[str]:
 
 def _facts(plan: Plan) -> Iterator[tuple[str, str]]:
     bus = plan.bus
-    router = bus.router or f"its own at port {bus.port}, or the next free one"
+    own = "by sockets of this user only" if bus.access == "user" else f"at port {bus.port}, or the next free one"
+    router = bus.router or f"its own {own}"
     namespace = f"namespace {bus.namespace}" if bus.namespace else "no namespace"
     yield "bus", f"domain {bus.domain}, {namespace}, wire format {bus.wire}"
     yield "router", router

@@ -56,6 +56,7 @@ class BusPlan:
     wire: str = "jazzy"
     router: str | None = None
     clock: str = "own"  # or `external`: robot time follows `/clock`
+    access: str = "machine"  # or `user`: the robot's own router takes programs of this user only
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import hashlib
 import json
@@ -19,6 +20,7 @@ from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.typed_json import UnreadableError, from_data, to_data
 
 STATE, LOCK, SOCKET = "state.json", "lock", "control.sock"
+_BUS = "bus"
 _VERSION = 1
 _PASSING = (STATE, SOCKET, LOCK)  # what goes when the robot is down; the log stays
 _LARGEST = 16_000_000  # [B] of a state
@@ -177,9 +179,14 @@ class RobotFolder:
         Raises:
             UnsafeFolderError: if it, or the one above, is another user's or open to others.
         """
-        for folder in (self.path.parent, self.path):
+        for folder in (self.path.parent, self.path, self.sockets):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             _require_private(folder)
+
+    @property
+    def sockets(self) -> Path:
+        """Return the folder of the sockets by which its processes talk, if only this user may."""
+        return self.path / _BUS
 
     @property
     def is_known(self) -> bool:
@@ -267,10 +274,13 @@ class RobotFolder:
     def clear(self) -> None:
         """Remove everything but the log. Needs the lock, which goes last."""
         self.sweep()
+        with contextlib.suppress(OSError):  # somebody has put something into it, or removed it
+            self.sockets.rmdir()
         for name in _PASSING:
             (self.path / name).unlink(missing_ok=True)
 
     def _leftovers(self) -> Iterator[Path]:
         yield from self.path.glob(f"*{TEMPORARY}")
         yield from self.path.glob("*.out")
+        yield from self.sockets.glob("*")
         yield self.path / SOCKET

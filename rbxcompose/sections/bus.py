@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from rbxcompose.config import Config
+from rbxcompose.endpoints import endpoint
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Reading
@@ -23,7 +24,10 @@ class BusModel(Config):
     """TCP port of the robot's router; if it is in use, the next free one."""
     wire: Literal["jazzy"] = "jazzy"
     """The ROS 2 distribution whose wire format is spoken."""
-    router: str | None = None
+    access: Literal["machine", "user"] = "machine"
+    """Who may take part through the robot's own router: every program of this machine, or those of this user only, by
+    Unix sockets instead of the port."""
+    router: Annotated[str, AfterValidator(endpoint)] | None = None
     """An existing router to use instead of the robot's own, such as `tcp/192.168.0.2:7447`."""
     clock: Literal["own", "external"] = "own"
     """Whose time the robot follows: its own, or that of an external simulator, which publishes it on `/clock`."""

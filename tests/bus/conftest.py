@@ -15,6 +15,7 @@ from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.zenoh_session import open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import MonotonicClock, SteppedClock
+from rbxcompose.endpoints import tcp_endpoint
 from rbxcompose.scheduler import Scheduler
 
 
@@ -69,7 +70,7 @@ class Network:
         self.start_router()
 
     def start_router(self) -> None:
-        self._router = open_router(self.port)
+        self._router = open_router(tcp_endpoint(self.port))
 
     def stop_router(self) -> None:
         self._router.close()  # type: ignore[no-untyped-call]

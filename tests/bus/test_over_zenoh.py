@@ -18,6 +18,7 @@ from rbxcompose.bus.attachment import Attachment, decode_attachment
 from rbxcompose.bus.refusals import RefusalReason
 from rbxcompose.bus.tokens import EndpointToken, NodeToken, parse_token
 from rbxcompose.bus.zenoh_session import open_peer, open_router
+from rbxcompose.endpoints import tcp_endpoint
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.example_interfaces import AddTwoInts
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
@@ -386,4 +387,4 @@ def test_a_port_that_is_taken_is_an_os_error() -> None:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         with pytest.raises(OSError, match="is taken"):
-            open_router(taken.getsockname()[1])
+            open_router(tcp_endpoint(taken.getsockname()[1]))

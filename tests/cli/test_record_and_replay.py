@@ -19,6 +19,7 @@ from mcap.reader import SeekingReader, make_reader
 
 from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.cli import main as command
+from rbxcompose.endpoints import tcp_endpoint
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import RecordingReader
 from rbxcompose.recording.topics import RecordedTopic
@@ -75,7 +76,7 @@ def router() -> Iterator[str]:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    session = open_router(port)
+    session = open_router(tcp_endpoint(port))
     yield f"tcp/127.0.0.1:{port}"
     session.close()  # type: ignore[no-untyped-call]
 

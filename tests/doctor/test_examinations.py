@@ -107,11 +107,19 @@ def test_the_port_of_the_bus_is_free_or_taken_by_whom(tmp_path: Path) -> None:
     ]
     foreign = robot_of(tmp_path, "bus: {router: tcp/10.0.0.1:7447}\n")
     assert told("ports", replace(FINE, file=foreign, listeners=taken)) == []
+    private = robot_of(tmp_path, "bus: {access: user}\n")
+    assert told("ports", replace(FINE, file=private, listeners=taken)) == []
 
 
 def test_a_router_listens_at_its_port_or_somebody_else_does() -> None:
     up = replace(FINE, running=(running(state(processes={"router": HERE})),))
-    assert told("ports", replace(up, listeners={7447: Listener(HERE.pid, "")})) == [("ok", "port 7447: router of cart")]
+    assert told("ports", replace(up, listeners={7447: Listener(HERE.pid, "")})) == [
+        ("ok", "port 7447: router of cart, open to every user of this machine")
+    ]
+    private = running(replace(state(processes={"router": HERE}), router="unixsock-stream//run/user/7/bus/router"))
+    assert told("ports", replace(FINE, running=(private,))) == [
+        ("ok", "the bus of cart takes programs of this user only")
+    ]
     orphaned = running(state(supervisor=GONE, processes={"router": GONE}))
     assert told("ports", replace(FINE, running=(orphaned,))) == []  # its end is told as what it has left
     assert told("ports", up) == [

@@ -13,6 +13,7 @@ import pytest
 from rbxcompose.bus.probe import MISSES, ProbeResult, probe_key
 from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
+from rbxcompose.endpoints import tcp_endpoint
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.qos import Qos
@@ -90,7 +91,7 @@ def count(soak: Soak) -> Iterator[Count]:
 def stage() -> Iterator[Stage]:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port: int = listener.getsockname()[1]
-    router = ZenohTransport(open_router(port), lambda owner, callback: None)
+    router = ZenohTransport(open_router(tcp_endpoint(port)), lambda owner, callback: None)
     router.serve(probe_key(ROBOT), answer)
     with Proxy(port) as proxy:
         made = Stage(proxy, Probed(proxy.port), Visitor(port))

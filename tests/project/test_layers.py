@@ -17,6 +17,7 @@ GROUND = {
     "clock": "",
     "config": "references units",
     "edits": "findings",
+    "endpoints": "",
     "expressions": "findings units",
     "findings": "",
     "formats": "findings plugins",

@@ -19,6 +19,7 @@ from rbxcompose.bus.transport import TransportReply
 from rbxcompose.bus.zenoh_session import open_client, open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import MonotonicClock
+from rbxcompose.endpoints import tcp_endpoint
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.qos import Qos
@@ -186,7 +187,7 @@ def port() -> Iterator[int]:
     """The port of a robot's router."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         free: int = listener.getsockname()[1]
-    transport = ZenohTransport(open_router(free), lambda owner, callback: None)
+    transport = ZenohTransport(open_router(tcp_endpoint(free)), lambda owner, callback: None)
     transport.serve(probe_key(ROBOT), answer)
     yield free
     transport.close()

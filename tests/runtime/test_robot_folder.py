@@ -80,7 +80,7 @@ def test_a_state_comes_back_as_it_was_written(folder: RobotFolder) -> None:
     assert folder.read_state() is None
     folder.write_state(state())
     assert folder.read_state() == state()
-    assert [path.name for path in folder.path.iterdir()] == [folders.STATE]
+    assert [path for path in folder.path.iterdir() if path.is_file()] == [folder.path / folders.STATE]
 
 
 def test_a_state_that_was_changed_is_not_believed(folder: RobotFolder) -> None:

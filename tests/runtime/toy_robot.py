@@ -99,11 +99,11 @@ class Toy(Component[ToyConfig]):
         return {"steps": str(self.steps)}
 
 
-def toy_plan(name: str = "toys", *, port: int = 17447, **config: object) -> Plan:
+def toy_plan(name: str = "toys", *, port: int = 17447, access: str = "machine", **config: object) -> Plan:
     """Return a plan of two toys in two processes; `config` is that of the second."""
     first = Instance("first", "toy", ToyConfig(), "robot")
     second = Instance("second", "toy", ToyConfig.model_validate(config), "other", starts_after=("first",))
-    return Plan(name, "toys.yaml", (first, second), BusPlan(port=port), start="toy")
+    return Plan(name, "toys.yaml", (first, second), BusPlan(port=port, access=access), start="toy")
 
 
 def main() -> int:
@@ -111,6 +111,7 @@ def main() -> int:
     parser.add_argument("--name", default="toys")
     parser.add_argument("--config", default="{}", help="JSON")
     parser.add_argument("--port", type=int, default=17447)
+    parser.add_argument("--access", default="machine")
     parser.add_argument("--rate", type=float, default=None)
     parser.add_argument("--stepped", action="store_true")
     parser.add_argument("--duration", type=float, default=None)
@@ -118,7 +119,7 @@ def main() -> int:
     arguments = parser.parse_args()
     config = ToyConfig.model_validate_json(arguments.config).model_dump()
     options = RunOptions(arguments.stepped, arguments.rate, arguments.duration, arguments.d)
-    return run_plan(toy_plan(arguments.name, port=arguments.port, **config), options)
+    return run_plan(toy_plan(arguments.name, port=arguments.port, access=arguments.access, **config), options)
 
 
 if __name__ == "__main__":

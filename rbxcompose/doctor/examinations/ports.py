@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.doctor.facts import HostFacts, Listener, RunningRobot
 from rbxcompose.doctor.registry import examination
+from rbxcompose.endpoints import is_private
 from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
 from rbxcompose.sections.bus import BusModel
@@ -45,7 +46,8 @@ def ports(facts: HostFacts) -> Iterator[str | Finding]:
         wanted = [] if facts.running else [BusModel().port]
     else:
         bus = facts.file.manifest.bus
-        wanted = [] if facts.file.manifest.name in names or bus.router else [bus.port]
+        needs_none = facts.file.manifest.name in names or bus.router or bus.access == "user"
+        wanted = [] if needs_none else [bus.port]
     for port in wanted:
         taken = facts.listeners.get(port)
         yield (
@@ -62,10 +64,13 @@ def _router(one: RunningRobot, facts: HostFacts) -> Iterator[str | Finding]:
         return  # it uses a router from elsewhere, or none is known
     if not one.state.is_supervised:
         return  # that the robot has ended is told by `leftovers`
+    if is_private(one.state.router):
+        yield f"the bus of {one.name} takes programs of this user only"
+        return
     router, port = one.state.processes["router"], int(one.state.router.rpartition(":")[2])
     taken = facts.listeners.get(port)
     if taken is not None and taken.pid == router.pid:
-        yield f"port {port}: router of {one.name}"
+        yield f"port {port}: router of {one.name}, open to every user of this machine"
         return
     words = "nothing listens there" if taken is None else f"{_who(taken)} listens there"
     yield NO_LISTENER.at(

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Iterator
+from pathlib import Path
 from types import FrameType
 
 from rbxcompose.bus.probe import probe_key
 from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import MonotonicClock
+from rbxcompose.endpoints import tcp_endpoint, unix_endpoint
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.process_group.driver import RealTimeDriver
@@ -22,11 +25,14 @@ TRIES = 20  # ports from `bus.port` on
 
 
 class Router:
-    """Listens on the robot's port, or the next free one, until the supervisor says so or has gone; answers probes."""
+    """Listens on the robot's port or the next free one, or on a Unix socket, and answers probes.
 
-    def __init__(self, plan: Plan, clock: MonotonicClock, channel: say.Channel) -> None:
+    It ends when the supervisor says so or has gone.
+    """
+
+    def __init__(self, plan: Plan, sockets: Path, clock: MonotonicClock, channel: say.Channel) -> None:
         self.is_over = False
-        self._plan, self._clock, self._channel = plan, clock, channel
+        self._plan, self._sockets, self._clock, self._channel = plan, sockets, clock, channel
         self._inbox = CallbackInbox()
         self._watchdog = Watchdog()
         self._transport: ZenohTransport | None = None
@@ -64,22 +70,28 @@ class Router:
         """Do nothing: a router has nothing to bring to rest."""
 
     def _open(self, endpoint: str | None) -> None:
-        """Open a session, at `endpoint` if the others have been told of one."""
-        first = self._plan.bus.port
-        ports = range(first, first + TRIES) if endpoint is None else [int(endpoint.rpartition(":")[2])]
-        for port in ports:
+        """Open a session, at `endpoint` if the others already know one."""
+        reason = ""
+        for wanted in [endpoint] if endpoint else self._endpoints():
             try:
-                session = open_router(port)
-            except OSError:
-                continue  # taken: perhaps by another robot
+                session = open_router(wanted)
+            except OSError as error:  # taken: perhaps by another robot
+                reason = f"the router cannot listen: {error.strerror}"
+                continue
             self._transport = ZenohTransport(session, self._inbox.put)
             self._transport.serve(probe_key(self._plan.robot), answer)
-            self._channel.send(say.Configured(f"tcp/127.0.0.1:{port}"))
+            self._channel.send(say.Configured(wanted))
             return
-        reason = f"no port is free for the router, from {ports[0]} to {ports[-1]}"
         if endpoint is not None:
             raise OSError(reason)  # another try may find it free again
         self._channel.send(say.Failed("", reason))
+
+    def _endpoints(self) -> Iterator[str]:
+        bus = self._plan.bus
+        if bus.access == "user":
+            yield unix_endpoint(self._sockets, "router")
+        else:
+            yield from map(tcp_endpoint, range(bus.port, bus.port + TRIES))
 
 
 def _end(number: int, frame: FrameType | None) -> None:

@@ -15,6 +15,7 @@ import setproctitle
 
 from rbxcompose.bus import shared_memory
 from rbxcompose.clock import MonotonicClock
+from rbxcompose.endpoints import unix_endpoint
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.faults import explain
@@ -160,6 +161,8 @@ def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: 
     folder = RobotFolder.of(plan.robot)
     try:
         folder.make()
+        if plan.bus.access == "user":
+            unix_endpoint(folder.sockets, "")  # before anything runs, for its path may be too long
         lock = folder.lock()  # ours until this process ends
         if lock is None:
             _report(reports, AlreadyUp(_supervisor_of(folder)))
@@ -174,7 +177,7 @@ def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: 
     _report(reports, Begun())
     for text in told:
         log.write(Record(0.0, Level.WARN, "robot", text))
-    ended = _run(Launch(plan, options, log, folder.path, clock), folder, lock, reports)
+    ended = _run(Launch(plan, options, log, folder, clock), folder, lock, reports)
     shared_memory.remove_orphans()  # of processes that were killed
     folder.clear()
     _report(reports, ended)

@@ -23,7 +23,7 @@ import setproctitle
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.channel import Channel
-from rbxcompose.runtime.folder import title
+from rbxcompose.runtime.folder import RobotFolder, title
 from rbxcompose.runtime.log import LogFile
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.processes import Process, end_with, give_back_large_memory
@@ -42,7 +42,7 @@ class Launch:
     plan: Plan
     options: RunOptions
     log: LogFile
-    folder: Path
+    folder: RobotFolder
     clock: MonotonicClock
 
     def title(self, process: str) -> str:
@@ -51,7 +51,7 @@ class Launch:
 
     def output(self, process: str) -> Path:
         """Return the file that takes what a process prints."""
-        return self.folder / f"{process}.out"
+        return self.folder.path / f"{process}.out"
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,7 +220,7 @@ def run_process(launch: Launch, order: Fork, channel: Channel) -> None:
     if order.group == ROUTER:
         from rbxcompose.runtime.process_group.router import Router
 
-        Router(launch.plan, launch.clock, channel).run()
+        Router(launch.plan, launch.folder.sockets, launch.clock, channel).run()
         return
     from rbxcompose.runtime.process_group.group import ProcessGroup
 
