@@ -13,7 +13,7 @@ from pathlib import Path
 
 FOLDER = Path("/dev/shm")  # noqa: S108
 POOL = 16 * 1024 * 1024  # [bytes] that a process sets aside for what it sends, once it sends something large
-YOUNG = 1.0  # [s]; a newer file may be about to be locked
+YOUNG = 0.2  # [s]; a newer file may be about to be locked, which follows its creation immediately
 
 
 def problem(folder: Path = FOLDER) -> str:
@@ -30,17 +30,25 @@ def problem(folder: Path = FOLDER) -> str:
     return ""
 
 
-def remove_orphans(folder: Path = FOLDER) -> int:
-    """Remove the files of processes that were killed and return how many; those in use stay, whoever uses them."""
-    return sum(map(_remove_if_orphan, folder.glob("*.zenoh")))
+def remove_orphans(folder: Path = FOLDER, *, waits: bool = False) -> int:
+    """Remove the files of processes that have ended and return how many; those in use stay, whoever uses them.
+
+    New files stay as well, unless it `waits` until they are no longer new.
+    """
+    removed = [_remove_if_orphan(path) for path in folder.glob("*.zenoh")]
+    if waits and None in removed:
+        time.sleep(YOUNG)
+        return removed.count(True) + remove_orphans(folder)
+    return removed.count(True)
 
 
-def _remove_if_orphan(path: Path) -> bool:
+def _remove_if_orphan(path: Path) -> bool | None:
+    """Return whether a file was removed; None if it is too new to be tried."""
     with contextlib.suppress(OSError):  # somebody else's, in use, or gone by now
         descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
         try:
             if os.fstat(descriptor).st_ctime > time.time() - YOUNG:
-                return False
+                return None
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             path.unlink()
             return True

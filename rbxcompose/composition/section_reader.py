@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from rbxcompose.composition.robot_manifest import RobotManifest
+from rbxcompose.config import Secret
 from rbxcompose.findings import Finding, Related, kind
 from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.fill import SHOWN_SECRET
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.registry import broken_sections, naming, sections
 from rbxcompose.manifest.section import ROBOT, Contents, Section
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, key_span
@@ -46,7 +49,7 @@ RESERVED = ("buses", "actuators", "joints", "controllers", "safety", "devices", 
 
 def read_sections(root: MappingNode, file: Path, sim: bool, documents: Documents) -> RobotManifest:
     """Return the robot that a composed and filled tree describes; entries with mistakes are left out."""
-    documents.report.extend([*broken_sections(), *_taken_names(root)])
+    documents.report.extend([*broken_sections(), *_taken_names(root), *_shown_secrets(root)])
     contents = Contents(root, file, documents, sections())
     for section in sections(ROBOT):
         if section.is_composed:
@@ -64,6 +67,14 @@ def reserved_names() -> frozenset[str]:
 def _text(root: MappingNode, key: str) -> str:
     value = root.get(key)
     return value.text if isinstance(value, ScalarNode) else ""
+
+
+def _shown_secrets(root: MappingNode) -> Iterator[Finding]:
+    """Yield a finding for each secret in the header; the header was checked before anything was filled in."""
+    for key in ManifestHeader.model_fields:
+        value = root.get(key)
+        if isinstance(value, ScalarNode) and isinstance(value.filled, Secret):
+            yield SHOWN_SECRET.at(value.span, f"'{key}' cannot hold a secret: everybody sees it")
 
 
 def _taken_names(root: MappingNode) -> Iterator[Finding]:

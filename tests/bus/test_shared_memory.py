@@ -49,6 +49,14 @@ def test_a_file_that_was_just_made_stays(tmp_path: Path) -> None:
     assert young.exists()
 
 
+def test_a_file_that_was_just_made_goes_as_well_if_there_is_time(tmp_path: Path) -> None:
+    young, used = segment(tmp_path, "1"), segment(tmp_path, "2")
+    with used.open("rb") as lock:
+        fcntl.flock(lock, fcntl.LOCK_SH)
+        assert remove_orphans(tmp_path, waits=True) == 1
+    assert (young.exists(), used.exists()) == (False, True)
+
+
 @pytest.mark.usefixtures("later")
 def test_a_link_is_not_followed(tmp_path: Path) -> None:
     target = tmp_path / "precious"

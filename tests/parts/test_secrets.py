@@ -34,6 +34,7 @@ class CloudConfig(Config):
 
 @pytest.fixture(autouse=True)
 def _cloud(monkeypatch: pytest.MonkeyPatch) -> None:
+    registry.usable_names()  # types that are imported later would be forgotten together with this one
     monkeypatch.setattr(registry, "_TYPES", dict(registry._TYPES))
 
     @component("cloud")
@@ -111,6 +112,7 @@ def test_a_link_and_a_folder_are_no_secrets(project: Project) -> None:
 TEXT_ARGUMENT = 'args: {t: {type: text, default: "${secret.token}"}}\n'
 WRONG = [
     ('about: "speaks with ${secret.token}"\n', "RBX1208"),
+    ("about: ${secret.token}\n", "RBX1208"),
     ('components:\n  cloud: {type: cloud, token: "x${secret.token}"}\n', "RBX1208"),
     ("components:\n  cloud: {type: cloud, token: abc}\n", "RBX1004"),
     (ROBOT.replace("}\n", ', name: "${secret.token}"}\n'), "RBX1003"),

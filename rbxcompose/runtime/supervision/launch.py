@@ -178,7 +178,7 @@ def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: 
     for text in told:
         log.write(Record(0.0, Level.WARN, "robot", text))
     ended = _run(Launch(plan, options, log, folder, clock), folder, lock, reports)
-    shared_memory.remove_orphans()  # of processes that were killed
+    shared_memory.remove_orphans(waits=True)
     folder.clear()
     _report(reports, ended)
     return ended.exit_code
