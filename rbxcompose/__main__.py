@@ -1,4 +1,4 @@
-"""Lets `python -m rbxcompose` do what `rbxcompose` does."""
+"""Makes `python -m rbxcompose` the same as `rbxcompose`."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Replacing a file: whole or not at all, whatever happens meanwhile."""
+"""Replacing a file atomically: completely or not at all, even if the write is interrupted."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-TEMPORARY = ".new"  # ends the name of a file that has not taken its place yet
+TEMPORARY = ".new"  # marks a file that has not replaced its target yet
 
 
 def replace_file(path: Path, data: bytes, *, mode: int | None = None) -> None:
-    """Write a file again, or for the first time. Its mode stays; a new one has `mode`, else what new files have.
+    """Create or replace a file. An existing file keeps its mode; a new one gets `mode`, or the default for new files.
 
     Raises:
-        OSError: if it cannot be written; it is as before then.
+        OSError: if it cannot be written; the old file is then unchanged.
     """
     mode = _mode_of(path) if mode is None else mode
     descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=TEMPORARY, dir=path.parent)
@@ -27,14 +27,14 @@ def replace_file(path: Path, data: bytes, *, mode: int | None = None) -> None:
             os.fsync(descriptor)
         os.replace(temporary, path)
     except BaseException:
-        with suppress(OSError):  # what has failed already is told
+        with suppress(OSError):  # the original error is reported, not this one
             os.unlink(temporary)
         raise
     sync_folder(path.parent)
 
 
 def sync_folder(folder: Path) -> None:
-    """Have the names in a folder survive a loss of power."""
+    """Flush a folder to disk, so that its entries survive a power failure."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         os.fsync(descriptor)

@@ -16,7 +16,7 @@ Check = Rule[Robot]
 Find = Callable[[Robot], Iterable[Finding]]
 
 PLUGINS = Plugins("check", "rbxcompose.checks")
-OWN = "RBX"  # begins the codes of this project
+OWN = "RBX"  # prefix of the codes of this project
 _CODE = re.compile(r"[A-Z]+\d+")
 
 
@@ -29,7 +29,7 @@ def check(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = 
     Codes that begin with `RBX` are those of this project; others start with their own word (`LAMP01`).
 
     Raises:
-        ValueError: if it has no docstring, or its code is taken, malformed or not for others.
+        ValueError: if it has no docstring, or its code is taken, malformed or reserved.
     """
 
     def declare(find: Find) -> Check:
@@ -44,14 +44,14 @@ def check(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = 
 
 
 def all_checks() -> list[Check]:
-    """Import every check, those of other packages as far as they are not broken, and return them by code."""
+    """Import every check, except broken ones of other packages, and return them by code."""
     for name in PLUGINS.names():
         _problem(name)
     return [CHECKS[code] for code in sorted(CHECKS)]
 
 
 def broken_checks() -> list[Finding]:
-    """Return what to tell of checks of other packages that are left out."""
+    """Return a finding for each check of another package that is left out."""
     return [LEFT_OUT.at(None, told) for name in sorted(PLUGINS.third_party) if (told := _problem(name))]
 
 
@@ -65,9 +65,9 @@ def _problem(name: str) -> str:
 
 
 def run_checks(robot: Robot, report: Report) -> None:
-    """Add what the checks of missions and of the robot find.
+    """Add the findings of the checks on missions and on the robot.
 
-    Warnings are only about a robot without errors, from which they might follow.
+    Warnings are reported only if there are no errors, since an error might cause them.
     """
     missions = [one for mission in robot.missions.values() for one in check_program(mission.program, robot.names)]
     for severity in (Severity.ERROR, Severity.WARNING):
@@ -81,12 +81,12 @@ def run_checks(robot: Robot, report: Report) -> None:
 
 
 def _found(one: Check, robot: Robot) -> list[Finding]:
-    """Return what a check finds. One of another package that raises an error is no reason not to check the rest."""
+    """Return the findings of a check. If one of another package raises an error, the rest still run."""
     if not _is_foreign(one.find):
         return list(one(robot))
     try:
         return list(one(robot))
-    except Exception as error:  # the code of others may raise anything
+    except Exception as error:  # third-party code may raise anything
         reason = plain(f"{type(error).__name__}: {error}")
         return [LEFT_OUT.at(None, f"the check {one.code} of '{_package(one.find)}' has failed: {reason}")]
 

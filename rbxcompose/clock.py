@@ -13,12 +13,12 @@ from typing import Protocol
 
 NANOSECONDS = 1_000_000_000
 PATIENCE = 0.5  # [s] of real time without an advance, after which outside time stands still
-LEAP = 10.0  # [s] of outside time; a larger advance at once is a jump to another time
-JUMPS, DISPUTE = 3, 2.0  # so many jumps within so much real time [s], and more than one source tells the time
+LEAP = 10.0  # [s] of outside time; a larger single advance is a jump
+JUMPS, DISPUTE = 3, 2.0  # this many jumps within this much real time [s]: several sources publish the time
 
 
 class Clock(Protocol):
-    """What tells the time: robot time for decisions, a stamp for messages."""
+    """A clock: robot time for decisions, a stamp for messages."""
 
     def now(self) -> float:
         """Return robot time [s] since the robot's start."""
@@ -45,7 +45,7 @@ class MonotonicClock:
 
 
 class SteppedClock:
-    """Simulated time: stands still until `advance_to` moves it, never backwards."""
+    """Simulated time: stands still until `advance_to` moves it; never runs backwards."""
 
     def __init__(self, start: float = 0.0) -> None:
         self._now = start
@@ -70,7 +70,7 @@ class SteppedClock:
 
 
 class Turn(Enum):
-    """What has become of a time that is told from outside."""
+    """What happened to the outside time."""
 
     GOES = auto()
     STANDS = auto()
@@ -79,26 +79,27 @@ class Turn(Enum):
 
 
 class ExternalClock(SteppedClock):
-    """Follows a time told from outside, such as a simulator's `/clock`: a stepped clock that may go up to `limit`.
+    """Follows outside time, such as a simulator's `/clock`: a stepped clock that may advance up to `limit`.
 
-    Robot time only goes forwards and by what the outside has advanced, wherever that begins to count; after a jump it
-    goes on from where it was. Where sources disagree, whatever they advance means nothing: it stands still until there
-    has been no jump for `DISPUTE`. Real time [s] is an argument; it counts from when the clock begins to listen.
+    Robot time only runs forwards, and only by what the outside time has advanced, wherever that begins to count; after
+    a jump it continues from where it was. If sources disagree, their advances are ignored: robot time stands still
+    until there has been no jump for `DISPUTE`. Real time [s] is an argument, counted from when the clock starts to
+    listen.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self.limit = 0.0  # [s] of robot time that has been told
+        self.limit = 0.0  # [s] of robot time that outside time allows
         self.is_standing = True
-        self._outside: int | None = None  # [ns] as told last
+        self._outside: int | None = None  # [ns], last value received
         self._shift = 0  # [ns] of outside time at robot time 0
-        self._moved_at = 0.0  # [s] of real time, of the last advance
-        self._has_told = False  # that time stands still
-        self._jumps: deque[float] = deque(maxlen=JUMPS)  # [s] of real time, of the last ones
+        self._moved_at = 0.0  # [s] of real time, at the last advance
+        self._has_told = False  # it has been reported that time stands still
+        self._jumps: deque[float] = deque(maxlen=JUMPS)  # [s] of real time, of the last jumps
         self._is_disputed = False
 
     def stamp(self) -> int:
-        """Return outside time [ns] at this instant, as other programs that follow it write it."""
+        """Return the outside time [ns] of this instant, as other programs that follow it stamp it."""
         return super().stamp() + self._shift
 
     def join(self, t: float) -> None:
@@ -107,10 +108,10 @@ class ExternalClock(SteppedClock):
         self.limit = t
 
     def hear(self, outside: int, *, real: float) -> Turn | None:
-        """Take the time [ns] as the outside tells it; return what is new about it."""
+        """Receive the outside time [ns]; return what has changed, if anything."""
         before, self._outside = self._outside, outside
         if before is None:
-            self._begin_here(outside)  # whether it goes is known from the next one
+            self._begin_here(outside)  # only the next one shows whether it runs
             return None
         if outside == before:
             return None
@@ -128,7 +129,7 @@ class ExternalClock(SteppedClock):
         return Turn.GOES if was_standing else None
 
     def look(self, *, real: float) -> Turn | None:
-        """Return `STANDS`, once, when the last advance lies too far back."""
+        """Return `STANDS`, once, when the last advance was too long ago."""
         if self._has_told or real - self._moved_at < PATIENCE:
             return None
         self._has_told = self.is_standing = True
@@ -136,7 +137,7 @@ class ExternalClock(SteppedClock):
         return Turn.STANDS
 
     def _jumped(self, real: float) -> Turn | None:
-        """Return what a jump tells: many of them together are a dispute, which is news only once."""
+        """Return what to report of a jump: several close together are a dispute, which is reported once."""
         was_disputed = self._is_disputed
         self._jumps.append(real)
         self._is_disputed |= len(self._jumps) == JUMPS and real - self._jumps[0] < DISPUTE
@@ -146,6 +147,6 @@ class ExternalClock(SteppedClock):
         return Turn.JUMPED
 
     def _begin_here(self, outside: int) -> None:
-        """Let the present instant be `outside` [ns]; what was told and has not been reached is left out."""
+        """Map the present instant to `outside` [ns]; received time that has not been reached yet is dropped."""
         self.limit = self.now()
         self._shift = outside - super().stamp()

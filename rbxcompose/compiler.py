@@ -27,9 +27,9 @@ from rbxcompose.plan.model import Plan
 
 @dataclass(slots=True)
 class Compilation:
-    """What came out: a plan unless there are errors, the findings, and the texts that they point into.
+    """The result: a plan unless there are errors, the findings, and the texts that they point into.
 
-    The robot is there as far as it could be read.
+    The robot is as complete as its files could be read.
     """
 
     robot: Robot | None = None
@@ -48,10 +48,10 @@ def compile_robot(
     environment: Mapping[str, str],
     unsaved: Mapping[Path, str] = MappingProxyType({}),
 ) -> Compilation:
-    """Compile a robot's file (a path, a folder with a `robot.yaml`, or `rbx:...`) and tell all its mistakes.
+    """Compile a robot's file (a path, a folder with a `robot.yaml`, or `rbx:...`) and report all its mistakes.
 
-    `overlays` are files that change it. `unsaved` are texts of an editor, by the real path of the file that each stands
-    for. Where no profile was chosen, each profile is tried as well: a broken one is found before it is used.
+    `overlays` are files that change it. `unsaved` are texts from an editor, by the real path of the file that each
+    replaces. If no profile was chosen, each profile is tried as well, so that a broken one is found before it is used.
     """
 
     def compiled(chosen: Sequence[str]) -> Compilation:
@@ -69,7 +69,7 @@ def compile_robot(
         if manifest is None:
             return out
         out.robot = build_robot(manifest, environment=environment, report=out.report, sources=out.sources)
-        if not any(finding.code == TWICE.code for finding in out.report):  # else half of what was written is not there
+        if not any(finding.code == TWICE.code for finding in out.report):  # otherwise half of it is missing
             run_checks(out.robot, out.report)
         out.report.findings = manifest.inclusions.told(out.report.findings)
         return out
@@ -90,9 +90,9 @@ def compile_robot(
 
 
 def _tell_profile(profile: Span, tried: Compilation, out: Compilation, above: Set[str]) -> None:
-    """Add what is wrong only with a profile: inside its own text, and errors that it makes in the robot's files.
+    """Add the findings that only a profile causes: those in its own text, and errors in the robot's files.
 
-    What lies `above` profiles was chosen without this one.
+    `above` names the layers that override profiles: their values were chosen without this profile.
     """
     known = {(finding.code, finding.span) for finding in out.report}
     for finding in tried.report:

@@ -66,9 +66,9 @@ class Place:
 
 
 class Secret:
-    """A text that is never shown: it is `***` wherever it is printed or dumped. `reveal()` gives it.
+    """Text that is never shown: it prints and dumps as `***`. `reveal()` returns it.
 
-    `name` is what the manifest calls it: `${secret.NAME}`.
+    `name` is its name in the manifest: `${secret.NAME}`.
     """
 
     __slots__ = ("_text", "name")
@@ -78,7 +78,7 @@ class Secret:
         self.name = name
 
     def reveal(self) -> str:
-        """Return the text, for the device or service that it is for."""
+        """Return the text, to pass it to the device or service that needs it."""
         return self._text
 
     def __str__(self) -> str:

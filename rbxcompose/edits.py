@@ -1,4 +1,4 @@
-"""Applying fixes to texts, byte-exact outside of what they replace. Pure: reading and writing files is for others."""
+"""Applying fixes to texts, byte-exact outside of what they replace. Pure: callers read and write the files."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 
 from rbxcompose.findings import Edit, Finding, Fix, Sources
 
-COMMAND_LINE = "--"  # names of texts that are no files, such as `--set`, begin so
+COMMAND_LINE = "--"  # prefix of the names of texts that are not files, such as `--set`
 _BYTE_ORDER_MARK = "\ufeff"
 _QUOTES = "'\""
 
 
 @dataclass(frozen=True, slots=True)
 class EditPlace:
-    """Where an edit lands: offsets in the text of a file, and what is to stand there."""
+    """Where an edit applies: offsets in the text of a file, and the new text for them."""
 
     file: str
     start: int
@@ -23,7 +23,7 @@ class EditPlace:
     is_guard: bool = False
 
     def meets(self, other: EditPlace) -> bool:
-        """Return whether both touch the same text, at least one of them changing it."""
+        """Return whether the two edits overlap and at least one of them changes text."""
         if self.file != other.file or (self.is_guard and other.is_guard):
             return False
         return self.start == other.start or (self.start < other.end and other.start < self.end)
@@ -31,7 +31,7 @@ class EditPlace:
 
 @dataclass(slots=True)
 class Applied:
-    """What came of applying fixes: the new texts, the fixes that are in them, and those that met another one."""
+    """The result of applying fixes: the new texts, the fixes applied, and those postponed since they overlap others."""
 
     texts: dict[str, str]
     done: list[Fix] = field(default_factory=list)
@@ -39,10 +39,10 @@ class Applied:
 
 
 def apply(fixes: Iterable[Fix], texts: Mapping[str, str]) -> Applied:
-    """Apply each fix, whole or not at all; of fixes that meet, the first one.
+    """Apply each fix completely or not at all; of overlapping fixes, only the first.
 
-    `texts` are whole files as they stand, with their byte order mark and ends of lines. A fix is left out if one of
-    its edits is not about these files, or finds another text than it expects.
+    `texts` are whole files as they are on disk, with byte order mark and line endings. A fix is skipped if one of its
+    edits is for another file, or does not find the text that it expects.
     """
     lines = {file: _Lines(text) for file, text in texts.items()}
     out = Applied(dict(texts))
@@ -64,7 +64,7 @@ def apply(fixes: Iterable[Fix], texts: Mapping[str, str]) -> Applied:
 
 
 def safe_fixes(findings: Iterable[Finding], sources: Sources) -> list[Fix]:
-    """Return the safe fixes of findings that can be applied to the texts that were read, each once."""
+    """Return the safe fixes that can be applied to the texts that were read, each once."""
     lines: dict[str, _Lines] = {}
     found = []
     for fix in dict.fromkeys(finding.fix for finding in findings):
@@ -79,7 +79,7 @@ def safe_fixes(findings: Iterable[Finding], sources: Sources) -> list[Fix]:
 
 
 def exact(fix: Fix | None, sources: Sources) -> Fix | None:
-    """Return a fix whose edits say where they land in the texts that were read (within quotes), None if they do not."""
+    """Return a fix whose edits span exactly the text they replace (within quotes), None if they do not apply."""
     if fix is None:
         return None
     edits = []
@@ -96,14 +96,14 @@ def exact(fix: Fix | None, sources: Sources) -> Fix | None:
 
 
 def _places(fix: Fix, lines: Mapping[str, _Lines]) -> list[EditPlace] | None:
-    """Return where all edits of a fix land, None if one of them finds another text than it expects."""
+    """Return the places of all edits of a fix, None if one of them does not find the text that it expects."""
     found = [lines[edit.span.file].place(edit) if edit.span.file in lines else None for edit in fix.edits]
     places = [place for place in found if place is not None]
     return places if len(places) == len(found) else None
 
 
 class _Lines:
-    """A text by lines and columns, which count characters from 1; a byte order mark counts as none."""
+    """A text by lines and columns, which count characters from 1; a byte order mark is not counted."""
 
     def __init__(self, text: str) -> None:
         self.text = text

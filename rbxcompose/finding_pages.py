@@ -1,4 +1,4 @@
-"""The pages of the kinds of findings: what a code means, why it matters, how it is wrong and how it is right."""
+"""The pages of the kinds of findings: what a code means, why it matters, a bad and a good example."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _BLOCK = re.compile(r"^```\w*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def all_kinds() -> dict[str, FindingKind]:
-    """Import every module that declares a kind of finding, those of installed plug-ins too, and return all by code."""
+    """Import every module that declares a kind of finding, including those of plug-ins, and return all by code."""
     for folder in rbxcompose.__path__:
         for module in pkgutil.walk_packages([folder], "rbxcompose."):
             path = Path(folder, *module.name.split(".")[1:]).with_suffix(".py")
@@ -62,12 +62,12 @@ def body_of(kind: FindingKind) -> str:
 
 
 def family_of(kind: FindingKind) -> str:
-    """Return what the kinds with the same first two digits are about."""
+    """Return the topic of the kinds that share the first two digits."""
     return FAMILIES.get(kind.code.removeprefix("RBX")[:2], "other")
 
 
 def facts_of(kind: FindingKind) -> str:
-    """Return what is known of a kind, in one line: "error; keys and values; fix: automatic"."""
+    """Return a summary of a kind in one line: "error; keys and values; fix: automatic"."""
     fix = ["fix: automatic ('check --fix')"] if kind.is_fixable else []
     return "; ".join([kind.severity.value, family_of(kind), *fix])
 

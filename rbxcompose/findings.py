@@ -1,6 +1,6 @@
-"""Findings: what the compiler says of a manifest, as data with a place, and how it is written for a person.
+"""Findings: what the compiler reports about a manifest, as data with a place, and how it is worded for people.
 
-A stage never prints or raises for a user's mistake; it adds a `Finding` to the `Report` that it was given.
+A stage never prints or raises for a user's mistake; it adds a `Finding` to the `Report` it was given.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from enum import StrEnum
 from functools import lru_cache
 from typing import NamedTuple
 
-SIMILAR = 0.6  # difflib ratio from which on a name is offered as "did you mean"
+SIMILAR = 0.6  # difflib ratio above which a name is offered as "did you mean"
 MOST_NAMES = 6  # valid names listed when none is similar
-SURE = 0.8  # difflib ratio from which on a similar name may be written in the place of a misspelt one,
-LEAD = 0.1  # if no other name comes that near to it
+SURE = 0.8  # difflib ratio above which a similar name may replace a misspelt one,
+LEAD = 0.1  # if it leads every other name by this much
 VALID = "valid names"
-MOST_COMPARED = 100  # names, before only those that are one slip away are looked at
+MOST_COMPARED = 100  # names; with more, only those one slip away are considered
 _LONGEST_COMPARED = 60  # characters of a name
 
 
 class Severity(StrEnum):
-    """How bad a finding is; only errors keep a robot from starting."""
+    """The severity of a finding; only errors keep a robot from starting."""
 
     ERROR = "error"
     WARNING = "warning"
@@ -53,7 +53,7 @@ class Span(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Related:
-    """A second place that a finding is about, with a few words on what is there."""
+    """A second place that a finding is about, with a short note on it."""
 
     span: Span
     message: str
@@ -61,10 +61,10 @@ class Related:
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """`text` to be written in the place of `old`, which must be what stands at `span` (perhaps in quotes).
+    """Replaces `old`, the text required at `span` (perhaps in quotes), with `text`.
 
-    If it is not, there is nothing to be edited: the value came from elsewhere, or is written in another way. An edit
-    whose `text` is `old` changes nothing and only guards what must stand there.
+    If `old` is not there, the edit does not apply: the value came from elsewhere, or is written in another way. An edit
+    whose `text` equals `old` changes nothing; it only guards that the text is there.
     """
 
     span: Span
@@ -74,7 +74,7 @@ class Edit:
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """Edits that together cure a mistake; a safe one cannot change what the author meant. `title` says what it does."""
+    """Edits that together correct a mistake; a safe fix cannot change what the author meant. `title` describes it."""
 
     edits: tuple[Edit, ...]
     is_safe: bool
@@ -99,7 +99,7 @@ class Finding:
 class FindingKind:
     """A kind of finding: a stable code and the text of its docs page (first line: title).
 
-    `is_fixable` tells that `check --fix` cures at least some of its findings.
+    `is_fixable` means that `check --fix` corrects at least some of its findings.
     """
 
     code: str
@@ -131,9 +131,9 @@ class FindingKind:
         taken: Collection[str] = (),
         within: str = "",
     ) -> Finding:
-        """Return a finding about a `name` at `span` that is none of `valid`, with what was probably meant.
+        """Return a finding about a `name` at `span` that is not in `valid`, with the name that was probably meant.
 
-        `what` are the valid ones if none is near; see `correction` for the rest.
+        `what` describes the valid names, which are listed if none is similar; see `correction` for the other arguments.
         """
         names = list(valid)
         fix = correction(name, names, span, taken=taken, within=within)
@@ -167,11 +167,11 @@ class Report:
     findings: list[Finding] = field(default_factory=list)
 
     def add(self, finding: Finding) -> None:
-        """Keep one finding."""
+        """Add one finding."""
         self.findings.append(finding)
 
     def extend(self, findings: Iterable[Finding]) -> None:
-        """Keep several findings."""
+        """Add several findings."""
         self.findings.extend(findings)
 
     @property
@@ -180,7 +180,7 @@ class Report:
         return any(finding.severity is Severity.ERROR for finding in self.findings)
 
     def __iter__(self) -> Iterator[Finding]:
-        """Yield the findings once each, by place."""
+        """Yield each distinct finding once, sorted by place."""
         return iter(sorted(dict.fromkeys(self.findings), key=_place))
 
 
@@ -202,9 +202,9 @@ def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
 
 
 def nearest(name: str, valid: Iterable[str], *, most: int = 1, cutoff: float = SIMILAR) -> list[str]:
-    """Return the valid names that are most like `name`, the nearest first; among very many, only those one slip away.
+    """Return the valid names most similar to `name`, nearest first; among very many, only those one slip away.
 
-    A comparison takes its time, and a file may have thousands of names that are all wrong.
+    Comparing takes time, and a file may contain thousands of wrong names.
     """
     names = frozenset(valid)
     if len(names) > MOST_COMPARED:
@@ -215,7 +215,7 @@ def nearest(name: str, valid: Iterable[str], *, most: int = 1, cutoff: float = S
 
 @lru_cache(maxsize=8)
 def _slips(names: frozenset[str]) -> dict[str, list[str]]:
-    """Return which names become which text when one character is left out, or none."""
+    """Return, for each text that is left when at most one character is removed, the names it comes from."""
     found: dict[str, list[str]] = {}
     for name in names:
         for short in _shortened(name):
@@ -231,10 +231,10 @@ def _shortened(name: str) -> set[str]:
 def correction(
     name: str, valid: Iterable[str], span: Span | None, *, taken: Collection[str] = (), within: str = ""
 ) -> Fix | None:
-    """Return the safe fix for a misspelt `name` at `span`, None where more than one name may be meant, or none.
+    """Return the safe fix for a misspelt `name` at `span`, None if no name or more than one may be meant.
 
-    `taken` are names that are used there already, so that writing one again would be a mistake of its own. Where the
-    name is only a part of the text at `span`, `within` is the whole text, in which it comes first.
+    `taken` are names already used there: using one again would be a mistake, too. If the name is only part of the text
+    at `span`, `within` is the whole text, and `name` is its first occurrence there.
     """
     meant = surely_meant(name, set(valid))
     if span is None or meant is None or meant in taken:
@@ -245,12 +245,12 @@ def correction(
 
 
 def replacement(span: Span, old: str, new: str, *, is_safe: bool = True) -> Fix:
-    """Return the fix that writes `new` in the place of `old`."""
+    """Return the fix that replaces `old` with `new`."""
     return Fix((Edit(span, old, new),), is_safe, f"'{old}' -> '{new}'")
 
 
 def surely_meant(name: str, valid: Iterable[str]) -> str | None:
-    """Return the only name that `name` can be a slip of the hand for."""
+    """Return the one name that `name` is a typing slip for, None if there is no such name."""
     near = nearest(name, valid, most=2, cutoff=SURE - LEAD)
     ratios = [_similarity(one, name) for one in near]
     is_near = bool(near) and (ratios[0] >= SURE or _is_swap(name, near[0]))
@@ -263,7 +263,7 @@ def _similarity(one: str, other: str) -> float:
 
 
 def _is_swap(name: str, meant: str) -> bool:
-    """Return whether two neighbouring characters have changed places."""
+    """Return whether two neighbouring characters are swapped."""
     swaps = (name[:at] + name[at + 1] + name[at] + name[at + 2 :] for at in range(len(name) - 1))
     return meant in swaps
 
@@ -278,4 +278,4 @@ def _is_slip(name: str, meant: str) -> bool:
     return all(_similarity(word, other) >= SIMILAR for word, other in zip(words, others, strict=True))
 
 
-Sources = Mapping[str, str]  # text of every file that a span may name
+Sources = Mapping[str, str]  # text of every file that a span may refer to

@@ -1,6 +1,6 @@
 """Formats of findings: each is one file in `rendering/`, declared by one decorator, found by its name.
 
-A file that would be named like something of Python's ends in an underscore, which is no part of the format's name.
+A file whose name would clash with one of Python's ends in an underscore, which is not part of the format's name.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _RENDERS: dict[str, Render] = {}
 
 
 def output_format(name: str) -> Callable[[R], R]:
-    """Declare how findings are written under `--format NAME`."""
+    """Declare the function that writes findings for `--format NAME`."""
 
     def declare(render: R) -> R:
         _RENDERS[name] = render
@@ -35,7 +35,7 @@ def format_names() -> list[str]:
 
 
 def renderer(name: str) -> Render:
-    """Return what writes findings in a format.
+    """Return the function that writes findings in a format.
 
     Raises:
         KeyError: if there is no such format.

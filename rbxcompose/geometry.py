@@ -1,6 +1,6 @@
 """Geometry of poses: planar ones for a base, spatial transforms for frames.
 
-Lengths are metres, angles radians, turning left is positive. `T_a_b` stands for the pose of frame b in frame a, so that
+Lengths are metres, angles radians, turning left is positive. `T_a_b` is the pose of frame b in frame a, so that
 `T_a_b.compose(T_b_c)` is `T_a_c`.
 """
 
@@ -17,7 +17,7 @@ NO_ROTATION: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
 def wrap_angle(angle: float) -> float:
-    """Return the same direction as `angle` [rad], within (-pi, pi]."""
+    """Return `angle` [rad] wrapped to (-pi, pi]."""
     wrapped = math.remainder(angle, math.tau)
     return math.pi if wrapped == -math.pi else wrapped
 
@@ -31,7 +31,7 @@ class Velocity2:
 
     @property
     def is_finite(self) -> bool:
-        """Return whether both parts are numbers that can be driven."""
+        """Return whether both parts are finite numbers."""
         return math.isfinite(self.linear) and math.isfinite(self.angular)
 
 
@@ -40,7 +40,7 @@ AT_REST = Velocity2()
 
 @dataclass(frozen=True, slots=True)
 class Pose2:
-    """Pose in the plane: `x`, `y` [m] and `heading` [rad]; what the methods return has its heading in (-pi, pi]."""
+    """Pose in the plane: `x`, `y` [m] and `heading` [rad]; poses returned by methods have it in (-pi, pi]."""
 
     x: float = 0.0
     y: float = 0.0
@@ -61,15 +61,15 @@ class Pose2:
         return Pose2(-cos * self.x - sin * self.y, sin * self.x - cos * self.y, wrap_angle(-self.heading))
 
     def distance(self, other: Pose2) -> float:
-        """Return the straight distance to `other` [m]; headings do not count."""
+        """Return the straight-line distance to `other` [m]; headings are ignored."""
         return math.hypot(other.x - self.x, other.y - self.y)
 
     def bearing(self, other: Pose2) -> float:
-        """Return by how much to turn left [rad] in order to face `other`, within (-pi, pi]."""
+        """Return the angle to turn left [rad] to face `other`, within (-pi, pi]."""
         return wrap_angle(math.atan2(other.y - self.y, other.x - self.x) - self.heading)
 
     def moved(self, velocity: Velocity2, duration: float) -> Pose2:
-        """Return the pose after `duration` [s] at a constant `velocity`: the exact arc, by its chord."""
+        """Return the pose after `duration` [s] at a constant `velocity`: the exact arc, computed by its chord."""
         half_turn = velocity.angular * duration / 2
         chord = velocity.linear * duration * (math.sin(half_turn) / half_turn if half_turn else 1.0)
         direction = self.heading + half_turn
@@ -86,7 +86,7 @@ def quaternion_from_yaw(yaw: float) -> Quaternion:
 
 
 def yaw_of(rotation: Quaternion) -> float:
-    """Return the yaw [rad] of a unit quaternion, that is the direction of its x axis seen from above."""
+    """Return the yaw [rad] of a unit quaternion: the direction of its x axis seen from above."""
     x, y, z, w = rotation
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
@@ -128,7 +128,7 @@ class Transform3:
         return cls((pose.x, pose.y, 0.0), quaternion_from_yaw(pose.heading))
 
     def to_pose2(self) -> Pose2:
-        """Return the pose seen from above: height, roll and pitch are left out."""
+        """Return the pose seen from above, without height, roll and pitch."""
         return Pose2(self.translation[0], self.translation[1], yaw_of(self.rotation))
 
     def apply(self, point: Vector3) -> Vector3:

@@ -1,6 +1,6 @@
-"""Finding plug-ins: one file is one plug-in, its name is the plug-in's name; nothing is imported before it is used.
+"""Finding plug-ins: one file is one plug-in, its name is the plug-in's name; none is imported before it is used.
 
-Ours lie in one package per family (`component`, `check`, ...). Third parties announce theirs under the entry-point
+Our own are in one package per family (`component`, `check`, ...). Third parties register theirs under the entry-point
 group `rbxcompose.plugins` as `FAMILY.NAME = "package.module"` and use the same decorators.
 """
 
@@ -45,11 +45,11 @@ Upgrade the package, uninstall it, or report it to its authors.
 
 
 class BrokenPluginError(Exception):
-    """Raised when a plug-in of another package cannot be used; its text names plug-in and package, and says why."""
+    """Raised when a plug-in of another package cannot be used; its text names plug-in, package and reason."""
 
 
 class Plugins:
-    """The modules of one family, by name; importing one lets its decorator register what it holds."""
+    """The modules of one family, by name; importing one lets its decorator register its contents."""
 
     def __init__(self, family: str, package: str) -> None:
         self.family, self.package = family, package
@@ -62,7 +62,7 @@ class Plugins:
 
     @cached_property
     def third_party(self) -> dict[str, tuple[EntryPoint, ...]]:
-        """Entry points of other distributions, by name; two of one name are a clash."""
+        """Entry points of other distributions, by name; two with the same name conflict."""
         from importlib.metadata import entry_points  # slow to import, and most commands need no plug-in
 
         prefix = f"{self.family}."
@@ -81,7 +81,7 @@ class Plugins:
         """Import the plug-in of this name; return whether there is one.
 
         Raises:
-            BrokenPluginError: if it is one of another package and cannot be imported.
+            BrokenPluginError: if it belongs to another package and cannot be imported.
         """
         if name in self.shipped:
             importlib.import_module(f"{self.package}.{name}")
@@ -93,18 +93,18 @@ class Plugins:
             raise self.broken(name, "more than one package announces it")
         try:
             entry.load()
-        except (Exception, SystemExit) as error:  # what the code of others raises while it is imported may be anything
+        except (Exception, SystemExit) as error:  # third-party code may raise anything while it is imported
             raise self.broken(name, f"{type(error).__name__}: {error}") from error
         return True
 
     def overshadowed(self, name: str) -> str:
-        """Return what to tell of a name of ours that other packages announce as well; empty if none does."""
+        """Return the message for a name of ours that other packages register as well; empty if none does."""
         if name not in self.shipped or name not in self.third_party:
             return ""
         return f"the {self.family} '{name}' of {self._packages(name)} is left out: rbxcompose has one of this name"
 
     def broken(self, name: str, reason: str) -> BrokenPluginError:
-        """Return the error that tells why a plug-in of another package cannot be used."""
+        """Return the error that reports why a plug-in of another package cannot be used."""
         return BrokenPluginError(
             f"the {self.family} '{plain(name, 60)}' of {self._packages(name)} cannot be used: {plain(reason)}"
         )

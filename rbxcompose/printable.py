@@ -15,7 +15,7 @@ _SHORT = {"\t": "\\t", "\n": "\\n", "\r": "\\r"}
 
 
 def code_point(character: str) -> str:
-    """Return the name of a character as `U+001B`."""
+    """Return the code point of a character: `U+001B`."""
     return f"U+{ord(character):04X}"
 
 
@@ -27,23 +27,23 @@ def _visible(match: re.Match[str]) -> str:
 
 
 def plain(text: str, limit: int = 200) -> str:
-    """Return `text` on one line with what is invisible spelt out, cut after `limit` characters with a count."""
+    """Return `text` on one line with invisible characters spelt out, cut after `limit` characters with a count."""
     shown = _INVISIBLE.sub(_visible, text[:limit])
     return f"{shown}... ({len(text) - limit:,} more characters)" if len(text) > limit else shown
 
 
 def escaped(json: str) -> str:
-    """Return a JSON text, in whose strings nothing can move the cursor, hide or reorder text."""
+    """Return a JSON text whose strings contain nothing that can move the cursor, hide or reorder text."""
     return FORBIDDEN.sub(lambda match: f"\\u{ord(match.group()):04x}", json)
 
 
 def columns(text: str) -> int:
-    """Return how many columns of a terminal a text takes."""
+    """Return the number of terminal columns that a text takes."""
     return sum(map(_columns, text))
 
 
 def fitted(text: str, width: int) -> str:
-    """Return `text` cut to at most `width` columns of a terminal, with dots where something is left out."""
+    """Return `text` cut to at most `width` terminal columns, with dots where something was cut."""
     if columns(text) <= width:
         return text
     kept, room = "", width - 3

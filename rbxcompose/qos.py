@@ -6,17 +6,17 @@ from enum import StrEnum
 
 
 class Qos(StrEnum):
-    """What a topic is for; the bus derives queue depth, reliability, priority and congestion control from it."""
+    """The purpose of a topic; the bus derives queue depth, reliability, priority and congestion control from it."""
 
     COMMAND = "command"  # newest wins, dropped rather than late
     STATE = "state"  # newest wins, a few kept
-    LATCHED = "latched"  # the last one is kept for who comes later
+    LATCHED = "latched"  # the last one is kept for late subscribers
     EVENT = "event"  # none may be lost
     BULK = "bulk"  # large, lowest priority
 
     @property
     def depth(self) -> int:
-        """Return how many messages a subscriber keeps before the oldest is dropped."""
+        """Return how many messages a subscriber queues before it drops the oldest."""
         return _DEPTH[self]
 
 

@@ -1,7 +1,7 @@
-"""Fields that name something of the robot: which kind of name they take, and whether it exists.
+"""Fields that refer to something in the robot by name: the kind of name they take, and whether it exists.
 
-A section of the manifest tells which names of a kind there are. A field says that it takes one by its type:
-`joint: Annotated[Name, Refers("joint")]`. Renaming of parts, completion, definitions and schemas follow from that.
+A section of the manifest defines the names of a kind. A field says that it takes one by its type:
+`joint: Annotated[Name, Refers("joint")]`. Renaming of parts, completion, definitions and schemas all derive from that.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ TOPIC, FILE, ANYTHING = "topic", "file", "anything"
 
 NAMES = "x-names"
 """The keyword of schemas that says of what the name stands there."""
-_HIDDEN = (TOPIC, ANYTHING)  # kinds of which editors know no names
+_HIDDEN = (TOPIC, ANYTHING)  # kinds whose names editors do not know
 
 Known = Mapping[str, Mapping[str, object]]
 """The context of a validation: kind of name -> name -> what it stands for."""
@@ -33,10 +33,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Refers:
-    """Marks a field that takes the name of something: `kind` is of what.
+    """Marks a field that takes the name of something; `kind` is the kind of thing it names.
 
-    A name that does not exist is a finding, if the context of the validation knows names of that kind. It is none
-    where a check `is_told`, which has more to say. A field that is no text holds what the name stands for.
+    A name that does not exist is a finding if the validation context knows the names of that kind, unless a check
+    reports it in more detail (`is_told`). A field that is not text holds the thing named.
     """
 
     kind: str
@@ -57,14 +57,14 @@ class Refers:
         return made if self.kind in _HIDDEN else {**made, NAMES: self.kind}
 
     def _name(self, name: str, info: ValidationInfo) -> str:
-        """Return a name that there is."""
+        """Return the name if it exists."""
         known: Known = info.context or {}
         if self.kind in known and name not in known[self.kind]:
             raise self._unknown(name, known[self.kind])
         return name
 
     def _thing(self, wanted: type[T]) -> Callable[[object, ValidationInfo], object]:
-        """Return what gives the thing that a name stands for."""
+        """Return the function that replaces a name with the thing it names."""
 
         def find(value: object, info: ValidationInfo) -> object:
             if isinstance(value, wanted):
@@ -84,5 +84,5 @@ class Refers:
 
 
 def plural(kind: str) -> str:
-    """Return what several things of a kind are called."""
+    """Return the plural of a kind."""
     return f"{kind}{'es' if kind.endswith(('s', 'x', 'ch')) else 's'}"

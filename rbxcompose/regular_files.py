@@ -9,21 +9,21 @@ from typing import BinaryIO
 
 
 class NotRegularError(OSError):
-    """Raised when a path leads to a pipe, a device, a folder: to no regular file."""
+    """Raised when a path does not lead to a regular file, but to a pipe, a device or a folder."""
 
 
 class TooLargeError(OSError):
-    """Raised when a file is larger than the limit of its kind."""
+    """Raised when a file exceeds the size limit of its kind."""
 
 
 def open_regular(path: Path, *, follow: bool = True) -> BinaryIO:
-    """Open a file of a user for reading; with `follow=False` no link is followed at its end.
+    """Open a user's file for reading; with `follow=False` the path must not end in a link.
 
     Raises:
         NotRegularError: if it is not a regular file.
-        OSError: if it is not there or may not be read.
+        OSError: if it does not exist or cannot be read.
     """
-    # O_NONBLOCK: a pipe without a writer would hold us up before we know what it is.
+    # O_NONBLOCK: opening a pipe without a writer would block before we know what it is.
     flags = os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | (0 if follow else os.O_NOFOLLOW)
     descriptor = os.open(path, flags)
     try:
@@ -36,12 +36,12 @@ def open_regular(path: Path, *, follow: bool = True) -> BinaryIO:
 
 
 def read_regular(path: Path, most: int) -> bytes:
-    """Return what a file of a user holds.
+    """Return the contents of a user's file.
 
     Raises:
-        TooLargeError: if that is more than `most` [B].
+        TooLargeError: if it is larger than `most` [B].
         NotRegularError: if it is not a regular file.
-        OSError: if it is not there or may not be read.
+        OSError: if it does not exist or cannot be read.
     """
     with open_regular(path) as file:
         data = file.read(most + 1)

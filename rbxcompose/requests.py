@@ -1,6 +1,6 @@
-"""What people and tools may ask of a running robot: typed requests, each with the type of its answer.
+"""Requests that people and tools may send to a running robot: typed, each with the type of its answer.
 
-A request is a frozen dataclass. Who takes it marks a method with `answers`; `answering` finds all of these.
+A request is a frozen dataclass. Whoever handles it marks a method with `answers`; `answering` finds all of these.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ class Refused(Exception):  # noqa: N818 - it is an answer, not an error of ours
 
 
 class Request(Generic[A]):
-    """A request, answered with an `A`; subclass `Command` or `Query`."""
+    """A request whose answer is an `A`; subclass `Command` or `Query`."""
 
     about: ClassVar[str]
     """What it is about: who takes it is said to be of this type."""
 
     @classmethod
     def name(cls) -> str:
-        """Return the name by which it goes from process to process."""
+        """Return the name that identifies the request between processes."""
         return f"{cls.about}.{cls.__name__}"
 
     @classmethod
@@ -42,7 +42,7 @@ class Request(Generic[A]):
 
     @property
     def words(self) -> str:
-        """Return it as a person would say it, for the log."""
+        """Return the request in a person's words, for the log."""
         return type(self).__name__
 
 
@@ -51,7 +51,7 @@ class Command(Request[str]):
 
 
 class Query(Request[A]):
-    """A question that changes nothing and may be asked as often as one likes."""
+    """A question that changes nothing and may be repeated at will."""
 
 
 Requests = Family[Request[Any]]
@@ -68,7 +68,7 @@ def as_data(request: Request[Any]) -> dict[str, Any]:
 
 
 def answers(request: type[Request[A]]) -> Callable[[Callable[[Taker, Taken], A]], Callable[[Taker, Taken], A]]:
-    """Mark the method that carries out a type of request: it takes one and returns the answer, or raises `Refused`."""
+    """Mark the method that handles a type of request: it takes one and returns the answer, or raises `Refused`."""
 
     def mark(method: Callable[[Taker, Taken], A]) -> Callable[[Taker, Taken], A]:
         setattr(method, _MARK, request)
@@ -78,7 +78,7 @@ def answers(request: type[Request[A]]) -> Callable[[Callable[[Taker, Taken], A]]
 
 
 def answering(cls: type) -> Mapping[type[Request[Any]], str]:
-    """Return the names of the methods of a class that answer requests, by type of request."""
+    """Return the names of the methods of a class that handle requests, by type of request."""
     return _answering(cls)
 
 

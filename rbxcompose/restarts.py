@@ -1,4 +1,4 @@
-"""When what has failed is tried again: the option `restart` of a component."""
+"""When a failed component is restarted: the option `restart`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ When = Literal["on_failure", "always", "never"]
 
 
 class Restart(Config):
-    """When a component that has failed is tried again."""
+    """When a failed component is restarted."""
 
     when: When = "on_failure"
     """`on_failure` ends the robot after `max` failures, `always` never gives up, `never` leaves it failed."""

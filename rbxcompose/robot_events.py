@@ -1,4 +1,4 @@
-"""What a component reports to its supervisor because it concerns the whole robot."""
+"""Events that a component reports to its supervisor because they concern the whole robot."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class MissionOver:
-    """A mission has ended with `outcome`; with the one that `up` started, the robot may go down."""
+    """A mission has ended with `outcome`; when the one that `up` started ends, the robot may go down."""
 
     mission: str
     outcome: str
@@ -16,7 +16,7 @@ class MissionOver:
 
 @dataclass(frozen=True, slots=True)
 class MissionWaits:
-    """A mission cannot begin, since a value does not come; `message` says which."""
+    """A mission cannot begin because a value has not arrived; `message` names it."""
 
     mission: str
     message: str

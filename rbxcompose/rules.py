@@ -1,6 +1,6 @@
 """Rules: functions that find one kind of error, declared by a decorator; the docstring is the docs page of the code.
 
-What a rule looks at depends on its family: the checks of `checks/` look at a robot, those of `missions/checks` at a
+The subject of a rule depends on its family: the checks in `checks/` examine a robot, those in `missions/checks` a
 mission.
 """
 
@@ -15,7 +15,7 @@ from typing import Generic, TypeVar
 from rbxcompose.findings import Finding, FindingKind, Severity, register_kind
 
 S = TypeVar("S")
-MOST = 100  # findings of one rule about one subject: pairs of a thousand things are a million
+MOST = 100  # findings of one rule about one subject: a thousand things make a million pairs
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class Rule(FindingKind, Generic[S]):
     find: Callable[[S], Iterable[Finding]] = lambda subject: ()
 
     def __call__(self, subject: S) -> Iterable[Finding]:
-        """Return what is wrong with `subject`; of very much, the first `MOST` findings."""
+        """Return what is wrong with `subject`: at most the first `MOST` findings."""
         found = list(islice(self.find(subject), MOST + 1))
         if len(found) > MOST:
             rest = f"there are more than these {MOST} findings of {self.code}"
@@ -47,5 +47,5 @@ def declared(find: Callable[[S], Iterable[Finding]], code: str, severity: Severi
 
 
 def belonging(find: Callable[[S], Iterable[Finding]], kind: FindingKind) -> Rule[S]:
-    """Return a rule for a kind of finding that is declared elsewhere, since others than rules find it as well."""
+    """Return a rule for a kind of finding that is declared elsewhere, because not only rules find it."""
     return Rule(kind.code, kind.doc, kind.severity, kind.is_fixable, find=find)

@@ -1,7 +1,7 @@
 """The scheduler of one process: what is due, in an order that never depends on chance.
 
-It is pure: it knows no clock and no thread. A driver tells it the time by `advance(t)`; in real time that is the
-monotonic clock, in simulated time the instant of the next event. Events run by time, then owner, then sequence.
+It is pure: it uses no clock and no thread. A driver passes the time to `advance(t)`: in real time that of the monotonic
+clock, in simulated time that of the next event. Events run by time, then owner, then sequence.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ Callback = Callable[[], None]
 OnError = Callable[[str, Exception], None]
 Observe = Callable[[str, Callback], None]  # runs the callback and may time it
 
-MOST_AT_ONCE = 100_000  # events at one instant before we call it a loop that never ends
+MOST_AT_ONCE = 100_000  # events at one instant before we call it an endless loop
 
 
 @dataclass(eq=False, slots=True)
 class ScheduledCallback:
-    """A callback that is due; `cancel` makes it none."""
+    """A callback that is due; `cancel` discards it."""
 
     callback: Callback | None
 
     def cancel(self) -> None:
-        """Forget the callback; the event then passes unseen."""
+        """Drop the callback; the event then does nothing."""
         self.callback = None
 
 
@@ -42,7 +42,7 @@ class Scheduler:
     """Due timers and arrived inputs of one process, all run by one thread through `advance`."""
 
     def __init__(self, on_error: OnError = _raise, observe: Observe = _run) -> None:
-        self.now = 0.0  # [s] of robot time, of the latest `advance`
+        self.now = 0.0  # [s] of robot time at the latest `advance`
         self.on_error = on_error
         self.observe = observe
         # By time [s], owner, sequence: tuples, since comparing them is most of the work of a heap.
@@ -50,13 +50,13 @@ class Scheduler:
         self._sequence = count()
 
     def at(self, time: float, owner: str, callback: Callback) -> ScheduledCallback:
-        """Run `callback` for `owner` once at robot time `time` [s] (at once, if that is past)."""
+        """Run `callback` for `owner` once at robot time `time` [s] (immediately, if that is past)."""
         event = ScheduledCallback(callback)
         heapq.heappush(self._events, (max(time, self.now), owner, next(self._sequence), event))
         return event
 
     def post(self, owner: str, callback: Callback) -> ScheduledCallback:
-        """Run `callback` for `owner` at the present instant, after what runs now."""
+        """Run `callback` for `owner` at the present instant, after the callback that is running now."""
         return self.at(self.now, owner, callback)
 
     def every(self, period: float, owner: str, callback: Callable[[float], None]) -> Periodic:
@@ -64,22 +64,22 @@ class Scheduler:
         return Periodic(self, period, owner, callback)
 
     def remove(self, owner: str) -> None:
-        """Cancel all that is due for `owner`."""
+        """Cancel all callbacks of `owner`."""
         for _, whose, _, event in self._events:
             if whose == owner:
                 event.cancel()
 
     def next_due(self) -> float | None:
-        """Return the time of the next event [s], or None if nothing is due ever."""
+        """Return the time of the next event [s], None if there is none."""
         while self._events and self._events[0][3].callback is None:
             heapq.heappop(self._events)
         return self._events[0][0] if self._events else None
 
     def advance(self, t: float) -> None:
-        """Run everything that is due until `t` [s], also what comes up meanwhile.
+        """Run everything that is due until `t` [s], including events added meanwhile.
 
         Raises:
-            RuntimeError: if events at one instant never end.
+            RuntimeError: if the events at one instant do not end.
         """
         self.now = max(self.now, t)
         for _ in range(MOST_AT_ONCE):
@@ -96,14 +96,14 @@ class Scheduler:
             return
         try:
             self.observe(owner, callback)
-        except Exception as error:  # a component's mistake must not stop its neighbours
+        except Exception as error:  # an error in one component must not stop its neighbours
             self.on_error(owner, error)
 
 
 class Periodic:
-    """A timer on an absolute grid: cycles that were missed are skipped and counted, never run in a burst."""
+    """A timer on an absolute grid: missed cycles are skipped and counted, never run in a burst."""
 
-    LONGEST_DT = 2.0  # a step is never told of more than this many periods
+    LONGEST_DT = 2.0  # a step never gets a `dt` of more than this many periods
 
     def __init__(self, scheduler: Scheduler, period: float, owner: str, callback: Callable[[float], None]) -> None:
         if period <= 0:
@@ -111,7 +111,7 @@ class Periodic:
         self.missed = 0
         self._scheduler, self._period, self._owner, self._callback = scheduler, period, owner, callback
         self._last = scheduler.now
-        # A grid that all timers of this period share, so that one waking of the process serves several of them.
+        # All timers of this period share one grid, so that a single wake-up of the process serves several of them.
         self._start = math.floor(scheduler.now / period) * period
         self._cycle = 0
         self._event = self._schedule()

@@ -1,8 +1,9 @@
 """Slips: beginners' mistakes that are recognised, reported with their correction, and read as they were meant.
 
-What compilers call error productions: each is one file, beside the grammar instead of in it. A slip of a tree sees a
-node at a place of its grammar and returns a `Repair`: what there is to say, and the node to go on with. So the reader
-behind them meets no slip, and is the grammar. A family of slips is a package of files and one `Slips` as decorator.
+Compiler writers call them error productions: each is one file, beside the grammar instead of in it. A slip in a tree
+looks at a node at one place of its grammar and returns a `Repair`: the findings, and the node to continue with. So the
+reader that follows sees no slips, only the grammar. A family of slips is a package of files with one `Slips` as
+decorator.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ N = TypeVar("N")
 
 @dataclass(frozen=True, slots=True)
 class Repair(Generic[N]):
-    """The node to go on with in the place of one with a slip, and what is said of the slip."""
+    """The node that replaces one with a slip, and the findings about the slip."""
 
     node: N
     findings: tuple[Finding, ...]
@@ -39,7 +40,7 @@ class Slips(Generic[Find]):
         self._earlier: dict[Find, set[Find]] = {}
 
     def __call__(self, *places: str, after: Iterable[Find] = (), before: Iterable[Find] = ()) -> Callable[[Find], Find]:
-        """Declare what recognises a slip at some places; it looks at a node `after` some others and `before` some."""
+        """Declare a function that recognises a slip at some places; it runs `after` and `before` certain others."""
 
         def declare(find: Find) -> Find:
             self._places[find] = places
@@ -51,7 +52,7 @@ class Slips(Generic[Find]):
         return declare
 
     def at(self, place: str) -> list[Find]:
-        """Return the slips of a place in their order: by name, as far as none was declared."""
+        """Return the slips of a place in order: by name, unless `after` or `before` say otherwise."""
         return self._by_place.get(place, [])
 
     @cached_property
@@ -75,7 +76,7 @@ def _name(find: Callable[..., Any]) -> str:
 def repaired(slips: Iterable[Callable[[P, N], Repair[N] | None]], place: P, node: N, report: Report) -> N:
     """Return a node without slips, and report each of them.
 
-    As soon as one has repaired the node, the others look again; each repairs it once at most, so that this ends.
+    When one slip has repaired the node, the others look at it again; each repairs it at most once, so that this ends.
     """
     waiting = list(slips)
     index = 0

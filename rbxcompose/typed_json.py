@@ -1,7 +1,7 @@
 """Frozen dataclasses as plain data for JSON, and back.
 
-What comes from outside is not trusted: data that do not have the shape of the wanted type raise `UnreadableError`,
-which names the place.
+Data from outside is not trusted: if it does not have the shape of the wanted type, `UnreadableError` is raised, which
+names the place.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from types import NoneType, UnionType
 from typing import Any, Generic, TypeVar, Union, get_args, get_origin, get_type_hints
 
 T = TypeVar("T")
-TYPE = "type"  # the key that tells types apart
+TYPE = "type"  # the key that holds the name of the type
 
 
 class UnreadableError(ValueError):
-    """Raised for data that do not have the wanted shape; its text says where and why."""
+    """Raised for data that does not have the wanted shape; its text says where and why."""
 
     def __init__(self, problem: str, *path: str) -> None:
         super().__init__(f"'{'.'.join(path)}' {problem}" if path else problem)
@@ -27,7 +27,7 @@ class UnreadableError(ValueError):
 
 
 def to_data(value: object) -> Any:
-    """Return plain data: of a dataclass a dict by field, in the order of its fields."""
+    """Return a value as plain data: a dataclass becomes a dict by field, in the order of its fields."""
     match value:
         case tuple() | list():
             return [to_data(one) for one in value]
@@ -37,12 +37,12 @@ def to_data(value: object) -> Any:
 
 
 def from_data(wanted: Any, data: Any) -> Any:
-    """Return the value of type `wanted` that plain data stand for.
+    """Return the value of type `wanted` that plain data represents.
 
-    `wanted` is a dataclass, a scalar, an enumeration, `Any`, or a union, sequence, tuple or mapping of such.
+    `wanted` is a dataclass, a scalar, an enumeration, `Any`, or a union, sequence, tuple or mapping of these.
 
     Raises:
-        UnreadableError: if the data have another shape.
+        UnreadableError: if the data has another shape.
     """
     origin, arguments = get_origin(wanted), get_args(wanted)
     if wanted is Any:
@@ -65,7 +65,7 @@ def from_data(wanted: Any, data: Any) -> Any:
 
 
 class Family(Generic[T]):
-    """Dataclasses that are told apart by a name beside their fields."""
+    """Dataclasses distinguished by a name stored beside their fields."""
 
     def __init__(self, types: Iterable[type[T]], name_of: Callable[[type[T]], str] = lambda one: one.__name__) -> None:
         self._name_of = name_of
@@ -76,10 +76,10 @@ class Family(Generic[T]):
         return {TYPE: self._name_of(type(value)), **to_data(value)}
 
     def from_data(self, data: object) -> T:
-        """Return the value that data stand for.
+        """Return the value that data represents.
 
         Raises:
-            UnreadableError: if the name is not known, or the fields do not fit.
+            UnreadableError: if the name is unknown, or the fields do not fit.
         """
         name = name_in(data)
         if name not in self.types or not isinstance(data, dict):
@@ -97,7 +97,7 @@ class Family(Generic[T]):
 
 
 def name_in(data: object) -> str:
-    """Return the name that data have; empty if they have none."""
+    """Return the type name in data; empty if it has none."""
     name = data.get(TYPE) if isinstance(data, dict) else None
     return name if isinstance(name, str) else ""
 
@@ -113,7 +113,7 @@ _SCALARS: Mapping[Any, tuple[tuple[type, ...], str]] = {
 
 
 def _checked(data: Any, types: tuple[type, ...], problem: str) -> Any:
-    if type(data) not in types:  # a bool is no int here
+    if type(data) not in types:  # a bool is not an int here
         raise UnreadableError(problem)
     return data
 
@@ -126,7 +126,7 @@ def _at(place: str, wanted: Any, data: Any) -> Any:
 
 
 def _first(wanted: Iterable[Any], data: Any) -> Any:
-    """Return the value of the first type that fits."""
+    """Return the value read as the first type that fits."""
     for one in wanted:
         try:
             return from_data(one, data)
@@ -154,7 +154,7 @@ def _fields(wanted: Any, data: Any) -> Any:
 
 @cache
 def _shape(wanted: Any) -> tuple[Mapping[str, Any], Sequence[str]]:
-    """Return the types of a dataclass's fields, and those of them that have no default."""
+    """Return the types of a dataclass's fields, and the names of those without a default."""
     hints = get_type_hints(wanted)
     needed = [one.name for one in fields(wanted) if one.default is MISSING and one.default_factory is MISSING]
     return {one.name: hints[one.name] for one in fields(wanted)}, needed

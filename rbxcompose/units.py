@@ -14,19 +14,19 @@ from types import MappingProxyType
 
 from rbxcompose.findings import suggest
 
-MOST = 1e15  # magnitudes from here on are refused: they are slips, and whole floats end soon after
+MOST = 1e15  # magnitudes from here on are refused: they are slips, and floats soon stop being exact for whole numbers
 LONGEST_NUMBER = 40  # characters of a number's text
 NUMBER_TEXT = r"(?:[0-9]+(?:\.[0-9]+)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 
-# The units that dimensions are made of. An angle is one of them, so that rad/s is no Hz and Nm no J; so is the bit,
+# The units that dimensions are made of. An angle is one, so that rad/s is not Hz and Nm is not J; so is the bit,
 # because B/s and bit/s differ by a factor that must not get lost.
 BASES = ("m", "s", "rad", "kg", "A", "degC", "B", "bit")
 
 
 class UnitError(ValueError):
-    """Raised when a text or a number is not the quantity that it should be.
+    """Raised when a text or a number is not the required quantity.
 
-    `message` says what is wrong, `detail` what stands there instead, `help` what to do; the last two may be empty.
+    `message` says what is wrong, `detail` what was found instead, `help` what to do; the last two may be empty.
     """
 
     def __init__(self, message: str, *, detail: str = "", help: str = "") -> None:
@@ -40,8 +40,8 @@ class UnitError(ValueError):
 class Dimension:
     """What a quantity measures: a name, and the exponents over `BASES`.
 
-    `ratio`, `number` and `quotient` (what a division of equal dimensions gives) have no exponents but differ by name:
-    a ratio is not compared with a bare number, a quotient is compared with either.
+    `ratio`, `number` and `quotient` (what a division of equal dimensions gives) have no exponents but differ by name: a
+    ratio cannot be compared with a bare number, a quotient with either.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Dimension:
 
     @property
     def phrase(self) -> str:
-        """Return the name as it stands in a sentence: 'an angular speed'."""
+        """Return the name as used in a sentence: 'an angular speed'."""
         if self != QUOTIENT and self.name not in DIMENSIONS:
             return f"a quantity in {self.name}"
         if self is DATA:
@@ -57,7 +57,7 @@ class Dimension:
         return f"{'an' if self.name[0] in 'aeiou' else 'a'} {self.name.replace('_', ' ')}"
 
     def is_comparable(self, other: Dimension) -> bool:
-        """Return whether values of the two may be compared or added."""
+        """Return whether values of the two dimensions may be compared or added."""
         return self.exponents == other.exponents and {self, other} != {RATIO, NUMBER}
 
     def __mul__(self, other: Dimension) -> Dimension:
@@ -129,7 +129,7 @@ _TABLE: Mapping[Dimension, tuple[str, Mapping[str, tuple[float, float]]]] = {
 DIMENSIONS: Mapping[str, Dimension] = MappingProxyType({dimension.name: dimension for dimension in _TABLE})
 _BY_EXPONENTS = {dimension.exponents: dimension for dimension in (*DIMENSIONS.values(), QUOTIENT)}
 
-# Two conventions exist for these, so that a bare number does not say what is meant.
+# These have two conventions each, so a bare number is ambiguous.
 _AMBIGUOUS: Mapping[Dimension, str] = {
     ANGLE: "write '90 deg' or '1.57 rad'",
     RATIO: "write '50 %'",
@@ -138,7 +138,7 @@ _AMBIGUOUS: Mapping[Dimension, str] = {
 
 
 def _measured(exponents: tuple[int, ...]) -> Dimension:
-    """Return the dimension with these exponents; one without a name of its own is called by its unit: 'm^2/s'."""
+    """Return the dimension with these exponents; one without a name is named by its unit: 'm^2/s'."""
     if known := _BY_EXPONENTS.get(exponents):
         return known
     above = [_power(base, size) for base, size in zip(BASES, exponents, strict=True) if size > 0]
@@ -174,7 +174,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
 _SHOWN_IN = {dimension: UNITS[text.split()[1]] for dimension, (text, _) in _TABLE.items() if " " in text}
 _SHOWN_IN |= {DATA: UNITS["B"], BIT_RATE: UNITS["bit/s"]}
 
-# What people write for a unit that looks nothing like it.
+# What people write for a unit whose symbol looks quite different.
 _OTHER_NAMES: Mapping[str, str] = {
     name: unit
     for unit, names in {
@@ -196,7 +196,7 @@ _QUANTITY = re.compile(rf"([+-]?{NUMBER_TEXT})\s*(.*)", re.DOTALL)
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A value in SI with what it measures."""
+    """A value in SI with its dimension."""
 
     value: float
     dimension: Dimension
@@ -208,19 +208,19 @@ def example(dimension: Dimension) -> str:
 
 
 def unit_help(name: str) -> str:
-    """Return what to do about an unknown unit: the one that was probably meant, or the beginning of the list."""
+    """Return the help for an unknown unit: the one that was probably meant, or the beginning of the list."""
     folded = name.casefold()
     meant = _OTHER_NAMES.get(folded) or next((unit for unit in UNITS if unit.casefold() == folded), None)
     return f"did you mean '{meant}'?" if meant else suggest(name, UNITS, "units")
 
 
 def bare_number_help(dimension: Dimension) -> str:
-    """Return what to write instead of a bare number, or nothing if a bare number is understood as SI."""
+    """Return what to write instead of a bare number; empty if a bare number is taken as SI."""
     return _AMBIGUOUS.get(dimension, "")
 
 
 def quantity(number: str, unit: Unit | None) -> Quantity:
-    """Return the quantity that the text of a number and a unit stand for.
+    """Return the quantity given by the text of a number and a unit.
 
     Raises:
         UnitError: if the number is too long or too large.
@@ -239,7 +239,7 @@ def _require_moderate(value: float) -> None:
         raise UnitError("a number must be finite and below 1e15")
 
 
-@lru_cache(1000)  # robots say the same again and again
+@lru_cache(1000)  # robots repeat the same texts
 def parse_quantity(text: str) -> Quantity:
     """Read `0.3 m/s`, `5s`, `-90 deg`, `1e-3 m`, `50 %` or a plain number.
 
@@ -262,10 +262,10 @@ def _shortened(text: str) -> str:
 
 
 def to_si(value: object, dimension: Dimension) -> float:
-    """Return the SI value of a text, a bare number (SI already) or a quantity, which must be of this dimension.
+    """Return the SI value of a text, a bare number (already SI) or a quantity, which must be of this dimension.
 
     Raises:
-        UnitError: if it is not; a bare number is no angle, ratio or temperature, for which two conventions exist.
+        UnitError: if it is not; a bare number is ambiguous for an angle, ratio or temperature.
     """
     if isinstance(value, str):
         try:
@@ -291,7 +291,7 @@ def _must_be(dimension: Dimension) -> str:
 
 
 def _bare(value: float) -> Quantity:
-    # Compared before it is converted: a whole number may be too large to become a float at all.
+    # Compared before conversion: a whole number may be too large to become a float.
     _require_moderate(value)
     return Quantity(float(value), NUMBER)
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 from rbxcompose.geometry import Transform3
 
-MOST_FRAMES = 10_000  # names come from the outside; a tree must not grow without end
-UNIT_TOLERANCE = 1e-2  # by how much the length of a rotation may differ from 1, as other transform trees allow
+MOST_FRAMES = 10_000  # names come from outside; a tree must not grow without bound
+UNIT_TOLERANCE = 1e-2  # how far the length of a rotation may differ from 1, as in other transform trees
 
 
 @dataclass(frozen=True, slots=True)
 class TransformAnswer:
-    """Answer to `set`: was the transform taken, and what there is to say (a refusal, or a parent that was replaced)."""
+    """Answer to `set`: whether the transform was accepted, and a message (a refusal, or a parent that was replaced)."""
 
     accepted: bool
     message: str = ""

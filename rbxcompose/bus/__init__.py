@@ -1,1 +1,1 @@
-"""Topics, services and actions: by reference within a process, over Zenoh as ROS 2 puts them between processes."""
+"""Topics, services and actions: by reference within a process, between processes over Zenoh in the format of ROS 2."""

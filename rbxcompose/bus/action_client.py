@@ -1,4 +1,4 @@
-"""Action clients: a goal is sent, perhaps cancelled, and its end comes exactly once."""
+"""Action clients: send a goal, perhaps cancel it, and receive its end exactly once."""
 
 from __future__ import annotations
 
@@ -42,15 +42,15 @@ class SentGoal(Generic[R]):
         self._is_unwanted = False
 
     def cancel(self) -> None:
-        """Ask the server to end it; `Ended` still comes."""
+        """Ask the server to end the goal; `Ended` still follows."""
         self._is_unwanted = True
         if self._is_accepted:
             self._client.ask_to_cancel(self.id)
 
     def answered(self, reply: Reply[Any]) -> None:
-        """Hear whether the server accepted it."""
+        """Receive whether the server accepted the goal."""
         if reply.response is None:
-            self._client.ask_to_cancel(self.id)  # the answer may have been late, and the goal accepted
+            self._client.ask_to_cancel(self.id)  # the answer may only be late, and the goal accepted
             self._end(Ended(Outcome.LOST, message=reply.error))
         elif not reply.response.accepted:
             self._end(Ended(Outcome.REJECTED, message="the server refused it"))
@@ -61,9 +61,9 @@ class SentGoal(Generic[R]):
                 self._client.ask_to_cancel(self.id)
 
     def resulted(self, reply: Reply[Any]) -> None:
-        """Hear how it ended."""
+        """Receive how the goal ended."""
         if reply.error == EXPIRED:
-            self._client.ask_for_result(self)  # a goal may take longer than any question
+            self._client.ask_for_result(self)  # a goal may take longer than any request may
         elif reply.response is None:
             self._end(Ended(Outcome.LOST, message=reply.error))
         elif reply.response.status in OUTCOMES:
@@ -85,11 +85,11 @@ class ActionClient(Generic[G, R, F]):
         names = ActionNames.of(name)
         self._action = action
         self._ids = count(1)
-        self._listeners: dict[bytes, Callable[[F], None]] = {}  # for feedback, by goal
+        self._listeners: dict[bytes, Callable[[F], None]] = {}  # feedback callbacks, by goal
         self._feedback = Subscription(
             topics, node, names.feedback, action.FeedbackMessage, Qos.STATE, self._on_feedback, listens=False
         )
-        self._feedback.is_wanted = lambda: bool(self._listeners)  # many clients never ask for it
+        self._feedback.is_wanted = lambda: bool(self._listeners)  # many clients never use feedback
         self._send: Client[Any, Any] = Client(services, node, names.send_goal, action.SendGoal)
         self._cancel = Client(services, node, names.cancel_goal, CancelGoal)
         self._result: Client[Any, Any] = Client(services, node, names.get_result, action.GetResult)
@@ -100,14 +100,14 @@ class ActionClient(Generic[G, R, F]):
         return self._send.is_available and self._cancel.is_available and self._result.is_available
 
     def watch(self, changed: Callable[[bool], None]) -> None:
-        """Have `changed` called when a server comes to be known, and when none is known any more."""
-        self._send.watch(changed)  # the last that a server declares
+        """Call `changed` when a server appears, and when the last one is gone."""
+        self._send.watch(changed)  # a server declares this service last
 
     def __call__(
         self, goal: G, then: Callable[[Ended[R]], None], feedback: Callable[[F], None] | None = None, /
     ) -> SentGoal[R]:
-        """Send `goal`; `then` gets its end exactly once."""
-        # Unique among all clients, and the same in each run on a stepped clock.
+        """Send `goal`; `then` receives its end exactly once."""
+        # Unique among all clients, yet the same in every run on a stepped clock.
         id_ = xxhash.xxh3_128_digest(self._send.gid + next(self._ids).to_bytes(8, "little"))
         sent: SentGoal[R] = SentGoal(self, id_, then)
         if feedback is not None:
@@ -121,11 +121,11 @@ class ActionClient(Generic[G, R, F]):
         self._result(self._action.GetResult.Request(goal_id=UUID(goal.id)), goal.resulted, timeout=math.inf)
 
     def ask_to_cancel(self, id: bytes) -> None:
-        """Ask for the end of a goal; whether it can still be cancelled, its result will tell."""
+        """Request the cancellation of a goal; its result will show whether it could still be cancelled."""
         self._cancel(CancelGoal.Request(goal_info=GoalInfo(goal_id=UUID(id))), lambda reply: None)
 
     def forget(self, id: bytes) -> None:
-        """Listen no more to feedback on a goal."""
+        """Stop listening to feedback on a goal."""
         self._listeners.pop(id, None)
 
     def close(self) -> None:

@@ -19,9 +19,9 @@ from rbxcompose.msgs.unique_identifier_msgs import UUID
 from rbxcompose.qos import Qos
 from rbxcompose.scheduler import ScheduledCallback
 
-STATUS_PERIOD = 0.1  # [s] between two publications of the states of goals in a flood of them
-LOG_PERIOD = 1.0  # [s] between two lines of the log on a flood of goals
-LOG_BURST = 10.0  # [s]; as many lines as this would allow may come at once
+STATUS_PERIOD = 0.1  # [s] between two publications of the goals' states during a flood of goals
+LOG_PERIOD = 1.0  # [s] between two log lines during a flood of goals
+LOG_BURST = 10.0  # [s]; the lines allowed in this time may also come all at once
 
 G = TypeVar("G", bound=Message)
 R = TypeVar("R", bound=Message)
@@ -33,7 +33,7 @@ class ServedGoal(Generic[G, R, F]):
 
     def __init__(self, server: ActionServer[G, R, F], goal: Goal[G, R]) -> None:
         self._server, self._goal = server, goal
-        self.is_paused = False  # it is to be held as it is
+        self.is_paused = False  # it is to be held in its present state
 
     @property
     def request(self) -> G:
@@ -50,15 +50,15 @@ class ServedGoal(Generic[G, R, F]):
         self._server.tell(self._goal, message)
 
     def succeeded(self, result: R | None = None, /) -> None:
-        """End the goal well; without a result its zero value is sent."""
+        """End the goal as succeeded; without a result, send its zero value."""
         self._server.end(self._goal, GoalState.SUCCEEDED, result)
 
     def aborted(self, reason: str = "", result: R | None = None, /) -> None:
-        """End the goal badly; the reason goes to the log."""
+        """End the goal as aborted and log the reason."""
         self._server.end(self._goal, GoalState.ABORTED, result, reason)
 
     def canceled(self, result: R | None = None, /) -> None:
-        """End the goal because its client or a stop asked for it."""
+        """End the goal as canceled, at the request of its client or of a stop."""
         self._server.end(self._goal, GoalState.CANCELED, result)
 
 
@@ -76,13 +76,13 @@ class ActionServer(Generic[G, R, F]):
         *,
         waits: bool = False,
     ) -> None:
-        """With `waits`, goals wait until the node is open."""
+        """With `waits`, hold goals back until the node is open."""
         names = ActionNames.of(name)
         self.current: ServedGoal[G, R, F] | None = None  # the goal to carry out; a newer one replaces it
         self._name, self._action, self._accept = name, action, accept
         self._process, self._owner = node.process, node.owner
         self._goals: Goals[G, R] = Goals()
-        self._asked: dict[bytes, list[ServedRequest[Any, Any]]] = {}  # for the results of goals that have not ended
+        self._asked: dict[bytes, list[ServedRequest[Any, Any]]] = {}  # result requests, by unfinished goal
         self._may_tell = Allowance(1 / STATUS_PERIOD, BURST)
         self._will_tell: ScheduledCallback | None = None
         self._may_log, self._unlogged = Allowance(1 / LOG_PERIOD, LOG_BURST), 0
@@ -105,7 +105,7 @@ class ActionServer(Generic[G, R, F]):
         ]
 
     def cancel_all(self) -> None:
-        """Ask for the end of the current goal."""
+        """Request the cancellation of the current goal."""
         self._goals.cancel()
         self._tell_status()
 
@@ -115,7 +115,7 @@ class ActionServer(Generic[G, R, F]):
             self._feedback(self._action.FeedbackMessage(goal_id=UUID(goal.id), feedback=message))
 
     def end(self, goal: Goal[G, R], state: GoalState, result: R | None, reason: str = "") -> None:
-        """End a goal that has not ended and answer those who asked for its result."""
+        """End a goal that has not ended and answer all requests for its result."""
         if not self._goals.end(goal, state, self._action.Result() if result is None else result, self._now):
             return
         self.current = None
@@ -126,9 +126,9 @@ class ActionServer(Generic[G, R, F]):
             self._reply_result(request, goal)
 
     def close(self) -> None:
-        """Withdraw the server; its goal ends as aborted, its clients hear that the server is gone."""
+        """Withdraw the server; its goal ends as aborted, and its clients learn that the server is gone."""
         if self._goals.current is not None:
-            # Its client must not take this for the goal's own failure, so the result is not sent.
+            # The result is not sent, so that the client does not mistake this for a failure of the goal itself.
             self._goals.end(self._goals.current, GoalState.ABORTED, self._action.Result(), self._now)
             self._publish_status()
         for timer in (self._will_tell, self._will_log):
@@ -205,7 +205,7 @@ class ActionServer(Generic[G, R, F]):
         request.reply(self._action.GetResult.Response(status=goal.state, result=goal.result))
 
     def _tell_status(self) -> None:
-        """Publish the states of all goals: at once, in a flood of goals soon."""
+        """Publish the states of all goals: immediately, or a little later during a flood of goals."""
         if self._will_tell is None:
             if self._may_tell.takes(self._now):
                 self._publish_status()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-BURST = 0.1  # [s]; as much as may come in this time may also come at once
-MOST_SOURCES = 16  # with an allowance of their own
+BURST = 0.1  # [s]; what may come in this time may also come all at once
+MOST_SOURCES = 16  # sources with an allowance of their own
 QUIET = 1.0  # [s] of silence after which a source makes room for another one
 
 
@@ -23,7 +23,7 @@ class Allowance:
         return now - self._filled > QUIET
 
     def takes(self, now: float) -> bool:
-        """Return whether a message that comes at `now` [s] is taken."""
+        """Return whether to take a message that arrives at `now` [s]."""
         self._left = min(self._most, self._left + max(0.0, now - self._filled) * self.rate)
         self._filled = now
         if self._left < 1.0:
@@ -35,7 +35,7 @@ class Allowance:
 class Allowances:
     """An allowance for each source, so that one that sends too much costs the others nothing.
 
-    Beyond `MOST_SOURCES`, those that are new share one: else a name for each message would be a way around it.
+    Beyond `MOST_SOURCES`, new sources share one; else a sender could evade the limit with a new name for each message.
     """
 
     def __init__(self, rate: float, burst: float = BURST) -> None:
@@ -44,7 +44,7 @@ class Allowances:
         self._own: dict[bytes, Allowance] = {}
 
     def takes(self, source: bytes, now: float) -> bool:
-        """Return whether a message of a source that comes at `now` [s] is taken."""
+        """Return whether to take a message of a source that arrives at `now` [s]."""
         return (self._own.get(source) or self._of_new(source, now)).takes(now)
 
     def _of_new(self, source: bytes, now: float) -> Allowance:

@@ -11,14 +11,14 @@ _GID_SIZE = 16
 
 
 class Attachment(NamedTuple):
-    """Where a message comes from; ROS drops what comes without it."""
+    """The origin of a message; ROS drops messages without it."""
 
     sequence: int  # counts from 1 for each publisher or client
-    stamp: int  # [ns] when it was sent, by the sender's clock
-    gid: bytes  # 16 bytes that name the sender
+    stamp: int  # [ns] time of sending, by the sender's clock
+    gid: bytes  # 16 bytes that identify the sender
 
     def encode(self) -> bytes:
-        """Return the 33 bytes of the wire."""
+        """Return the 33 bytes that go over the wire."""
         return _LAYOUT.pack(self.sequence, self.stamp, _GID_SIZE, self.gid)
 
 

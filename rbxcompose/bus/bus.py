@@ -35,8 +35,8 @@ class Bus:
     """Connects the components of a process with each other and, over `transport`, with all others.
 
     An owner is a component's name; ROS knows it as a node. Names of topics, services and actions are relative to
-    `namespace` unless they start with `/`. Everything is called, and calls back, in the scheduler's thread. A
-    `witness` is told of each request and each reply, also within the process.
+    `namespace` unless they start with `/`. All calls and callbacks happen in the scheduler's thread. A `witness`
+    receives each request and each reply, including those within the process.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Bus:
         return _kept(node, Publisher(self._topics, node, topic, message, qos))
 
     def orders(self, owner: str, topic: str, message: type[M], qos: Qos, servers: Collection[str]) -> OrderPublisher[M]:
-        """Declare a publisher that knows whether the components `servers` listen."""
+        """Declare a publisher that knows whether the components `servers` are listening."""
         node = self._node(owner)
         return _kept(node, OrderPublisher(self._topics, node, topic, message, qos, servers))
 
@@ -84,10 +84,10 @@ class Bus:
         waits: bool = False,
         is_patient: bool = False,
     ) -> Subscription[M]:
-        """Have `handler` called with each message of a topic, with `waits` not before `open`.
+        """Call `handler` with each message of a topic; with `waits`, not before `open`.
 
-        At most `max_rate` [Hz] are taken from each publisher of another process, if it is infinite all of them;
-        None stands for what the class allows. A patient subscription is for what is told often and asked for rarely.
+        Takes at most `max_rate` [Hz] from each publisher of another process (all messages if infinite); None means the
+        limit of the QoS class. A patient subscription is for topics that are published often and read rarely.
         """
         node = self._node(owner)
         kinds = {"waits": waits, "is_patient": is_patient}
@@ -96,7 +96,7 @@ class Bus:
     def serve(self, owner: str, name: str, service: type[Service[Q, R]], handler: Callable[[Q], R]) -> None:
         """Answer requests with what `handler` returns; if it raises, the caller gets the error instead.
 
-        `Refused` is no error of the handler's, anything else goes to the scheduler's `on_error` as well.
+        `Refused` is not an error of the handler; any other exception also goes to the scheduler's `on_error`.
         """
         node = self._node(owner)
         _kept(node, Server(self._services, node, name, service, lambda asked: asked.reply(handler(asked.message))))
@@ -110,7 +110,7 @@ class Bus:
         *,
         waits: bool = False,
     ) -> None:
-        """Have `handle` see to it that each request is answered, now or later; with `waits`, none before `open`."""
+        """Call `handle` with each request, to be answered now or later; with `waits`, none before `open`."""
         node = self._node(owner)
         _kept(node, Server(self._services, node, name, service, handle, waits=waits))
 
@@ -128,7 +128,7 @@ class Bus:
         *,
         waits: bool = False,
     ) -> ActionServer[G, R, F]:
-        """Carry out goals, with `waits` none before `open`; `accept` returns why it refuses one, or nothing."""
+        """Carry out goals; with `waits`, none before `open`. `accept` returns why it refuses a goal, or nothing."""
         node = self._node(owner)
         return _kept(node, ActionServer(self._topics, self._services, node, name, action, accept, waits=waits))
 
@@ -139,16 +139,16 @@ class Bus:
 
     @property
     def subscriptions(self) -> Sequence[Subscription[Any]]:
-        """Return all that is subscribed to."""
+        """Return all subscriptions."""
         return list(self._topics.subscriptions)
 
     @property
     def gates(self) -> Sequence[Refusing]:
-        """Return where other processes ask."""
+        """Return the gates through which requests of other processes come."""
         return list(self._process.gates)
 
     def watch_writers(self, owner: str) -> Writers:
-        """Follow who publishes in other processes."""
+        """Follow the publishers of other processes."""
         process, transport, writers = self._process, self._transport, Writers(self._transport.session)
 
         def take(change: tuple[str, bool]) -> None:
@@ -161,16 +161,16 @@ class Bus:
         return writers
 
     def window(self, owner: str, key: str, answer: Callable[[], object]) -> Window:
-        """Let tools outside see something of a component at a key; `answer` returns the whole as JSON."""
+        """Show tools outside a part of a component's state at a key; `answer` returns all of it as JSON."""
         node = self._node(owner)
         return _kept(node, Window(node, key, answer))
 
     def open(self, owner: str) -> None:
-        """Let a component have the requests and goals that have waited for it."""
+        """Deliver to a component the requests and goals that have waited for it."""
         self._node(owner).open()
 
     def close_owner(self, owner: str) -> None:
-        """Withdraw all that a component declared: its goals end as aborted, their clients hear that it is lost."""
+        """Withdraw all that a component declared: its goals end as aborted, and their clients learn that it is lost."""
         node = self._nodes.pop(owner, None)
         if node is not None:
             node.close()

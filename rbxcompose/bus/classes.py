@@ -9,7 +9,7 @@ from rbxcompose.qos import Qos
 
 SERVICE_QOS = RosQos(depth=10)  # ROS's default for services
 
-COMMAND_RATE = 1000.0  # [Hz]; more commands than this are no control loop but a mistake
+COMMAND_RATE = 1000.0  # [Hz]; a higher rate is no control loop but a mistake
 LATCHED_QUEUE = 100  # several publishers may each have a latched message for one subscriber
 
 
@@ -18,12 +18,12 @@ class Sending:
     """How Zenoh sends what is published: `priority` is a name of its `Priority`."""
 
     priority: str
-    is_express: bool = False  # sent at once, never batched
+    is_express: bool = False  # sent immediately, never batched
     blocks: bool = False  # when the link is congested: wait, rather than drop
     is_reliable: bool = True
 
 
-# `event` has a priority of its own, since what waits there would hold up everything else of that priority.
+# `event` has a priority of its own, since its waiting messages would hold up all others of that priority.
 _SENDING = {
     Qos.COMMAND: Sending("REAL_TIME", is_express=True),
     Qos.STATE: Sending("INTERACTIVE_HIGH"),
@@ -46,17 +46,17 @@ def queue_depth(qos: Qos) -> int:
 
 
 def most_per_second(qos: Qos) -> float | None:
-    """Return how many messages a second a subscription takes from other processes [Hz], unless it says so itself."""
+    """Return the default limit on messages that a subscription takes from each publisher of another process [Hz]."""
     return COMMAND_RATE if qos is Qos.COMMAND else None
 
 
 def expects_speech(qos: Qos) -> bool:
-    """Return whether a publisher that is there should be heard of before long."""
+    """Return whether a publisher that exists should publish something before long."""
     return qos in (Qos.STATE, Qos.LATCHED)
 
 
 def ros_qos(qos: Qos) -> RosQos:
-    """Return what ROS tools are told of this class."""
+    """Return the quality of service that ROS tools see for this class."""
     if qos is Qos.EVENT:
         return RosQos(keeps_all=True)
     return RosQos(

@@ -1,4 +1,4 @@
-"""The gate for requests of other processes: a limited number per second for each client, the rest is refused."""
+"""The gate for requests of other processes: it limits the rate of each client and refuses the rest."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from rbxcompose.bus.local import Participant
 from rbxcompose.bus.refusals import RefusalReason, Refusals
 from rbxcompose.bus.transport import Question
 
-REQUESTS = 1000.0  # [Hz] of one asker, for services
-GOALS = 50.0  # [Hz] of one client: a new goal replaces the one before, which costs more than a request
+REQUESTS = 1000.0  # [Hz] per client, for services
+GOALS = 50.0  # [Hz] per client: a new goal replaces the one before, which costs more than a request
 QUESTIONS = 100.0  # [Hz] to a window
-BURST = 1.0  # [s]; as much as may be asked in this time may also be asked at once
+BURST = 1.0  # [s]; the requests allowed in this time may also come all at once
 
-SOMEBODY = b""  # who asks without saying who it is
+SOMEBODY = b""  # a client that does not identify itself
 
 
 class Gate:
-    """Lets in what each asker may ask. It is called in threads of the transport and wakes nobody for the rest."""
+    """Lets in what each client may request. It runs in threads of the transport and wakes nobody for the rest."""
 
     def __init__(self, node: Participant, name: str, rate: float, put: Callable[[Question], None]) -> None:
-        """Hand at most `rate` requests a second [Hz] of each asker to `put`; `name` is what findings call it."""
+        """Pass at most `rate` requests per second [Hz] of each client to `put`; `name` is used in findings."""
         self.owner, self.name = node.owner, name
         self.refusals = Refusals()
         self._clock, self._rate, self._put = node.process.clock, rate, put
@@ -34,7 +34,7 @@ class Gate:
         """Let a request in, or refuse it."""
         try:
             asker = decode_attachment(question.attachment).gid
-        except AttachmentError:  # a tool at a window; of a service it is refused where it is read
+        except AttachmentError:  # a tool at a window; a service refuses such a request when it reads it
             asker = SOMEBODY
         if self._allowances.takes(asker, self._clock.now()):
             self._put(question)
@@ -43,5 +43,5 @@ class Gate:
             question.fail(f"more than {self._rate:g} requests a second")
 
     def close(self) -> None:
-        """Forget it; nothing may come any more."""
+        """Remove the gate; no more requests may arrive."""
         self._gates.pop(self, None)

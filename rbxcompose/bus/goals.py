@@ -10,10 +10,10 @@ from typing import Generic, TypeVar
 G = TypeVar("G")
 R = TypeVar("R")
 
-KEPT_FOR = 10.0  # [s] that the result of a goal can be asked for after its end
+KEPT_FOR = 10.0  # [s] after its end in which the result of a goal can be requested
 MOST_KEPT = 100  # ended goals
 
-ANY_GOAL = bytes(16)  # the goal id that stands for none in particular
+ANY_GOAL = bytes(16)  # the goal id that means no particular goal
 
 
 class GoalState(IntEnum):
@@ -48,7 +48,7 @@ class Goal(Generic[G, R]):
 
     id: bytes  # 16 bytes
     request: G
-    client: bytes  # GID of who sent it
+    client: bytes  # GID of the sender
     accepted: int  # [ns]
     state: GoalState = GoalState.EXECUTING
     result: R | None = None
@@ -56,7 +56,7 @@ class Goal(Generic[G, R]):
 
 
 class Goals(Generic[G, R]):
-    """The goals of one action: one is carried out at a time, those that ended are remembered for a while."""
+    """The goals of one action: one is carried out at a time; ended goals are remembered for a while."""
 
     def __init__(self) -> None:
         self.current: Goal[G, R] | None = None  # the one that has not ended
@@ -66,17 +66,17 @@ class Goals(Generic[G, R]):
         return iter(self._goals.values())
 
     def find(self, id: bytes) -> Goal[G, R] | None:
-        """Return the goal of that id, if it is still remembered."""
+        """Return the goal with that id, if it is still remembered."""
         return self._goals.get(id)
 
     def accept(self, goal: Goal[G, R]) -> None:
-        """Take a goal; what was current must have ended, and its id must be new."""
+        """Accept a goal; the current one must have ended, and the id must be new."""
         if self.current is not None or goal.id in self._goals:
             raise ValueError("a goal can be accepted only after the current one has ended, and only once")
         self._goals[goal.id] = self.current = goal
 
     def end(self, goal: Goal[G, R], state: GoalState, result: R, now: float) -> bool:
-        """Bring a goal to its end at `now` [s]; return False if it had ended before."""
+        """End a goal at `now` [s]; return False if it had already ended."""
         if goal is not self.current:
             return False
         goal.state, goal.result, goal.ended = state, result, now
@@ -84,7 +84,7 @@ class Goals(Generic[G, R]):
         return True
 
     def cancel(self, id: bytes = ANY_GOAL, stamp: int = 0) -> tuple[CancelCode, list[Goal[G, R]]]:
-        """Ask for the end of goals and return which of them will.
+        """Request the cancellation of goals and return those that will be cancelled.
 
         `id` names one goal, `stamp` [ns] all that were accepted until then; with neither it is all goals.
         """
@@ -101,7 +101,7 @@ class Goals(Generic[G, R]):
         return CancelCode.NONE, [goal]
 
     def cancel_from(self, client: bytes) -> bool:
-        """Ask for the end of the goal of a client that went away; return whether it has one."""
+        """Request the cancellation of the goal of a client that is gone; return whether it has one."""
         if self.current is None or self.current.client != client:
             return False
         self.current.state = GoalState.CANCELING
@@ -109,7 +109,7 @@ class Goals(Generic[G, R]):
 
     def forget(self, now: float) -> None:
         """Drop ended goals that no client will query again."""
-        ended = [goal for goal in self if goal is not self.current]  # in the order of their ends
+        ended = [goal for goal in self if goal is not self.current]  # in the order in which they ended
         for place, goal in enumerate(reversed(ended)):
             if place >= MOST_KEPT or goal.ended < now - KEPT_FOR:
                 del self._goals[goal.id]

@@ -23,7 +23,7 @@ class WireType:
 
 @dataclass(frozen=True, slots=True)
 class GraphEnd:
-    """A publisher, subscription, server or client. `qos` is None if its token tells something that we cannot read."""
+    """A publisher, subscription, server or client. `qos` is None if its token has one that we cannot read."""
 
     node: str
     kind: WireType
@@ -33,7 +33,7 @@ class GraphEnd:
 
 @dataclass(frozen=True, slots=True)
 class GraphName:
-    """A topic, service or action: who gives (publishers, servers), and who takes (subscriptions, clients)."""
+    """A topic, service or action: its givers (publishers, servers) and takers (subscriptions, clients)."""
 
     name: str
     givers: tuple[GraphEnd, ...]
@@ -41,7 +41,7 @@ class GraphName:
 
     @property
     def kinds(self) -> list[WireType]:
-        """Return all types with their hashes: those of who gives first, as they count more."""
+        """Return all types with their hashes: those of the givers first, since they count more."""
         given = sorted({end.kind for end in self.givers})
         return given + sorted({end.kind for end in self.takers} - set(given))
 
@@ -52,7 +52,7 @@ class GraphName:
 
     @property
     def is_hidden(self) -> bool:
-        """Return whether ROS tools leave it out of lists: a word of it begins with `_`."""
+        """Return whether ROS tools leave it out of lists: a part of the name begins with `_`."""
         return "/_" in self.name
 
     @property
@@ -67,7 +67,7 @@ class GraphName:
 
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """All that was on the bus at one moment, sorted by name. The parts of actions are also topics and services."""
+    """Everything on the bus at one moment, sorted by name. The parts of actions are also topics and services."""
 
     nodes: Sequence[str]
     topics: Sequence[GraphName]
@@ -76,7 +76,7 @@ class Graph:
 
     @classmethod
     def of(cls, keys: Iterable[str]) -> Graph:
-        """Read tokens; those that we do not know are left out."""
+        """Read tokens and skip unknown ones."""
         tokens = [token for key in sorted(set(keys)) if (token := parse_token(key)) is not None]
         ends = [token for token in tokens if isinstance(token, EndpointToken)]
         return cls(
@@ -88,7 +88,7 @@ class Graph:
 
 
 def find(names: Iterable[GraphName], wanted: str) -> GraphName | None:
-    """Return the one of that name, with or without its leading slash."""
+    """Return the entry of that name, given with or without its leading slash."""
     full = f"/{wanted.lstrip('/')}"
     return next((one for one in names if one.name == full), None)
 
@@ -105,7 +105,7 @@ def _named(ends: Iterable[EndpointToken], giving: EntityKind, taking: EntityKind
 
 
 def _actions(ends: Iterable[EndpointToken]) -> list[GraphName]:
-    """Return the actions: each is told by the service to which goals are sent."""
+    """Return the actions: each is recognised by the service that takes its goals."""
     sending = [token for token in ends if token.name.endswith(_SEND_GOAL)]
     return [
         GraphName(one.name.removesuffix(_SEND_GOAL), _as_action(one.givers), _as_action(one.takers))

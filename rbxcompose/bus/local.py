@@ -1,4 +1,4 @@
-"""What the ends of one process share: by whom a name is served here, and all they need to declare themselves."""
+"""State shared by the ends of one process: who serves a name here, and all that is needed to declare an end."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Registry(Generic[T]):
 
     def add(self, route: Route, end: T) -> None:
         """Enter an end."""
-        # A new list, since a loop over the old one may be what brought the end about.
+        # A new list, since a loop over the old one may have created this end.
         self._ends[route] = [*self.at(route), end]
 
     def remove(self, route: Route, end: T) -> None:
@@ -49,7 +49,7 @@ class Registry(Generic[T]):
 
 
 class Refusing(Protocol):
-    """Where requests of other processes are refused: whose it is, its name, and how many."""
+    """A place that refuses requests of other processes: its owner, its name, and its counts."""
 
     owner: str
     name: str
@@ -73,7 +73,7 @@ class BusProcess:
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """The identity of one end: where it is in the process, on the wire, and its name there."""
+    """The identity of one end: its route in the process, its key on the wire, and its token and GID there."""
 
     route: Route
     key: str
@@ -82,14 +82,14 @@ class Endpoint:
 
 
 class Participant:
-    """A component as a participant: it announces itself, and what it declared is closed with it."""
+    """A component as a participant: it announces itself, and closing it closes all that it declared."""
 
     def __init__(self, process: BusProcess, owner: str) -> None:
         self.process = process
         self.owner = owner
         self._token = NodeToken(process.domain, process.transport.session, next(process.ids), owner, process.namespace)
         self._declared: list[Closable] = [process.transport.announce(self._token.key)]
-        self._closed_doors: list[Callable[[], None]] = []  # what opens them
+        self._closed_doors: list[Callable[[], None]] = []  # the callbacks that open them
 
     def endpoint(self, kind: EntityKind, name: str, interface: type[Interface], qos: RosQos) -> Endpoint:
         """Return the identity of a new end of this node."""
@@ -102,29 +102,29 @@ class Participant:
         return Endpoint((full_name, interface.TYPE), key, token, gid(token))
 
     def peers(self, kind: EntityKind, name: str, interface: type[Interface]) -> str:
-        """Return the key expression of the tokens of all ends of one kind that have this name and type."""
+        """Return the key expression that matches the tokens of all ends of one kind with this name and type."""
         full_name = resolve(name, self.process.namespace)
         type_hash = self.process.wire.hash_of(interface)
         return endpoint_pattern(self.process.domain, kind, full_name, dds_type(interface.TYPE), type_hash)
 
     def announce(self, endpoint: Endpoint) -> Closable:
-        """Let the others know of an end, which must be ready."""
+        """Announce an end to other processes; it must be ready."""
         return self.process.transport.announce(endpoint.token)
 
     def keep(self, end: Closable) -> None:
-        """Have `end` closed with the node."""
+        """Close `end` together with the node."""
         self._declared.append(end)
 
     def when_open(self, callback: Callable[[], None]) -> None:
-        """Have `callback` called by `open`."""
+        """Let `open` call `callback`."""
         self._closed_doors.append(callback)
 
     def open(self) -> None:
-        """Take the requests that have waited, and those that come."""
+        """Admit the requests that have waited, and new ones."""
         while self._closed_doors:
             self._closed_doors.pop(0)()
 
     def close(self) -> None:
-        """Withdraw all that was declared, the last first."""
+        """Withdraw all that was declared, last first."""
         while self._declared:
             self._declared.pop().close()

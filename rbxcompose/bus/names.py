@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 LONGEST_NAME = 247  # rmw's limit: 255 bytes less the prefixes that some middleware adds
-ADMIN = "rbx/"  # begins the keys that are not of ROS 2
+ADMIN = "rbx/"  # prefix of the keys that are not part of ROS 2
 
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _DDS = re.compile(r"(\w+)::(\w+)::dds_::(\w+)_")
@@ -37,19 +37,19 @@ def resolve(name: str, namespace: str = "") -> str:
 
 
 def dds_type(ros_type: str) -> str:
-    """Return the name that DDS has for a ROS type: `std_msgs/msg/String` is `std_msgs::msg::dds_::String_`."""
+    """Return the DDS name of a ROS type: `std_msgs/msg/String` becomes `std_msgs::msg::dds_::String_`."""
     package, kind, name = ros_type.split("/")
     return f"{package}::{kind}::dds_::{name}_"
 
 
 def ros_type(dds: str) -> str:
-    """Return the ROS type that has this name in DDS; another text as it is."""
+    """Return the ROS type with this DDS name; any other text unchanged."""
     found = _DDS.fullmatch(dds)
     return "/".join(found.groups()) if found else dds
 
 
 def admin_key(robot: str, path: str) -> str:
-    """Return the Zenoh key of what a robot shows to tools, apart from the topics of ROS 2."""
+    """Return the Zenoh key of something that a robot shows to tools, apart from the topics of ROS 2."""
     return f"{ADMIN}{robot}/{path}"
 
 

@@ -1,4 +1,4 @@
-"""Orders: messages of which the sender knows whether those who carry them out listen, here or in other processes."""
+"""Orders: messages whose sender knows whether those who carry them out are listening, here or in other processes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ M = TypeVar("M", bound=Message)
 class OrderPublisher(Publisher[M]):
     """Publishes orders for the components `servers`.
 
-    Only they count as listeners: that a recorder or a person looks on does not get an order carried out.
+    Only these count as listeners: a recorder or a person looking on does not carry out an order.
     """
 
     def __init__(
@@ -37,21 +37,21 @@ class OrderPublisher(Publisher[M]):
 
     @property
     def listeners(self) -> frozenset[bytes]:
-        """Return the GIDs of those who would get an order now."""
+        """Return the GIDs of the subscriptions that would receive an order now."""
         here = {one.gid for one in self._topics.subscriptions.at(self.route) if one.owner in self._servers}
-        # A token may be known before the connection that it tells of can be used.
+        # A token may be known before its connection can be used.
         return frozenset(here | set(self._elsewhere.values() if self.has_match else ()))
 
     def watch(self, changed: Callable[[], None], /) -> None:
-        """Have `changed` called whenever a subscriber comes or goes."""
+        """Call `changed` whenever a subscriber comes or goes."""
         self._watchers.append(changed)
 
     def look_again(self) -> None:
-        """Hear that subscriptions of this process have changed."""
+        """React to a change of the subscriptions in this process."""
         self._inbox.put(self._tell, self._process.scheduler.post)
 
     def close(self) -> None:
-        """Withdraw the publisher, and stop watching."""
+        """Withdraw the publisher and stop watching."""
         super().close()
         self._tokens.close()
         self._inbox.close()

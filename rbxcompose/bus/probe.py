@@ -1,4 +1,4 @@
-"""Whether a session still carries data, judged from the probes that it has sent. Pure: no bus, no clock."""
+"""Judge from the probes that a session has sent whether it still carries data. Pure: no bus, no clock."""
 
 from __future__ import annotations
 
@@ -6,28 +6,28 @@ from enum import Enum, auto
 
 from rbxcompose.bus.names import admin_key
 
-MISSES = 3  # probes in a row without an answer that make a session stuck
-MOST_MISSES = 96  # for one that was opened again and again without success
+MISSES = 3  # consecutive probes without an answer after which a session counts as stuck
+MOST_MISSES = 96  # for a session that was reopened again and again without success
 
 
 def probe_key(robot: str) -> str:
-    """Return the key at which all processes of a robot ask, and answer, each other."""
+    """Return the key at which all processes of a robot probe and answer each other."""
     return admin_key(robot, "probe")
 
 
 class ProbeResult(Enum):
-    """What became of a probe by the time when the next one is due."""
+    """The result of a probe by the time the next one is due."""
 
-    ANSWER = auto()  # of anybody: the session carries data
-    NOTHING = auto()  # there is a way to somebody, and nothing comes back
-    NOBODY = auto()  # there is no way to anybody
+    ANSWER = auto()  # from anybody: the session carries data
+    NOTHING = auto()  # there is a route to somebody, but nothing comes back
+    NOBODY = auto()  # there is no route to anybody
 
 
 class Probe:
-    """Counts probes that were missed.
+    """Counts missed probes.
 
-    Where the router must answer (`expects_router`), `NOBODY` is a miss as well, unless the router is down: then that
-    has to come back. A router from elsewhere need not know probes, and a process may be alone with it.
+    Where the router must answer (`expects_router`), `NOBODY` is a miss as well, unless the router is down: then the
+    router has to come back. A router from elsewhere need not know probes, and a process may be alone with it.
     """
 
     def __init__(self, *, expects_router: bool) -> None:
@@ -37,13 +37,13 @@ class Probe:
 
     @property
     def is_in_doubt(self) -> bool:
-        """Return whether the last probe was missed, so that the next one goes to all; else whoever is near will do."""
+        """Return whether the last probe was missed, so that the next goes to all; else it goes to the nearest."""
         return self._misses > 0
 
     def judge(self, heard: ProbeResult, *, is_router_up: bool) -> bool:
-        """Take what became of a probe; return whether the session is stuck, to be opened again.
+        """Evaluate the result of a probe; return whether the session is stuck and must be reopened.
 
-        After a renewal that did not help, twice as many misses are waited for.
+        After a renewal that did not help, it waits for twice as many misses.
         """
         if heard is ProbeResult.ANSWER:
             self._misses, self._bound = 0, MISSES

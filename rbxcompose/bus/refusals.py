@@ -1,4 +1,4 @@
-"""Messages from outside that are not taken, counted by reason."""
+"""Counts of refused messages from outside, by reason."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class RefusalReason(StrEnum):
 
 
 class Refusals:
-    """Counts refusals. `add` may be called by any thread, all else only by the scheduler's."""
+    """Counts refusals. Any thread may call `add`; only the scheduler's may call the rest."""
 
     def __init__(self) -> None:
-        self._numbers = {reason: count(1) for reason in RefusalReason}  # `next` is one step even with several threads
+        self._numbers = {reason: count(1) for reason in RefusalReason}  # `next` is atomic
         self._counted = dict.fromkeys(RefusalReason, 0)
         self._told = dict.fromkeys(RefusalReason, 0)
 
@@ -34,7 +34,7 @@ class Refusals:
         return sum(self._counted.values())
 
     def news(self) -> dict[RefusalReason, int]:
-        """Return how many were refused since the last call, by reason."""
+        """Return how many messages were refused since the last call, by reason."""
         counted = dict(self._counted)
         new = {reason: counted[reason] - self._told[reason] for reason in RefusalReason}
         self._told = counted
@@ -42,7 +42,7 @@ class Refusals:
 
 
 def sentence(name: str, news: dict[RefusalReason, int], what: str = "message") -> str:
-    """Say what has been refused on a topic, or at a service."""
+    """Return a sentence on what a topic or service has refused."""
     total = sum(news.values())
     messages = f"1 {what} was" if total == 1 else f"{total} {what}s were"
     reasons = [reason if len(news) == 1 else f"{number} {reason}" for reason, number in news.items()]

@@ -1,4 +1,4 @@
-"""A transport whose session can be replaced while the process runs: what was declared is declared again."""
+"""A transport whose session can be replaced at run time; everything declared is then declared again."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ E = TypeVar("E", bound="_Entry")
 
 
 class RenewableTransport:
-    """Passes everything on to a transport, and keeps in mind what has been declared.
+    """Passes everything on to a transport and remembers what has been declared.
 
-    `detach` takes the transport away and `attach` brings another. In between, messages to other processes are dropped,
-    and requests fail. Tokens keep the name of the first session, which names the process and not the connection.
+    `detach` removes the transport and `attach` sets another. In between, messages to other processes are dropped and
+    requests fail. Tokens keep the name of the first session, since it names the process, not the connection.
     """
 
     def __init__(self, transport: Transport) -> None:
         self.session = transport.session
-        self._first = transport  # wakes the scheduler, whichever session it is
+        self._first = transport  # wakes the scheduler, whichever session is in use
         self._transport: Transport | None = transport
         self._is_closed = False
         self._entries: Entries = {}
 
     def detach(self) -> Transport:
-        """Take the transport away, for the caller to close; who was known from the others is told to be gone.
+        """Remove the transport and return it for the caller to close; report all known participants as gone.
 
         Raises:
             RuntimeError: if there is none.
@@ -50,8 +50,8 @@ class RenewableTransport:
         return transport
 
     def attach(self, transport: Transport) -> None:
-        """Declare everything on another transport, in the order in which it was declared first."""
-        if self._is_closed:  # while there was none
+        """Declare everything on another transport, in the original order."""
+        if self._is_closed:  # while there was no transport
             transport.close()
             return
         self._transport = transport
@@ -59,7 +59,7 @@ class RenewableTransport:
             entry.attach(transport)
 
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
-        """Have `callback` run for `owner` by the scheduler; any thread may call it."""
+        """Let the scheduler run `callback` for `owner`; any thread may call this."""
         self._first.wake(owner, callback)
 
     def publisher(self, key: str, qos: Qos) -> RemotePublisher:
@@ -67,7 +67,7 @@ class RenewableTransport:
         return self._keep(_Publisher(self._entries, key, qos))
 
     def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Closable:
-        """Receive what other processes publish; a latched one also what they published last."""
+        """Receive what other processes publish; if latched, also what they published last."""
         return self._keep(_Entry(self._entries, lambda transport: transport.subscribe(key, qos, arrived)))
 
     def serve(self, key: str, asked: Callable[[Question], None]) -> Closable:
@@ -84,7 +84,7 @@ class RenewableTransport:
         of_all: bool = True,
         within: float = LONGEST_WAIT,
     ) -> Closable:
-        """Send a request. It is never sent twice: with its session gone, it ends with an error."""
+        """Send a request. It is never sent twice: if its session is replaced, it ends with an error."""
 
         def declare(transport: Transport) -> Closable:
             return transport.ask(key, payload, attachment, answered, of_all=of_all, within=within)
@@ -95,15 +95,15 @@ class RenewableTransport:
         return self._keep(request)
 
     def announce(self, token: str) -> Closable:
-        """Show a token for as long as it is not closed and this process lives."""
+        """Show a token until it is closed or this process ends."""
         return self._keep(_Entry(self._entries, lambda transport: transport.announce(token)))
 
     def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Closable:
-        """Hear which tokens match; with its session gone, they all are, until another one finds them again."""
+        """Report which tokens match; when the session goes, all of them go until another session finds them again."""
         return self._keep(_Watch(self._entries, pattern, changed))
 
     def close(self) -> None:
-        """Close the transport and with it everything that was declared."""
+        """Close the transport and everything declared on it."""
         self._is_closed = True
         self._entries.clear()
         transport, self._transport = self._transport, None
@@ -128,7 +128,7 @@ class _Entry:
         self._current = self._declare(transport)
 
     def detach(self) -> None:
-        self._current = None  # who took the transport closes it with all that is on it
+        self._current = None  # whoever took the transport closes it with all that is on it
 
     def close(self) -> None:
         self._entries.pop(self, None)
@@ -179,7 +179,7 @@ class _Request(_Entry):
 
     def detach(self) -> None:
         super().detach()
-        self._entries.pop(self, None)  # it may have been carried out: asking again is the caller's decision
+        self._entries.pop(self, None)  # it may have been carried out: whether to repeat it is the caller's decision
         self._answered(TransportReply(error=RENEWED))
 
 
@@ -187,7 +187,7 @@ class _Watch(_Entry):
     def __init__(self, entries: Entries, pattern: str, changed: Callable[[str, bool], None]) -> None:
         super().__init__(entries, self._watch)
         self._pattern, self._changed = pattern, changed
-        self._known: set[str] = set()  # tokens that are there, as this session knows
+        self._known: set[str] = set()  # tokens that this session knows to exist
 
     def detach(self) -> None:
         super().detach()
@@ -200,7 +200,7 @@ class _Watch(_Entry):
 
         def heard(token: str, is_there: bool) -> None:  # in a thread of the transport
             if known is not self._known:
-                return  # late news of a session that was given up
+                return  # a late update of a session that was replaced
             if is_there:
                 known.add(token)
             else:

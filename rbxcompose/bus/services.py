@@ -1,4 +1,4 @@
-"""Services: requests by reference within the process, over the transport to others, answered now or later."""
+"""Services: requests go by reference within the process and over the transport to others; answers may come later."""
 
 from __future__ import annotations
 
@@ -43,22 +43,22 @@ class Services:
 
 
 class ServedRequest(Generic[Q, R]):
-    """A request as its server sees it; it is answered once, now or later."""
+    """A request as its server sees it, to be answered once, now or later."""
 
     def __init__(self, message: Q, client: bytes, sequence: int, answer: WhenAnswered[R]) -> None:
         self.message = message
         self.client = client  # GID
-        self.sequence = sequence  # among those of its client
-        self.witness: WhenAnswered[R] | None = None  # hears the answer first
+        self.sequence = sequence  # among the requests of its client
+        self.witness: WhenAnswered[R] | None = None  # receives the answer first
         self._answer: WhenAnswered[R] | None = answer
 
     @property
     def is_open(self) -> bool:
-        """Return whether it was not answered yet."""
+        """Return whether it is still unanswered."""
         return self._answer is not None
 
     def reply(self, response: R) -> None:
-        """Answer it."""
+        """Answer the request."""
         self._end(Reply(response))
 
     def fail(self, error: str) -> None:
@@ -74,7 +74,7 @@ class ServedRequest(Generic[Q, R]):
 
 
 class Server(Generic[Q, R]):
-    """Has requests answered by `handle`, and tells `client_left` the GID of each client that went away."""
+    """Answers requests by `handle`, and calls `client_left` with the GID of each client that is gone."""
 
     def __init__(
         self,
@@ -88,7 +88,7 @@ class Server(Generic[Q, R]):
         waits: bool = False,
         rate: float = REQUESTS,
     ) -> None:
-        """With `waits`, requests wait until the node is open; of each asker elsewhere, `rate` [Hz] are taken."""
+        """With `waits`, hold requests until the node is open; take at most `rate` [Hz] from each client elsewhere."""
         endpoint = node.endpoint(EntityKind.SERVER, name, service, SERVICE_QOS)
         self.route = endpoint.route
         self.malformed = 0  # requests that could not be read
@@ -106,20 +106,20 @@ class Server(Generic[Q, R]):
         if client_left is not None:
             clients = node.peers(EntityKind.CLIENT, name, service)
             self._declared.append(transport.watch(clients, self._client_changed))
-        self._declared.append(node.announce(endpoint))  # last: who sees it may ask
+        self._declared.append(node.announce(endpoint))  # last: a client that sees it may send a request
         services.servers.add(self.route, self)
         self._tell_clients()
 
     def ask(self, request: ServedRequest[Q, R]) -> None:
-        """Queue a request of this process; it is handled at the same instant."""
+        """Queue a request from this process; it is handled at the same instant."""
         self._inbox.put(request, self._process.scheduler.post)
 
     def leave(self, client: bytes) -> None:
-        """Hear that a client of this process went away."""
+        """Handle the departure of a client in this process."""
         self._left.put(client, self._process.scheduler.post)
 
     def close(self) -> None:
-        """Withdraw the server; whoever waits for an answer hears that it went away."""
+        """Withdraw the server; clients that wait for an answer learn that it is gone."""
         self._services.servers.remove(self.route, self)
         while self._declared:
             self._declared.pop().close()
@@ -179,16 +179,16 @@ class Server(Generic[Q, R]):
         if reply.response is None:
             question.fail(reply.error)
         else:
-            # The asker's sequence number and GID are how ROS finds what the reply belongs to.
+            # By the client's sequence number and GID, ROS matches the reply with its request.
             question.reply(encode(reply.response), asker._replace(stamp=self._process.clock.stamp()).encode())
 
 
 @dataclass(slots=True)
 class _Waiting(Generic[R]):
-    """A request that was sent and not answered yet."""
+    """A request that was sent and is still unanswered."""
 
     then: WhenAnswered[R]
-    servers: frozenset[str] = frozenset()  # tokens of the servers in other processes that were asked
+    servers: frozenset[str] = frozenset()  # tokens of the servers in other processes that received it
     timer: ScheduledCallback | None = None
     remote: Closable | None = None
 
@@ -200,7 +200,7 @@ class _Waiting(Generic[R]):
 
 
 class Client(Generic[Q, R]):
-    """Asks a service. A server of the same process is preferred; replies come by the scheduler."""
+    """Calls a service. It prefers a server in the same process; the scheduler delivers replies."""
 
     def __init__(self, services: Services, node: Participant, name: str, service: type[Service[Q, R]]) -> None:
         endpoint = node.endpoint(EntityKind.CLIENT, name, service, SERVICE_QOS)
@@ -225,11 +225,11 @@ class Client(Generic[Q, R]):
         return bool(self._services.servers.at(self.route) or self._servers)
 
     def watch(self, changed: Callable[[bool], None]) -> None:
-        """Have `changed` called whenever a server comes to be known, and when none is known any more."""
+        """Call `changed` whenever a server appears, and when the last one is gone."""
         self._watchers.append(changed)
 
     def __call__(self, request: Q, then: WhenAnswered[R], /, *, timeout: float = 5.0) -> None:
-        """Send `request`; `then` gets the reply, or an error after `timeout` [s] or if there is no server."""
+        """Send `request`; `then` receives the reply, or an error after `timeout` [s] or if there is no server."""
         sequence = next(self._sequence)
         waiting = self._waiting[sequence] = _Waiting(then, frozenset(self._servers))
         if math.isfinite(timeout):
@@ -251,11 +251,11 @@ class Client(Generic[Q, R]):
             self._answered(sequence, Reply(None, f"no server of {self.route[0]} is known"))
 
     def look_again(self) -> None:
-        """Hear that servers of this process have changed."""
+        """React to a change of the servers in this process."""
         self._inbox.put(self._look, self._process.scheduler.post)
 
     def close(self) -> None:
-        """Withdraw the client and forget its requests; servers hear that it went away."""
+        """Withdraw the client and forget its requests; servers learn that it is gone."""
         self._services.clients.remove(self.route, self)
         self._token.close()
         self._tokens.close()

@@ -1,6 +1,6 @@
-"""Shared memory, through which large messages go between processes of one host without being copied.
+"""Shared memory, which passes large messages between processes of one host without copying.
 
-Zenoh keeps it in files, each locked (`flock`) by who uses it, and so does what is here.
+Zenoh keeps it in files, each locked (`flock`) by its users; this module takes the same locks.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ YOUNG = 0.2  # [s]; a newer file may be about to be locked, which follows its cr
 
 
 def problem(folder: Path = FOLDER) -> str:
-    """Say why shared memory cannot be used; empty if it can."""
+    """Return why shared memory cannot be used; empty if it can."""
     try:
         room = os.statvfs(folder)
     except OSError:

@@ -1,6 +1,6 @@
-"""Threads of Zenoh that call into Python stay known to it: else each call would create and destroy their state.
+"""Keep Zenoh's threads that call into Python attached: else each call would create and destroy their state.
 
-That takes several times as long as the callbacks here do, and Zenoh's receiving threads live as long as the process.
+That takes several times as long as our callbacks, and Zenoh's receiving threads live as long as the process.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _attached = _Attached()
 
 
 def keep_attached() -> None:
-    """Keep the state that Python has for the calling thread, which is not one of Python's own."""
+    """Keep Python's state for the calling thread, which Python did not create."""
     if not _attached.is_kept:
-        _attached.is_kept = True  # is part of that state: with it, it would be gone
-        _attach()  # never released, so that the count of who needs the state does not reach zero
+        _attached.is_kept = True  # part of that state, and lost with it
+        _attach()  # never released, so that the state's reference count does not reach zero

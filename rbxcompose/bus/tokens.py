@@ -11,7 +11,7 @@ SPACE = "@ros2_lv"
 
 
 class EntityKind(StrEnum):
-    """What a token stands for."""
+    """The kind of entity that a token represents."""
 
     NODE = "NN"
     PUBLISHER = "MP"
@@ -37,7 +37,7 @@ class NodeToken:
         return f"{SPACE}/{self.domain}/{self.session}/{self.id}/{self.id}/{EntityKind.NODE}/{self._place()}"
 
     def endpoint_key(self, kind: EntityKind, id: int, name: str, dds_type: str, type_hash: str, qos: str) -> str:
-        """Return the text of the token of one of the node's endpoints."""
+        """Return the token text of one of the node's endpoints."""
         start = f"{SPACE}/{self.domain}/{self.session}/{self.id}/{id}/{kind}/{self._place()}"
         return f"{start}/{mangle(name)}/{dds_type}/{type_hash}/{qos}"
 
@@ -64,7 +64,7 @@ class EndpointToken:
 
 
 def parse_token(key: str) -> NodeToken | EndpointToken | None:
-    """Read a token; None if it is not one that we know. What newer versions append is left out."""
+    """Read a token; None if it is unknown. Parts that newer versions append are ignored."""
     chunks = key.split("/")
     try:
         space, domain, session, node_id, id_, kind, enclave, namespace, name, *endpoint = chunks
@@ -80,13 +80,13 @@ def parse_token(key: str) -> NodeToken | EndpointToken | None:
 
 
 def endpoint_pattern(domain: int, kind: EntityKind, name: str, dds_type: str, type_hash: str) -> str:
-    """Return the key expression of all endpoints of one kind for one name and type."""
-    # `**` also takes what newer versions append after the quality of service.
+    """Return the key expression that matches all endpoints of one kind for one name and type."""
+    # `**` also matches what newer versions append after the quality of service.
     return f"{SPACE}/{domain}/*/*/*/{kind}/*/*/*/{mangle(name)}/{dds_type}/{type_hash}/**"
 
 
 def publishers_pattern(domain: int) -> str:
-    """Return the key expression of all publishers of a domain."""
+    """Return the key expression that matches all publishers of a domain."""
     return f"{SPACE}/{domain}/*/*/*/{EntityKind.PUBLISHER}/**"
 
 
@@ -96,7 +96,7 @@ def session_of(key: str) -> str:
 
 
 def gid(key: str) -> bytes:
-    """Return the 16 bytes that name an endpoint, made from the text of its token."""
+    """Return the 16 bytes that identify an endpoint, derived from the text of its token."""
     return xxhash.xxh3_128_intdigest(key.encode()).to_bytes(16, "little")
 
 

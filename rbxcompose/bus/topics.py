@@ -1,4 +1,4 @@
-"""Topics: by reference to subscribers in the process, encoded only if there are others."""
+"""Topics: messages go by reference to subscribers in the process, and are encoded only if there are others."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ M = TypeVar("M", bound=Message)
 
 
 class Delivery(NamedTuple, Generic[M]):
-    """A message on its way within the process, and where it comes from."""
+    """A message on its way within the process, and its origin."""
 
     message: M
     source: Attachment
@@ -40,7 +40,7 @@ class Topics:
     subscriptions: Registry[Subscription[Any]] = field(default_factory=Registry)
 
     def published_here(self, subscription: Subscription[Any], source: Attachment) -> bool:
-        """Return whether a message comes from a publisher of this very process."""
+        """Return whether a message comes from a publisher in this process."""
         return any(publisher.gid == source.gid for publisher in self.publishers.at(subscription.route))
 
 
@@ -75,20 +75,19 @@ class Publisher(Generic[M]):
             self._remote.put(encode(message), source.encode())
 
     def look_again(self) -> None:
-        """Hear that subscriptions of this process have changed; most publishers need not know."""
+        """React to a change of the subscriptions in this process; most publishers need not."""
 
     def close(self) -> None:
-        """Withdraw the publisher and what it kept."""
+        """Withdraw the publisher and drop its last message."""
         self._topics.publishers.remove(self.route, self)
         self._token.close()
         self._remote.close()
 
 
 class Subscription(Generic[M]):
-    """Hands the messages of a topic to `handler` and remembers the newest.
+    """Passes the messages of a topic to `handler` and remembers the newest.
 
-    Of what each publisher of another process sends, no more is taken than `max_rate` [Hz]; None stands for what the
-    class allows.
+    It takes at most `max_rate` [Hz] from each publisher in another process; None means the limit of the QoS class.
     """
 
     def __init__(
@@ -105,9 +104,9 @@ class Subscription(Generic[M]):
         listens: bool = True,
         is_patient: bool = False,
     ) -> None:
-        """With `waits`, messages wait until the node is open; unless it `listens`, other processes are not heard.
+        """With `waits`, hold messages until the node is open; unless it `listens`, ignore other processes.
 
-        A patient one takes what comes from them when half of its queue is full, or at `catch_up`: the process is not
+        A patient subscription takes their messages when half of its queue is full, or at `catch_up`: the process is not
         woken for each message.
         """
         endpoint = node.endpoint(EntityKind.SUBSCRIPTION, topic, message, ros_qos(qos))
@@ -115,14 +114,14 @@ class Subscription(Generic[M]):
         self.value: M | None = None
         self.source: Attachment | None = None  # of the newest message
         self.refusals = Refusals()
-        self.is_wanted: Callable[[], bool] = lambda: True  # else what arrives from other processes is left alone
+        self.is_wanted: Callable[[], bool] = lambda: True  # if false, arrivals from other processes are ignored
         self._topics, self._process, self._qos = topics, node.process, qos
         self._message, self._handler = message, handler
         rate = max_rate or most_per_second(qos)
         self._allowances = None if rate is None or math.isinf(rate) else Allowances(rate)
         self._arrived = -math.inf  # [s] of robot time
         self._patience = queue_depth(qos) // 2 if is_patient else 1  # messages that may wait for each other
-        self._has_complained = False  # in the log; diagnostics go on counting
+        self._has_complained = False  # in the log; diagnostics continue to count
         self._inbox: Inbox[tuple[float, Delivery[M] | Arrival]] = Inbox(
             node.owner, queue_depth(qos), self._take, node.process.scheduler.post
         )
@@ -153,33 +152,33 @@ class Subscription(Generic[M]):
 
     @property
     def reader(self) -> TopicReader:
-        """Return what is asked of who publishes the topic elsewhere."""
+        """Return what this subscription expects of publishers in other processes."""
         self.catch_up()
         type_hash = self._process.wire.hash_of(self._message)
-        is_part_of_an_action = "/_" in self.route[0]  # nobody speaks there as long as there is no goal
+        is_part_of_an_action = "/_" in self.route[0]  # nothing is published there until there is a goal
         speaks = expects_speech(self._qos) and not is_part_of_an_action
         return TopicReader(self.owner, self.route, type_hash, self._arrived, speaks)
 
     def listen(self) -> None:
-        """Receive from now on what other processes send."""
+        """Start to receive from other processes."""
         if self._remote is None:
             self._remote = self._process.transport.subscribe(self._key, self._qos, self._arrive)
 
     def catch_up(self) -> None:
-        """Handle now what a patient subscription has left until more comes."""
+        """Handle now the messages that a patient subscription has let wait."""
         if self._patience > 1:
             self._inbox.take_all()
 
     def hurry(self) -> None:
-        """Be patient no longer."""
+        """Stop being patient: handle each message as it arrives."""
         self._patience = 1
 
     def deliver(self, delivery: Delivery[M]) -> None:
-        """Queue a message of this process; it is handled at the same instant."""
+        """Queue a message from this process; it is handled at the same instant."""
         self._inbox.put((self._process.clock.now(), delivery), self._process.scheduler.post)
 
     def close(self) -> None:
-        """Withdraw the subscription; messages that wait are forgotten."""
+        """Withdraw the subscription and drop its waiting messages."""
         self._topics.subscriptions.remove(self.route, self)
         self._token.close()
         if self._remote is not None:
@@ -192,7 +191,7 @@ class Subscription(Generic[M]):
             publisher.look_again()
 
     def _arrive(self, arrival: Arrival) -> None:
-        # In a thread of the transport: the age counts from here, however busy the scheduler is.
+        # In a thread of the transport: age is measured from here, however busy the scheduler is.
         if not self.is_wanted():
             return
         now = self._process.clock.now()
@@ -200,7 +199,7 @@ class Subscription(Generic[M]):
             self._inbox.put((now, arrival), self._process.transport.wake, at=self._patience)
 
     def _is_allowed(self, allowances: Allowances, arrival: Arrival, now: float) -> bool:
-        # What is refused here is said by diagnostics: it displaces nothing, and the scheduler is not even woken.
+        # Diagnostics report what is refused here: it displaces nothing and does not even wake the scheduler.
         try:
             source = decode_attachment(arrival.attachment)
         except AttachmentError:

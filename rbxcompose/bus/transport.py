@@ -1,6 +1,6 @@
-"""What the bus needs from a transport between processes, and the transport that reaches no other process.
+"""The interface of a transport between processes, and the transport that reaches no other process.
 
-Callbacks given to a transport are called in its own threads: they may only put things into an inbox.
+A transport calls its callbacks in its own threads: they may only put items into an inbox.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Protocol
 
 from rbxcompose.qos import Qos
 
-LONGEST_WAIT = 600.0  # [s] of real time for an answer; the transport keeps a little of each request for so long
+LONGEST_WAIT = 600.0  # [s] of real time for an answer; the transport keeps a little of each request that long
 EXPIRED = "no answer in time"
 
 
@@ -19,12 +19,12 @@ class Closable(Protocol):
     """Something that was declared and can be withdrawn."""
 
     def close(self) -> None:
-        """Withdraw it; a second time does nothing."""
+        """Withdraw it; a second call does nothing."""
         ...
 
 
 class Arrival(Protocol):
-    """Bytes that came from another process."""
+    """Bytes from another process."""
 
     @property
     def payload(self) -> bytes:
@@ -38,10 +38,10 @@ class Arrival(Protocol):
 
 
 class Question(Arrival, Protocol):
-    """A request that came from another process; it is answered once, now or later."""
+    """A request from another process, to be answered once, now or later."""
 
     def reply(self, payload: bytes, attachment: bytes) -> None:
-        """Answer it."""
+        """Answer the request."""
         ...
 
     def fail(self, error: str) -> None:
@@ -51,7 +51,7 @@ class Question(Arrival, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TransportReply:
-    """What became of a request: a payload, or an error."""
+    """The outcome of a request: a payload, or an error."""
 
     payload: bytes = b""
     error: str = ""
@@ -73,10 +73,10 @@ class RemotePublisher(Closable, Protocol):
 class Transport(Protocol):
     """Carries messages between processes. Everything but `wake` is called from the scheduler's thread only."""
 
-    session: str  # names this process among all
+    session: str  # identifies this process among all
 
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
-        """Have `callback` run for `owner` by the scheduler; any thread may call it."""
+        """Let the scheduler run `callback` for `owner`; any thread may call this."""
         ...
 
     def publisher(self, key: str, qos: Qos) -> RemotePublisher:
@@ -84,7 +84,7 @@ class Transport(Protocol):
         ...
 
     def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Closable:
-        """Receive what other processes publish; a latched one also what they published last."""
+        """Receive what other processes publish; if latched, also what they published last."""
         ...
 
     def serve(self, key: str, asked: Callable[[Question], None]) -> Closable:
@@ -101,18 +101,18 @@ class Transport(Protocol):
         of_all: bool = True,
         within: float = LONGEST_WAIT,
     ) -> Closable:
-        """Send a request. An answer or an error comes once the server has one or is gone; closing forgets it.
+        """Send a request. It ends with an answer, or with an error when the server is gone; closing forgets it.
 
-        Unless it is asked `of_all` servers, the nearest gets it. After `within` [s] of real time it is `EXPIRED`.
+        The nearest server receives it, or `of_all` all of them. After `within` [s] of real time it is `EXPIRED`.
         """
         ...
 
     def announce(self, token: str) -> Closable:
-        """Show a token for as long as it is not closed and this process lives."""
+        """Show a token until it is closed or this process ends."""
         ...
 
     def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Closable:
-        """Hear which tokens match: those that exist now, those that come (True), those that go (False)."""
+        """Report matching tokens: those that exist now or appear (True), and those that go (False)."""
         ...
 
     def close(self) -> None:
@@ -121,7 +121,7 @@ class Transport(Protocol):
 
 
 class NoTransport:
-    """The transport of a process that is alone: it reaches no other, and no other reaches it."""
+    """The transport of a lone process: it reaches no other, and no other reaches it."""
 
     session = "0"
     has_match = False

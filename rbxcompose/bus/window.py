@@ -1,9 +1,9 @@
-"""Windows: what tools outside may see of a component, at a key of the robot's own and not as a topic of ROS 2.
+"""Windows: state of a component that tools outside may see, at a key of the robot's own rather than a ROS 2 topic.
 
-Who listens at the key hears what is new, who asks there gets the whole. Both are JSON of one shape (`SCHEMA`):
-`source` names the window, `sequence` counts the news from one, so that a listener notices what it missed, and `value`
-is what the component tells. A whole has the sequence of the last news that it contains. `missions/view/replica.py` is
-the other side.
+A subscriber at the key receives updates, a query there returns the whole state. Both are JSON of one shape (`SCHEMA`):
+`source` names the window, `sequence` counts the updates from one, so that a subscriber notices what it missed, and
+`value` is the component's data. A whole state has the sequence of the last update that it contains.
+`missions/view/replica.py` is the other side.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from rbxcompose.qos import Qos
 from rbxcompose.requests import Refused
 
 SCHEMA = 1
-GRACE = 2.0  # [s] after a question in which somebody counts as listening: the transport may know of it later
+GRACE = 2.0  # [s] after a query in which somebody counts as listening: the transport may report a listener late
 
 
 class Window:
-    """Tells news to those who listen; `answer` returns the whole as data for JSON, or raises Refused."""
+    """Sends updates to subscribers; `answer` returns the whole state as data for JSON, or raises Refused."""
 
     def __init__(self, node: Participant, key: str, answer: Callable[[], object]) -> None:
         process, transport = node.process, node.process.transport
@@ -31,14 +31,14 @@ class Window:
         self._clock, self._answer = process.clock, answer
         self._sequence = 0
         self._asked_at: float | None = None  # [s]
-        self._remote = transport.publisher(key, Qos.STATE)  # a viewer that is slow must not hold us up
+        self._remote = transport.publisher(key, Qos.STATE)  # a slow viewer must not hold us up
         inbox: Inbox[Question] = Inbox(node.owner, None, self._asked, process.scheduler.post)
         gate = Gate(node, key, QUESTIONS, lambda question: inbox.put(question, transport.wake))
         self._declared: list[Closable] = [gate, transport.serve(key, gate), self._remote]
 
     @property
     def is_watched(self) -> bool:
-        """Return whether anybody would hear news."""
+        """Return whether anybody would receive updates."""
         if self._remote.has_match:
             return True
         return self._asked_at is not None and self._clock.now() - self._asked_at <= GRACE
@@ -49,7 +49,7 @@ class Window:
         self._remote.put(self._message(value), b"")
 
     def close(self) -> None:
-        """Withdraw it."""
+        """Withdraw the window."""
         for one in self._declared:
             one.close()
 

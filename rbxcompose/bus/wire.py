@@ -1,4 +1,4 @@
-"""Wire profiles: in what the distributions of ROS 2 differ on Zenoh, and how quality of service is written there.
+"""Wire profiles: how the distributions of ROS 2 differ on Zenoh, and how quality of service is written there.
 
 Keys, payloads and the 33-byte attachment are the same for all of them.
 """
@@ -24,20 +24,20 @@ class RosQos:
 
 @dataclass(frozen=True, slots=True)
 class WireProfile:
-    """What a distribution puts on the wire in its own way."""
+    """The particulars of one distribution on the wire."""
 
     name: str
     has_type_hashes: bool = True
     default_qos: RosQos = field(default_factory=RosQos)
 
     def hash_of(self, interface: type[Interface]) -> str:
-        """Return the last chunk of the data key; parties with another one never meet."""
+        """Return the last chunk of the data key; ends with different ones never meet."""
         return interface.HASH if self.has_type_hashes else "TypeHashNotSupported"
 
     def qos_text(self, qos: RosQos) -> str:
-        """Return `qos` as tokens write it: what equals the default is left out.
+        """Return `qos` as tokens write it, without what equals the default.
 
-        Writing a default would be read in the same way, but GIDs are made from the text of the token.
+        A written default would mean the same, but GIDs are derived from the text of the token.
         """
         default = self.default_qos
         reliability = _unless(qos.is_reliable == default.is_reliable, 1 if qos.is_reliable else 2)
@@ -48,7 +48,7 @@ class WireProfile:
         return f"{reliability}:{durability}:{history},{depth}:,:,:,,"
 
     def read_qos(self, text: str) -> RosQos:
-        """Return what `qos_text` wrote.
+        """Read the text that `qos_text` wrote.
 
         Raises:
             ValueError: if it is something else.

@@ -1,4 +1,4 @@
-"""What a witness of a process learns about its services: each request that is sent and each reply that is given."""
+"""What a witness learns about the services of a process: each request sent and each reply given."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class WitnessedCall:
     name: str  # of the service, with its leading slash
     service: type[Service[Any, Any]]
     client: bytes  # GID
-    sequence: int  # of the request among those of its client
+    sequence: int  # of the request among those of its client; a reply has the same
     is_reply: bool
     message: Message | None  # None: a reply without a response, since the request was refused or failed
 

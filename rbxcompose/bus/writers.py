@@ -1,4 +1,4 @@
-"""Publishers in other processes, read from tokens, and why nothing arrives from them. Pure: time is an argument."""
+"""Publishers in other processes, read from tokens, and reasons why nothing arrives. Pure: time is an argument."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rbxcompose.bus.local import Route
 from rbxcompose.bus.names import ros_type
 from rbxcompose.bus.tokens import EndpointToken, EntityKind, parse_token
 
-SILENCE = 5.0  # [s] after which a publisher of a state, or of something latched, should have been heard
+SILENCE = 5.0  # [s] after which a publisher of a state or a latched topic should have published
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,13 +21,13 @@ class TopicWriter:
 
 @dataclass(frozen=True, slots=True)
 class TopicReader:
-    """A subscription of this process as far as its writers matter; `arrived` [s] is when a message came last."""
+    """What matters to writers about a subscription of this process; `arrived` [s] is when the last message came."""
 
     owner: str
     route: Route
     type_hash: str
     arrived: float
-    expects_speech: bool  # a writer that is there should be heard, as it is not with events and commands
+    expects_speech: bool  # an existing writer should publish before long, unlike one of events or commands
 
 
 class Writers:
@@ -38,7 +38,7 @@ class Writers:
         self._by_topic: dict[str, dict[str, TopicWriter]] = {}
 
     def heard(self, key: str, now: float, *, is_there: bool) -> None:
-        """Take a token that came or went."""
+        """Apply a token that appeared or went."""
         token = parse_token(key)
         if not isinstance(token, EndpointToken) or token.kind is not EntityKind.PUBLISHER:
             return
@@ -53,9 +53,9 @@ class Writers:
             del self._by_topic[token.name]
 
     def trouble(self, reader: TopicReader, now: float, started: float) -> str:
-        """Say why `reader` gets nothing at `now` from a writer of its topic; empty if all is well.
+        """Return why `reader` receives nothing at `now` from a writer of its topic; empty if all is well.
 
-        Silence counts from `started` [s], when the whole robot had become active.
+        Silence counts from `started` [s], when the whole robot became active.
         """
         (topic, message), writers = reader.route, self._of(reader.route[0])
         for writer in writers:

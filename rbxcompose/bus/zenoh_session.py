@@ -1,4 +1,4 @@
-"""Zenoh sessions: one peer for each process of a robot, and the router through which they find each other.
+"""Zenoh sessions: one peer for each process of a robot, and the router that lets them find each other.
 
 Nothing is left to Zenoh's defaults, which look for strangers on every network.
 """
@@ -16,8 +16,8 @@ import zenoh
 from rbxcompose.bus import shared_memory
 from rbxcompose.endpoints import folder_of, is_private, tcp_endpoint, unix_endpoint
 
-LEASE = 2000  # [ms] until a link that went silent counts as lost
-PATIENCE = 1000  # [ms] of a visitor with a router that does not answer
+LEASE = 2000  # [ms] until a silent link counts as lost
+PATIENCE = 1000  # [ms] that a visitor waits for a router
 _TAKEN = ("os error 98", "Unable to acquire lock")  # what Zenoh says of an endpoint in use
 _session_numbers = itertools.count()
 
@@ -25,11 +25,11 @@ _session_numbers = itertools.count()
 def _common() -> dict[str, object]:
     return {
         "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": True,  # without it, two peers of one router never exchange anything
+        "scouting/gossip/enabled": True,  # without it, two peers of one router never exchange data
         # Else two peers that learn of each other connect twice, once from each side, and keep both links alive.
         "scouting/gossip/autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}},
-        "scouting/delay": 0,  # a router would wait for as long before it opens
-        "timestamping/enabled": True,  # the caches of latched topics need it
+        "scouting/delay": 0,  # a router would wait this long before it opens
+        "timestamping/enabled": True,  # needed by the caches of latched topics
         "transport/link/tx/lease": LEASE,
         "transport/shared_memory/enabled": not shared_memory.problem(),  # else no session opens without room for it
         "transport/shared_memory/transport_optimization/pool_size": shared_memory.POOL,
@@ -44,7 +44,7 @@ def peer_settings(router: str) -> dict[str, object]:
         "listen/endpoints": [_endpoint_beside(router)],  # other peers connect to it once they know of each other
         "connect/endpoints": [router],
         "connect/retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2},
-        "connect/timeout_ms": -1,  # goes on trying for ever, in the background; 0 would mean once
+        "connect/timeout_ms": -1,  # retries forever, in the background; 0 would mean once
         "connect/exit_on_failure": False,
     }
 
@@ -69,14 +69,14 @@ def router_settings(endpoint: str) -> dict[str, object]:
 
 
 def client_settings(router: str) -> dict[str, object]:
-    """Return the configuration of a visitor, which hears through `router` of everything at once."""
+    """Return the configuration of a visitor, which learns of everything at once through `router`."""
     return {
         **_common(),
         "mode": "client",
         "connect/endpoints": [router],
         "connect/timeout_ms": PATIENCE,
         "connect/exit_on_failure": True,
-        "transport/unicast/open_timeout": PATIENCE,  # a router that was stopped takes connections, and says nothing
+        "transport/unicast/open_timeout": PATIENCE,  # a stopped router accepts connections but says nothing
     }
 
 

@@ -15,8 +15,8 @@ from rbxcompose.bus.threads import keep_attached
 from rbxcompose.bus.transport import EXPIRED, LONGEST_WAIT, Arrival, Closable, Question, RemotePublisher, TransportReply
 from rbxcompose.qos import Qos
 
-HEARTBEAT = 0.5  # [s] after a latched message, its sequence number is told again
-ZENOH_EXPIRED = "Timeout"  # what Zenoh answers in the place of a server
+HEARTBEAT = 0.5  # [s] after a latched message until its sequence number is repeated
+ZENOH_EXPIRED = "Timeout"  # Zenoh's answer in place of a server's
 GONE = "the server is gone"
 
 
@@ -29,7 +29,7 @@ class ZenohTransport:
         self._declared: dict[_Declared, None] = {}  # an ordered set
 
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
-        """Have `callback` run for `owner` by the scheduler."""
+        """Let the scheduler run `callback` for `owner`."""
         self._wake(owner, callback)
 
     def publisher(self, key: str, qos: Qos) -> RemotePublisher:
@@ -48,7 +48,7 @@ class ZenohTransport:
         return _LatchedPublisher(self._declared, latched)
 
     def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Closable:
-        """Receive what other processes publish; a latched one also what they published last."""
+        """Receive what other processes publish; if latched, also what they published last."""
         handler = _direct(lambda sample: arrived(_Arrival(sample)))
         if qos is not Qos.LATCHED:
             return self._keep(self._session.declare_subscriber(key, handler, allowed_origin=zenoh.Locality.REMOTE))
@@ -80,9 +80,9 @@ class ZenohTransport:
         of_all: bool = True,
         within: float = LONGEST_WAIT,
     ) -> Closable:
-        """Send a request. An answer or an error comes once the server has one or is gone; closing forgets it."""
+        """Send a request. It ends with an answer, or with an error when the server is gone; closing forgets it."""
         token = zenoh.CancellationToken()
-        # The query ends with `drop`: after an answer that is nothing new, without one the server is gone.
+        # The query ends with `drop`: after an answer, that means nothing; without one, the server is gone.
         handler = _direct(lambda reply: answered(_answer(reply)), lambda: answered(TransportReply(error=GONE)))
         self._session.get(
             key,
@@ -91,23 +91,23 @@ class ZenohTransport:
             attachment=attachment,
             target=zenoh.QueryTarget.ALL_COMPLETE if of_all else zenoh.QueryTarget.BEST_MATCHING,
             consolidation=zenoh.ConsolidationMode.NONE,
-            timeout=within,  # Zenoh keeps some 800 B of each query until then, also of one that was answered
+            timeout=within,  # Zenoh keeps some 800 B of each query until then, even if it was answered
             cancellation_token=token,
             **_options(SERVICE_SENDING, "reliability"),
         )
         return _Asked(token)
 
     def announce(self, token: str) -> Closable:
-        """Show a token for as long as it is not closed and this process lives."""
+        """Show a token until it is closed or this process ends."""
         return self._keep(self._session.liveliness().declare_token(token))
 
     def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Closable:
-        """Hear which tokens match: those that exist now, those that come (True), those that go (False)."""
+        """Report matching tokens: those that exist now or appear (True), and those that go (False)."""
         handler = _direct(lambda sample: changed(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
         return self._keep(self._session.liveliness().declare_subscriber(pattern, handler, history=True))
 
     def close(self) -> None:
-        """Withdraw everything and close the session, which would hang with a latched subscription left."""
+        """Withdraw everything and close the session, which would hang if a latched subscription were left."""
         for declared in reversed(list(self._declared)):
             declared.close()
         self._session.close()  # type: ignore[no-untyped-call]
@@ -138,8 +138,8 @@ class _Publisher(_Declared):
         super().__init__(declared, publisher)
         self.has_match = False
         self._publisher = publisher
-        # A listener, since asking for the status costs as much as sending. It tells of changes only; and unlike its
-        # type stub says, the status is an object, which is always true.
+        # A listener, since querying the status costs as much as sending. It reports only changes; and contrary to its
+        # type stub, the status is an object, which is always true.
         publisher.declare_matching_listener(_direct(self._match))
         status: Any = publisher.matching_status
         if status.matching:
@@ -164,7 +164,7 @@ class _LatchedPublisher(_Declared):
 
 
 class _Arrival:
-    """A sample; its bytes are copied only if somebody takes them."""
+    """A sample; its bytes are copied only on access."""
 
     __slots__ = ("_sample",)
 
@@ -190,7 +190,7 @@ class _Question(_Arrival):
         self._key, self._query = key, query
 
     def reply(self, payload: bytes, attachment: bytes) -> None:
-        with self._query:  # it is over for the asker once it is left
+        with self._query:  # leaving the block ends the query for the client
             self._query.reply(self._key, payload, attachment=attachment)
 
     def fail(self, error: str) -> None:

@@ -1,4 +1,4 @@
-"""A speed at which the base drops its commands."""
+"""A speed at which the base ignores its commands."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from rbxcompose.model.robot import Robot
 def absurd_speed(robot: Robot) -> Iterator[Finding]:
     """A component drives so fast that its base drops the commands
 
-    A base treats a command above twice its limit as a fault of the sender and does not follow it, so the robot would
-    not move. Often a unit is wrong.
+    A base treats a command above twice its limit as a fault of the sender and ignores it, so the robot would not move.
+    Often a unit is wrong.
 
     Bad:
     ```yaml

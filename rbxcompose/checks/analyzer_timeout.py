@@ -14,9 +14,9 @@ REPORTS = 1.0  # [s] between two reports of a component's status
 
 @check("RBX5005")
 def analyzer_timeout(robot: Robot) -> Iterator[Finding]:
-    """An analyzer gives its components up between two reports
+    """An analyzer treats its components as stale between two reports
 
-    Components report once a second. With a shorter `timeout` they are STALE between two reports.
+    Components report once a second. With a shorter `timeout` they become STALE in between.
 
     Bad:
     ```yaml

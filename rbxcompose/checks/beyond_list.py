@@ -1,4 +1,4 @@
-"""An item of a list that is not there."""
+"""A list item that does not exist."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX4132", Severity.WARNING)
 def beyond_list(robot: Robot) -> Iterator[Finding]:
-    """An item of a list that is not there
+    """A list item that does not exist
 
-    List items are counted from 0, so the last of two is `$rooms[1]`. If nothing sets the list, an item past its end
+    List items are counted from 0, so the last of two is `$rooms[1]`. If nothing changes the list, an item past its end
     never exists: a node that needs it fails, and a condition on it never holds.
 
     Bad:
@@ -40,7 +40,7 @@ def beyond_list(robot: Robot) -> Iterator[Finding]:
         known = constants(mission)
         for scalar, expression in _expressions(mission.program):
             if any(isinstance(tree, FunctionCall) and tree.function == "count" for tree, _ in walk(expression.tree)):
-                continue  # it asks how long the list is before it takes the item
+                continue  # the expression checks how long the list is before it takes the item
             for tree, _ in walk(expression.tree):
                 match tree:
                     case Index(of=Variable(name=name), index=Number(value=index)):
@@ -64,4 +64,4 @@ def _expressions(program: Program) -> Iterator[tuple[ScalarNode, Expression]]:
                 try:
                     yield argument.value, expression_of(argument.value)
                 except ExpressionError:
-                    continue  # it is told where missions are read
+                    continue  # reported where missions are read

@@ -1,4 +1,4 @@
-"""A charge that ends below the level that calls for it."""
+"""A charge that ends below the level that triggers it."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from rbxcompose.units import RATIO, format_quantity
 
 @check("RBX4121")
 def charge_and_call(robot: Robot) -> Iterator[Finding]:
-    """A charge ends below the level that calls for it
+    """A charge ends below the level that triggers it
 
     The charger stops at 99 %. If the interrupt's condition still holds then, the reaction has not removed its cause,
-    and the interrupt cannot act again.
+    and the interrupt cannot fire again.
 
     Bad:
     ```yaml

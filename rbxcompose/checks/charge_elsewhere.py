@@ -35,7 +35,7 @@ def charge_elsewhere(robot: Robot) -> Iterator[Finding]:
         ways = ways_of(robot, mission)
         if ways is None:
             continue
-        list(too_short(ways, constants(mission)))  # goes through all of the mission
+        list(too_short(ways, constants(mission)))  # consumed for its side effect: it walks the whole mission
         for number, here in ways.starts_at.items():
             node = mission.program.nodes[number]
             charger, charges = charger_of(robot, node.skill) or (None, None)

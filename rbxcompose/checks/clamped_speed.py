@@ -42,7 +42,7 @@ def clamped_speed(robot: Robot) -> Iterator[Finding]:
 
 @dataclass(frozen=True, slots=True)
 class Excess:
-    """A setting of a driver that is above the limit of its base."""
+    """A setting of a component that exceeds the limit of the base it drives."""
 
     drive: Drive
     wanted: Setting[float]
@@ -51,23 +51,23 @@ class Excess:
 
     @property
     def is_absurd(self) -> bool:
-        """Return whether the base drops such commands instead of cutting them."""
+        """Return whether the base ignores such commands instead of clamping them."""
         factor = self.drive.drives.drops_above
         return factor is not None and self.wanted.value > factor.value * self.limit.value
 
     def shown(self, setting: Setting[float]) -> str:
-        """Write the value of one of the settings for people."""
+        """Return the value of one of the settings, formatted for people."""
         return format_quantity(setting.value, self.dimension)
 
     @property
     def times(self) -> str:
-        """Return in words how many times its limit the base follows."""
+        """Return, in words, the multiple of its limit up to which the base accepts commands."""
         factor = self.drive.drives.drops_above
         return "twice" if factor is None or factor.value == 2.0 else f"{factor.value:g} times"
 
     @property
     def remedy(self) -> str:
-        """Return what to do about it."""
+        """Return how to correct it."""
         if self.wanted.field:
             return f"make '{self.wanted.field}' of '{self.drive.driver.name}' at most {self.shown(self.limit)}"
         if self.limit.field:
@@ -75,7 +75,7 @@ class Excess:
         return OTHER_TYPE
 
     def finding(self, robot: Robot, kind: FindingKind, what: str) -> Finding:
-        """Return the finding; `what` the base does about it."""
+        """Return the finding; `what` says how the base reacts."""
         driver, base, name = self.drive.driver, self.drive.base, self.limit.field
         there = (base, name)
         span, limit = setting_span(robot, (driver, self.wanted.field), there), setting_span(robot, there)
@@ -88,7 +88,7 @@ class Excess:
 
 
 def excesses(robot: Robot) -> Iterator[Excess]:
-    """Yield the speeds and turn rates above the limits of the base that they are for."""
+    """Yield the speeds and turn rates that exceed the limits of the base they drive."""
     for one in MessageFlow(robot).drives():
         wants, has = one.commands, one.drives
         speeds = (wants.max_speed, has.max_speed, SPEED), (wants.max_turn_rate, has.max_turn_rate, ANGULAR_SPEED)

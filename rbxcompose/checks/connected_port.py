@@ -1,4 +1,4 @@
-"""A port that is connected, but not there."""
+"""A connected port that does not exist."""
 
 from __future__ import annotations
 

@@ -18,9 +18,10 @@ from rbxcompose.units import RATIO, TIME, format_quantity
 
 @check("RBX4124", Severity.WARNING)
 def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
-    """The battery may be empty before the robot is at its dock
+    """The battery may be empty before the robot reaches its dock
 
-    At the level at which the mission breaks off, the charge must last for the way from the farthest place to the dock.
+    At the level at which the mission is interrupted, the charge must last for the way from the farthest place to the
+    dock.
 
     Bad:
     ```yaml
@@ -49,7 +50,7 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
         ways, known = ways_of(robot, mission), constants(mission)
         if ways is None:
             continue
-        list(too_short(ways, known))  # goes through all of the mission
+        list(too_short(ways, known))  # consumed for its side effect: it walks the whole mission
         for call in calls(robot, mission):
             goals = (
                 goal_place(node, ways.driving.main, known, ways.places)

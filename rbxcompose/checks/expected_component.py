@@ -1,4 +1,4 @@
-"""An expected name that is not there."""
+"""An expected component that does not exist."""
 
 from __future__ import annotations
 

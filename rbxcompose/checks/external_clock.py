@@ -1,4 +1,4 @@
-"""Real drivers under a time from outside."""
+"""Real drivers that follow an outside clock."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX8002")
 def external_clock(robot: Robot) -> Iterator[Finding]:
-    """The real robot keeps its own time
+    """The real robot must keep its own time
 
-    With `clock: external`, robot time is that of a simulator: it may run slower, stand still or jump. A real motor
-    keeps running meanwhile, and no deadline would stop it.
+    With `clock: external`, robot time follows a simulator: it may run slower, stand still or jump. A real motor keeps
+    running meanwhile, and no deadline would stop it.
 
     Bad: `rbxcompose up robot.yaml --real`, with
     ```yaml
     bus:
       clock: external
     ```
-    Good: its own clock, which is the default; a profile for the simulator may choose the other one.
+    Good: its own clock, which is the default; a profile for the simulator may choose `external`.
     ```yaml
     bus:
       clock: own

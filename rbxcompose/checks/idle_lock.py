@@ -1,4 +1,4 @@
-"""A lock that holds nothing back."""
+"""A lock that blocks no input."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3105")
 def idle_lock(robot: Robot) -> Iterator[Finding]:
-    """A lock of a mux holds back no input
+    """A lock of a mux blocks no input
 
-    A silent lock holds back the inputs with a lower priority than its own. If there are none, the robot drives as if
-    the lock did not exist.
+    A silent lock blocks the inputs with a lower priority than its own. If there are none, the robot drives as if the
+    lock did not exist.
 
     Bad:
     ```yaml

@@ -15,7 +15,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX7001", Severity.WARNING)
 def idle_overlay(robot: Robot) -> Iterator[Finding]:
-    """A profile or an overlay sets a value to what it is already
+    """A profile or an overlay sets a value to what it already is
 
     It changes nothing. Perhaps you meant another value, or the robot has changed since.
 
@@ -49,7 +49,7 @@ def idle_overlay(robot: Robot) -> Iterator[Finding]:
 
 
 def changes(robot: Robot) -> Iterator[tuple[HistoryStep, HistoryStep, str]]:
-    """Yield what one layer wrote in the place of what a layer before it wrote, with its path; `--set` may repeat."""
+    """Yield each value of a layer and the earlier value it replaces, with the path; `--set` may repeat values."""
     for path in robot.manifest.history.paths:
         for before, after in pairwise(robot.manifest.history.of(path)):
             if after.span.file != SET:

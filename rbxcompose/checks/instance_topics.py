@@ -15,8 +15,8 @@ from rbxcompose.sdk.ports import Out
 def instance_topics(robot: Robot) -> Iterator[Finding]:
     """Two instances of a part publish on the same topic
 
-    A subscriber would receive both and could not tell them apart. Topics do not contain the names of instances: give
-    the topics of one instance other names with `connect:`. Absolute topics such as `/tf` are shared on purpose.
+    A subscriber would receive both and could not tell them apart. Topics do not contain instance names: rename the
+    topics of one instance with `connect:`. Absolute topics such as `/tf` are shared on purpose.
 
     Bad:
     ```yaml

@@ -1,4 +1,4 @@
-"""An input of a mux that stays live long after its source fell silent."""
+"""A mux input that stays live long after its source fell silent."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LONGEST = 60.0  # [s]: commands come many times a second
 def long_timeout(robot: Robot) -> Iterator[Finding]:
     """An input of a mux stays live long after its source fell silent
 
-    An input is live until its `timeout` has passed since its last message. Until then it holds back inputs of a lower
+    An input is live until its `timeout` has passed since its last message. Until then it blocks inputs of a lower
     priority. Commands come many times a second; a source that has been silent for a minute will not continue. A bare
     number counts in seconds: `500` is more than eight minutes.
 

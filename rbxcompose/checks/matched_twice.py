@@ -11,7 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX5004", Severity.WARNING)
 def matched_twice(robot: Robot) -> Iterator[Finding]:
-    """Two entries of analyzers name the same component
+    """Two analyzers name the same component
 
     The component would appear in both groups, and its faults would count twice.
 

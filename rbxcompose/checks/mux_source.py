@@ -1,4 +1,4 @@
-"""A mux whose source does not exist."""
+"""A mux input whose source does not exist."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def mux_source(robot: Robot) -> Iterator[Finding]:
 
 @dataclass(frozen=True, slots=True)
 class Wrong:
-    """What is wrong with a source, what may help, and the name in it that is none of `valid`, if one is."""
+    """An error in a source: what may help, and the name in it that is not one of `valid`, if any."""
 
     message: str
     help: str = ""
@@ -61,7 +61,7 @@ class Wrong:
 
 
 def missing(robot: Robot, source: str) -> Wrong | None:
-    """Return what is wrong with the source of a mux input; None if it is there."""
+    """Return what is wrong with the source of a mux input; None if it exists."""
     component, _, port = source.partition(".")
     if component not in robot.written:
         message = f"takes from a component that the robot does not have: '{component}'"
@@ -72,7 +72,7 @@ def missing(robot: Robot, source: str) -> Wrong | None:
         return Wrong(message, help_text, component, valid)
     part = robot.components.get(component)
     if part is None:
-        return None  # it is there, but broken: that is said at its own place
+        return None  # it exists, but has mistakes, which are reported at their own place
     outputs = [end.name for end in part.ends if isinstance(end.port, Out)]
     if port and port not in outputs:
         message = f"takes from an output that '{component}' does not have: '{port}'"
@@ -83,7 +83,7 @@ def missing(robot: Robot, source: str) -> Wrong | None:
 
 
 def unclear(robot: Robot, mux: str, source: str) -> Wrong | None:
-    """Return what is wrong with the source of an input that does not say which of several outputs is meant."""
+    """Return the error of a source that does not say which of several outputs is meant, None if it is clear."""
     component, _, port = source.partition(".")
     part = robot.components.get(component)
     if part is None or port:

@@ -1,4 +1,4 @@
-"""A mux input that is given up between two messages."""
+"""A mux input that times out between two messages."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from rbxcompose.units import TIME, format_quantity
 
 @check("RBX3101")
 def mux_timeout(robot: Robot) -> Iterator[Finding]:
-    """A mux gives up an input between two of its messages
+    """An input of a mux times out between two of its messages
 
     An input is live until its `timeout` has passed since its last message. If the source publishes less often than
-    that, the mux drops it after each message: the robot jerks, or a source of a lower priority drives in between. With
-    less than two periods, a single late or lost message is enough for that.
+    that, the input times out after each message: the robot jerks, or a source of a lower priority drives in between.
+    With a timeout below two periods, a single late or lost message is enough for that.
 
     Bad:
     ```yaml

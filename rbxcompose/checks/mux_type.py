@@ -1,4 +1,4 @@
-"""A mux input of another type than the mux."""
+"""A mux input whose type differs from that of the mux."""
 
 from __future__ import annotations
 

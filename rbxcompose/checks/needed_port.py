@@ -1,4 +1,4 @@
-"""What a component needs and nothing provides."""
+"""A component's need that nothing meets."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ SERVED_BY = {Calls: Serves, CallsAction: ServesAction, In: Out}
 
 @check("RBX3010", Severity.WARNING)
 def needed_port(robot: Robot) -> Iterator[Finding]:
-    """A component needs what nothing in the robot provides
+    """A component needs something that nothing in the robot provides
 
     An input without a publisher stays silent, and a service without a server never responds. Often the component that
-    should provide it is on another topic, or is missing.
+    should provide it uses another topic, or is missing.
 
     Bad:
     ```yaml
@@ -45,19 +45,19 @@ def needed_port(robot: Robot) -> Iterator[Finding]:
     lost = {end.type_name for ends in robot.writers.values() for end in ends if is_unheard(robot, end)}
     for component in robot.components.values():
         if component.declared(RunsMissions):
-            continue  # its values may come from outside, and its skills are those that are there
+            continue  # its values may come from outside, and its skills are those that exist
         needed = [
             end for end in component.ends if type(end.port) in SERVED_BY and not getattr(end.port, "is_open", False)
         ]
         missing = [end for end in needed if (SERVED_BY[type(end.port)], end.topic) not in given]
-        # A command that goes nowhere is told where it leaves.
+        # A command without a subscriber is reported at its publisher.
         ends = [end for end in missing if not (_is_command(end) and end.type_name in lost)]
         if ends:
             yield _finding(robot, component, ends)
 
 
 def is_unheard(robot: Robot, end: PortEnd) -> bool:
-    """Return whether commands leave at this end and nothing receives them."""
+    """Return whether this end publishes commands that nothing receives."""
     return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND and end.topic not in robot.readers
 
 
@@ -78,5 +78,5 @@ def _finding(robot: Robot, component: RobotComponent, ends: list[PortEnd]) -> Fi
 
 
 def _fits(end: PortEnd, other: PortEnd) -> bool:
-    is_another = other.instance != end.instance  # what listens to itself gets nothing
+    is_another = other.instance != end.instance  # a component that subscribes to itself receives nothing
     return is_another and type(other.port) is SERVED_BY[type(end.port)] and other.type_name == end.type_name

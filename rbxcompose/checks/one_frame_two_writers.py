@@ -1,4 +1,4 @@
-"""One frame whose pose is written by two components."""
+"""One frame whose pose two components write."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.model.wires import PortEnd
 from rbxcompose.sdk.capabilities import WritesFrame
 
-STATIC = "_static"  # ends the topic of transforms that never change; both topics tell one tree
+STATIC = "_static"  # suffix of the topic of static transforms; both topics describe one tree
 
 
 @check("RBX3014", Severity.WARNING)
 def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
     """Two components write the pose of the same frame
 
-    A frame has one pose in one other frame. If two components write it, whoever looks it up gets now one pose, now the
-    other, and drives by the wrong one. Two bases do this even if each of them follows commands of its own.
+    A frame has one pose in one other frame. If two components write it, a look-up returns now one pose, now the other,
+    and the robot drives by the wrong one. This happens with two bases even if each follows commands of its own.
 
     Bad:
     ```yaml
@@ -69,14 +69,14 @@ def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
 
 @dataclass(frozen=True, slots=True)
 class FrameWriter:
-    """A component that writes a frame, and the end where it does."""
+    """A component that writes a frame, and the port it uses for that."""
 
     component: RobotComponent
     frame: WritesFrame
     end: PortEnd
 
     def span(self, robot: Robot) -> Span:
-        """Return the place of the frame's name if it is written down, else that of what brings the component."""
+        """Return the place of the frame's name if it is written, else that of the entry that brings the component."""
         component, field = self.component, self.frame.child.field
         return (
             setting_span(robot, (component, field))

@@ -39,7 +39,7 @@ def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
         (resolve(f"{mux}/{name}", robot.manifest.bus.namespace or ""), one.source.partition(".")[0])
         for mux, entry in robot.manifest.muxes.items()
         for name, one in entry.inputs.items()
-        if one.source  # what does not fit there is said where the mux names its source
+        if one.source  # a type that does not fit there is reported where the mux names its source
     }
     ends = [end for end in robot.ends if not isinstance(end.port, Looks) and (end.topic, end.instance) not in taken]
     for topic, group in groupby(sorted(ends, key=lambda end: end.topic), key=lambda end: end.topic):
@@ -61,7 +61,7 @@ def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
 
 
 def _name_used_twice(robot: Robot, mux: str, name: str) -> Finding:
-    """Return the finding for a mux of which an input and a lock have one name, and so one topic."""
+    """Return the finding for a mux that has an input and a lock of the same name, and so on one topic."""
     return one_topic_two_types.at(
         robot.key("muxes", mux, "locks", name),
         f"mux '{mux}' uses the name '{name}' twice, for an input and for a lock: both are the topic '{mux}/{name}'",

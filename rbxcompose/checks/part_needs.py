@@ -18,7 +18,7 @@ WIRES: tuple[tuple[type[Port[Any]], type[Port[Any]]], ...] = ((Out, In), (Calls,
 
 @check("RBX3021")
 def part_needs(robot: Robot) -> Iterator[Finding]:
-    """A part needs a topic that nothing else has
+    """A part needs a topic that nothing else provides
 
     `needs:` of a part lists topics with their types. Something outside the part must subscribe to what the part
     publishes, publish what it subscribes to, or serve what it calls.
@@ -58,17 +58,17 @@ def part_needs(robot: Robot) -> Iterator[Finding]:
 
 
 def own_instances(part: IncludedPart) -> frozenset[str]:
-    """Return all that a part brought; a mux that it has an input of is its own end of the wire."""
+    """Return all instances that a part brought, including muxes: a mux that it feeds is its own end of the wire."""
     return part.components | part.muxes
 
 
 def is_type(end: PortEnd, written: str) -> bool:
-    """Return whether an end has the type that a part writes: `geometry_msgs/Twist`."""
+    """Return whether an end has the type written in a part: `geometry_msgs/Twist`."""
     return short(end.type_name) == short(written)
 
 
 def short(type_name: str) -> str:
-    """Return a type as people write it: without the middle of `geometry_msgs/msg/Twist`."""
+    """Return the short form of a type: `geometry_msgs/msg/Twist` without its middle."""
     package, _, name = type_name.partition("/")
     return f"{package}/{name.rpartition('/')[-1]}"
 
@@ -79,6 +79,6 @@ def _at(robot: Robot, topic: str) -> list[PortEnd]:
 
 
 def _answers(own: Iterable[PortEnd]) -> tuple[type[Port[Any]], ...]:
-    """Return what may stand at the other ends of the wires of these."""
+    """Return the types of ports that may be at the other end of the wires of `own`."""
     pairs = [*WIRES, *(wire[::-1] for wire in WIRES)]
     return tuple({other for end in own for one, other in pairs if isinstance(end.port, one)})

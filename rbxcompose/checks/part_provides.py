@@ -1,4 +1,4 @@
-"""A promise of a part that it does not keep."""
+"""A promise that a part does not keep."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 
 @check("RBX3022")
 def part_provides(robot: Robot) -> Iterator[Finding]:
-    """A part does not have what it says that it provides
+    """A part lacks something that it says it provides
 
-    `provides:` of a part lists the topics with their types, the skills and the values that it gives to the rest of the
+    `provides:` of a part lists the topics with their types, the skills and the values that it offers to the rest of the
     robot. A file that includes the part relies on them.
 
     Bad:
@@ -45,7 +45,7 @@ def part_provides(robot: Robot) -> Iterator[Finding]:
     for part in robot.manifest.parts.values():
         ends = [end for name in own_instances(part) & robot.components.keys() for end in robot.components[name].ends]
         if (part.components & robot.written) - robot.components.keys():
-            continue  # one of its components has mistakes, which are said at their own places
+            continue  # one of its components has mistakes, which are reported at their own places
         for claim in part.claims:
             if claim.about is not About.NEED and (what := _lacking(robot, claim, ends)):
                 message = f"part '{part.name}' does not have {what}, which it says it provides"
@@ -58,7 +58,7 @@ def _serves(end: PortEnd, skill: str) -> bool:
 
 
 def _lacking(robot: Robot, claim: Claim, ends: list[PortEnd]) -> str:
-    """Return what a part promises and does not have, in words; nothing if it keeps its promise."""
+    """Return what a part promises but lacks, in words; empty if it keeps its promise."""
     match claim.about:
         case About.VALUE if at(robot.manifest.root, ("values", claim.name)) is None:
             return f"the value '{claim.name}'"

@@ -1,4 +1,4 @@
-"""A listener that bypasses a mux."""
+"""A subscriber that bypasses a mux."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from rbxcompose.sdk.ports import In
 
 @check("RBX3102")
 def past_the_mux(robot: Robot) -> Iterator[Finding]:
-    """A component listens to an input of a mux instead of its output
+    """A component subscribes to an input of a mux instead of its output
 
-    It would follow that one source whatever its priority, even while the robot is stopped.
+    It would follow this one source regardless of priority, even while the robot is stopped.
 
     Bad:
     ```yaml
@@ -49,7 +49,7 @@ def past_the_mux(robot: Robot) -> Iterator[Finding]:
 
 
 def _output(robot: Robot, end: PortEnd) -> str:
-    """Return the topic to which a mux forwards what comes in at this end; nothing if it is no input of a mux."""
+    """Return the topic to which a mux forwards what this end receives; empty if it is not an input of a mux."""
     mux = robot.components[end.instance]
     muxed = (mux.end(one.output) for one in mux.declared(Forwards) if end.name in one.inputs)
     return next((output.port.topic for output in muxed if output), "")

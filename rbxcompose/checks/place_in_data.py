@@ -1,4 +1,4 @@
-"""A place in the data of a mission that does not exist."""
+"""Mission data that name a place that does not exist."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ def place_in_data(robot: Robot) -> Iterator[Finding]:
 
 
 def _shortened(program: Program) -> Constants:
-    """Return the data that only lose items: what is left of them was there from the start."""
+    """Return the data that only ever lose items: what remains of them was there from the start."""
     names = (written(program) & program.data.keys()) - replaced(program)
     return {name: program.data[name].value for name in names}
 
 
 def _place_of(program: Program, datum: str, text: str) -> Span:
-    """Return where a text stands in a datum; the name of the datum, if it is not found."""
+    """Return the place of a text in a datum, or that of the datum's name if the text is not found."""
     match at(program.root, ("data", datum)):
         case MappingNode(entries=entries) if text in entries:
             return entries[text].key.span
@@ -79,7 +79,7 @@ def _place_of(program: Program, datum: str, text: str) -> Span:
 
 
 def _goals(robot: Robot, program: Program) -> Iterator[tuple[MissionNode, str]]:
-    """Yield each skill that gets a pose by `$name` alone, with that name."""
+    """Yield each node whose skill takes a pose from a plain `$name`, with that name."""
     for node in program.nodes:
         skill = robot.skills[node.skill].skill if node.skill in robot.skills else None
         for argument in node.step.arguments if skill else ():
@@ -95,7 +95,7 @@ def _goals(robot: Robot, program: Program) -> Iterator[tuple[MissionNode, str]]:
 
 
 def _texts(program: Program, node: MissionNode, name: str, known: Constants) -> Iterator[tuple[str, str]]:
-    """Yield the texts that `$name` can be at a node, each with the datum that it stands in."""
+    """Yield the texts that `$name` can be at a node, each with the datum that contains it."""
     above = node
     while above.parent is not None:
         above = program.nodes[above.parent]

@@ -1,4 +1,4 @@
-"""Two places at one spot."""
+"""Two places with the same pose."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A list that was replaced where it was perhaps to grow."""
+"""A list that was replaced, but was probably meant to be extended."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX7002", Severity.WARNING)
 def shortened_list(robot: Robot) -> Iterator[Finding]:
-    """A profile or an overlay adds to a list and drops what was in it
+    """A profile or an overlay adds to a list and drops its old items
 
     Maps are merged, but a list replaces the one below it. A list with new items that lacks some of the old ones was
     probably meant to extend them. `!replace` before the list says that you mean it.
@@ -51,12 +51,12 @@ def shortened_list(robot: Robot) -> Iterator[Finding]:
 
 
 def dropped(robot: Robot) -> set[str]:
-    """Return all words that lists have lost so."""
+    """Return all words that lists lose in this way."""
     return {word for before, after, _ in changes(robot) for word in lost(before.node, after.node)}
 
 
 def lost(before: TreeNode | None, after: TreeNode | None) -> list[str]:
-    """Return the words of a list that are in the new one no more, if that has something new and no `!replace`."""
+    """Return the words missing from a new list that also adds some and is not marked `!replace`."""
     if not isinstance(after, SequenceNode) or after.tag == REPLACE:
         return []
     old, new = _words(before), _words(after)

@@ -1,4 +1,4 @@
-"""A start mission that is not there."""
+"""A start mission that does not exist."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def start_mission(robot: Robot) -> Iterator[Finding]:
 
 
 def _files(places: Iterable[Span], start: str) -> list[str]:
-    """Return the mission files of the project that are named like it, as the first of some files has to write them."""
+    """Return the project's mission files of this name, as the first existing file of `places` has to write them."""
     writer = next((path for one in places if (path := Path(one.file)).is_file()), None)  # `--set` and the library: none
     found = files_named(f"{start}{_ENDING}", writer) if writer else []
     return [one for one in found if writer and _is_mission(writer.resolve().parent / one)]

@@ -1,4 +1,4 @@
-"""A start order that cannot be kept."""
+"""A start order that cannot be satisfied."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One output for two inputs of muxes."""
+"""One output that two mux inputs take."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3106")
 def taken_twice(robot: Robot) -> Iterator[Finding]:
-    """Two inputs of muxes take the same output
+    """Two mux inputs take the same output
 
     An output publishes on one topic, so only one of the inputs would ever receive it.
 

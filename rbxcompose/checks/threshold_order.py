@@ -14,7 +14,7 @@ from rbxcompose.units import RATIO, format_quantity
 
 @check("RBX3502")
 def threshold_order(robot: Robot) -> Iterator[Finding]:
-    """A battery is in error before it warns
+    """A battery reports an error before it warns
 
     Below `warn` the status of a battery is WARN, below `error` it is ERROR. With `error` above `warn`, there is never a
     warning.

@@ -15,7 +15,7 @@ from rbxcompose.units import LENGTH, TIME, format_quantity
 
 @check("RBX4120", Severity.WARNING)
 def timeout_and_way(robot: Robot) -> Iterator[Finding]:
-    """A timeout is shorter than what it is for
+    """A timeout is shorter than the step it limits
 
     The way from one place to the next, straight and at full speed, takes longer than the step's timeout, so the step
     would fail each time. Waits are checked in the same way.

@@ -15,8 +15,8 @@ from rbxcompose.sdk.capabilities import Drives
 def two_bases(robot: Robot) -> Iterator[Finding]:
     """Two bases follow the same commands
 
-    A base takes commands and publishes its position as odometry. If two bases follow one topic, both move and both say
-    where the robot is: a component that drives to a place would see two poses in turn.
+    A base takes commands and publishes its position as odometry. If two bases follow one topic, both move and both
+    report where the robot is: a component that drives to a place would receive two poses in turn.
 
     Bad:
     ```yaml
@@ -48,5 +48,5 @@ def two_bases(robot: Robot) -> Iterator[Finding]:
 
 
 def _moves(robot: Robot, end: PortEnd) -> bool:
-    """Return whether the robot moves by what comes in at this end."""
+    """Return whether commands received at this end move the robot."""
     return any(end.name == one.commands for one in robot.components[end.instance].declared(Drives))

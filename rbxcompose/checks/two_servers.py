@@ -15,7 +15,7 @@ from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 def two_servers(robot: Robot) -> Iterator[Finding]:
     """Two components serve the same service or action
 
-    Either of them might respond to a client; nobody knows which.
+    Either of them might respond to a client; which one is undefined.
 
     Bad:
     ```yaml
@@ -57,5 +57,5 @@ def two_servers(robot: Robot) -> Iterator[Finding]:
 
 
 def _answers(end: PortEnd) -> bool:
-    """Return whether a client there waits for an answer; an order whose end is not reported may go to several."""
+    """Return whether a client of this end waits for an answer; an order whose end is not reported may go to several."""
     return isinstance(end.port, Serves | ServesAction) or (isinstance(end.port, ServesTopic) and bool(end.port.ends))

@@ -15,7 +15,7 @@ from rbxcompose.sdk.ports import ServesAction, ServesTopic
 def two_skills(robot: Robot) -> Iterator[Finding]:
     """Two actions are the same skill
 
-    A skill is named after the last word of the topic of its action, or of the topic that takes its orders. Missions
+    A skill is named after the last word of the topic of its action, or of the topic that receives its orders. Missions
     could not tell the two apart.
 
     Bad:

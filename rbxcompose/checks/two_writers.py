@@ -16,7 +16,7 @@ from rbxcompose.sdk.ports import Out
 
 
 def is_command(end: PortEnd) -> bool:
-    """Return whether commands leave at this end."""
+    """Return whether this end publishes commands."""
     return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND
 
 
@@ -63,7 +63,7 @@ def two_writers(robot: Robot) -> Iterator[Finding]:
     for topic, ends in groupby(commands, key=lambda end: end.topic):
         mux = robot.manifest.muxes.get(topic.strip("/"))
         if mux and any(one.source and missing(robot, one.source) for one in mux.inputs.values()):
-            continue  # the mux was to take one of them, and its mistake is said at its own place
+            continue  # the mux was to take one of them, and its mistake is reported at its own place
         writers = sorted(ends, key=lambda end: robot.component_span(end.instance))
         first, *others = writers
         for other in others:
@@ -77,7 +77,7 @@ def two_writers(robot: Robot) -> Iterator[Finding]:
 
 
 def _remedy(robot: Robot, topic: str, writers: Iterable[PortEnd], both: tuple[str, str]) -> str:
-    """Return how two of the writers get along: in the mux that is a writer too, or else in a new one."""
+    """Return how to combine two of the writers: in the mux that is also a writer, or else in a new one."""
     mux = next((one.instance for one in writers if robot.components[one.instance].declared(Forwards)), None)
     if mux is None:
         return f"put both into a mux: 'muxes: {{{topic.strip('/')}: ...}}' with an input 'from:' each"

@@ -12,10 +12,10 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3011", Severity.WARNING)
 def unheard_command(robot: Robot) -> Iterator[Finding]:
-    """Commands go to a topic without a subscriber
+    """Commands are published on a topic without a subscriber
 
-    The publisher believes that it drives the robot, but nothing moves. A mux is named after the topic that it
-    publishes; a base subscribes to `cmd_vel`.
+    The publisher assumes that it drives the robot, but nothing moves. A mux is named after the topic that it publishes;
+    a base subscribes to `cmd_vel`.
 
     Bad:
     ```yaml

@@ -39,7 +39,7 @@ def unread_name(robot: Robot) -> Iterator[Finding]:
     for mission in robot.missions.values():
         program = mission.program
         if program.file in seen:
-            continue  # the same file as another mission
+            continue  # shares its file with another mission
         seen.add(program.file)
         read = program.reads()
         for node in program.nodes:

@@ -40,14 +40,14 @@ def _missing(robot: Robot, name: str, source: str) -> Wrong | None:
     part = robot.components.get(component)
     if part is None:
         if component in robot.written:
-            return None  # it is there, but broken: that is said at its own place
+            return None  # it exists, but has mistakes, which are reported at their own place
         message = f"comes from a component that the robot does not have: '{component}'"
         return Wrong(
             message, suggest(component, robot.components, "components of this robot"), component, robot.components
         )
     outputs = [end.name for end in part.ends if isinstance(end.port, Out)]
     if name in robot.values:
-        return None  # also the level of a group of the diagnostics
+        return None  # the level of a diagnostics group is a value, too
     if not dot:
         message = f"names a component; it must name one of its outputs, as '{component}.PORT'"
         return Wrong(message, suggest("", outputs, "ports"))

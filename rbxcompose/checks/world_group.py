@@ -1,4 +1,4 @@
-"""Simulated and real things in one process."""
+"""Components of the robot in the process of the simulated world."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ WORLD = "world"
 
 @check("RBX6001", Severity.WARNING)
 def world_group(robot: Robot) -> Iterator[Finding]:
-    """The process group `world` is for simulated truth, and for nothing else
+    """The process group `world` is for simulated truth only
 
-    Simulated truth (where the robot is, how much charge it has) lives in the process group `world`, so that the end of
-    any other process never changes it. A component of the robot itself does not belong there: if the process `world`
+    Simulated truth (where the robot is, how much charge it has) lives in the process group `world`, so that the death
+    of any other process never changes it. A component of the robot itself does not belong there: if the process `world`
     fails, the robot goes down.
 
     Bad:

@@ -1,1 +1,1 @@
-"""The command line: one file per verb, and what they share in packages."""
+"""The command line: one file per verb, and packages with what they share."""

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do what is asked for."""
+    """Run the chosen subcommand."""
     return visit(arguments, lambda guest: int(arguments.do(guest, arguments)))
 
 
@@ -29,6 +29,6 @@ def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
 
 
 def _send(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.bus.action_send import send  # what messages need would slow down the list
+    from rbxcompose.cli.bus.action_send import send  # the imports for messages would slow down the list
 
     return send(guest, arguments)

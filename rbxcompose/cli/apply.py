@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Compile the robot, show what would change in the one that runs, change it."""
+    """Compile the robot, show what would change in the running one, and apply the change."""
     compilation = compiled(arguments.path, arguments)
     tell_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.robot is None:

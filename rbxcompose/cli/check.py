@@ -23,7 +23,7 @@ from rbxcompose.formats import format_names, renderer
 from rbxcompose.plan.model import Plan, extent
 
 TEXT = "text"
-FOR_PEOPLE = (TEXT, "github")  # formats in which also a line without a finding has a meaning
+FOR_PEOPLE = (TEXT, "github")  # formats that may contain lines without a finding
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,15 +37,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 @dataclass(slots=True)
 class CheckedRobots:
-    """What was found in all robots together; `fine` are the plans of those that can run."""
+    """The findings of all robots together; `fine` has the plans of those that can run."""
 
     report: Report = field(default_factory=Report)
     sources: dict[str, str] = field(default_factory=dict)
     fine: list[Plan] = field(default_factory=list)
-    tests: list[str] = field(default_factory=list)  # the names of those that can run
+    tests: list[str] = field(default_factory=list)  # names of the tests that can run
 
     def add(self, one: Compilation) -> None:
-        """Add what was found in one robot."""
+        """Add the findings of one robot."""
         self.report.extend(one.report)
         self.sources.update(one.sources)
         if one.plan is not None:
@@ -53,7 +53,7 @@ class CheckedRobots:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Compile the robots, fix what is asked for, and write the findings to stdout."""
+    """Compile the robots, apply fixes if requested, and write the findings to stdout."""
     wanted = targets(arguments.paths)
     if arguments.fix:
         fix(lambda: _check(wanted, arguments), tell if arguments.format == TEXT else _whisper)
@@ -79,7 +79,7 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
 
 
 def _check_tests(tests: list[str], checked: CheckedRobots) -> None:
-    from rbxcompose.mission_tests.reader import TrialReader  # only tests need it
+    from rbxcompose.mission_tests.reader import TrialReader  # only needed for tests
 
     reading, found = TrialReader(os.environ), Report()
     for path in tests:
@@ -99,5 +99,5 @@ def _written(checked: CheckedRobots, form: str) -> str:
 
 
 def _whisper(text: str) -> None:
-    """Write beside the output that a program reads."""
+    """Write to stderr, beside output that a program reads."""
     sys.stderr.write(f"{text}\n")

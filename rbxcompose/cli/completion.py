@@ -10,7 +10,7 @@ import argparse
 
 from rbxcompose.cli.output.console import tell
 
-# A script asks for what fits each time, so that it need not change with each version.
+# A script queries the candidates each time, so that it need not change with each version.
 
 _BASH = r"""_rbxcompose() {
     local one

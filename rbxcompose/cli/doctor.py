@@ -28,7 +28,7 @@ from rbxcompose.model.robot import Robot
 from rbxcompose.rendering.text import render_text
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, base_folder
 
-_LISTENING = 1.0  # [s] to messages, for their stamps
+_LISTENING = 1.0  # [s] of listening to messages, for their stamps
 _NANOSECONDS = 1e9
 
 
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Collect the facts, examine them, tell what came out."""
+    """Collect the facts, examine them, and report the results."""
     watch = machine.ClockWatch()
     try:
         folders, path = _meant(arguments.robot or arguments.path)
@@ -67,10 +67,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _meant(wanted: str | None) -> tuple[list[RobotFolder], str | None]:
-    """Return the robots that are up, or the file that is meant and need not be up.
+    """Return the running robots, or the given file, whose robot need not run.
 
     Raises:
-        NotDoneError: if what is wanted is neither.
+        NotDoneError: if `wanted` is neither.
     """
     if wanted is None:
         return robots_up(), None
@@ -83,7 +83,7 @@ def _meant(wanted: str | None) -> tuple[list[RobotFolder], str | None]:
 
 
 def _described(path: str) -> Robot | None:
-    """Return the robot that a file describes; tell what is wrong with the file if it cannot be read as one."""
+    """Return the robot that a file describes; if it cannot be read as one, report the findings."""
     compilation = compile_robot(path, environment=os.environ)
     if compilation.robot is None:
         tell_report(compilation.report, compilation.sources)
@@ -102,7 +102,7 @@ def _running(folder: RobotFolder) -> RunningRobot:
 
 
 def _bus(folder: RobotFolder) -> BusFacts | None:
-    """Listen for a moment; None if there is no bus to be reached, which others tell."""
+    """Listen for a moment; return None if the bus cannot be reached, which other examinations report."""
     try:
         with Guest(place_of(folder)) as guest:
             graph = guest.graph()
@@ -125,7 +125,7 @@ def _bus(folder: RobotFolder) -> BusFacts | None:
 
 
 def _text(answers: list[ExaminationResult]) -> str:
-    """Return what is fine, then the findings."""
+    """Return the examinations that passed, then the findings."""
     width = max(len(one.examination) for one in answers)
     lines = [f"ok  {one.examination:<{width}}  {one.told}" for one in answers if isinstance(one.told, str)]
     report = Report()

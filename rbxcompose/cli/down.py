@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """End the robot, in order if its supervisor answers and by force if not."""
+    """End the robot: orderly if its supervisor answers, else by force."""
     try:
         folder = find_robot(arguments.robot or arguments.path)
         told = _end(folder)
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _end(folder: RobotFolder) -> list[str]:
-    """End the robot and return what a person should know of how it went.
+    """End the robot and return a report for people.
 
     Raises:
         NotDoneError: if someone else holds the robot and cannot be found.

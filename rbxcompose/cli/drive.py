@@ -29,7 +29,7 @@ from rbxcompose.units import ANGULAR_SPEED, SPEED
 
 _INPUT = "/cmd_vel/teleop"
 _HELP = "ready: arrows or w a s d: drive   space: stop   q: quit"
-_MOST_READ = 4096  # bytes of keys at once
+_MOST_READ = 4096  # bytes of keys per read
 
 NO_TERMINAL = kind(
     "RBX9027",
@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Drive until q, an interrupt, or the end of the terminal or of its input."""
+    """Drive until q, an interrupt, or the end of the terminal or its input."""
     if not sys.stdin.isatty():
         return refuse(NO_TERMINAL.at(None, "there is no terminal to read keys from"))
     return visit(arguments, lambda guest: _drive(guest, arguments))
@@ -82,7 +82,7 @@ def _drive(guest: Guest, arguments: argparse.Namespace) -> int:
 
 
 def _input(topics: Iterable[GraphName], wanted: str | None) -> str:
-    """Return the topic that takes the keyboard's commands; a robot with a namespace has it below that."""
+    """Return the topic that takes the keyboard's commands; with a namespace, it lies below that."""
     taking = [one.name for one in topics if one.takers and Twist.TYPE in one.types]
     fitting = [name for name in taking if name.endswith(_INPUT)] if wanted is None else [f"/{wanted.lstrip('/')}"]
     if len(fitting) == 1 and fitting[0] in taking:
@@ -102,12 +102,12 @@ class _Wheel:
         guest.scheduler.every(PERIOD, NAME, lambda dt: self._send(dead_man.due(guest.clock.now())))
 
     def read(self) -> None:
-        """Take the keys that were pressed."""
+        """Handle the pressed keys."""
         for key in self._pressed():
             self._send(self._dead_man.press(key, self._guest.clock.now()))
 
     def read_early(self) -> None:
-        """Take the keys that were pressed before this: they move nothing, but may end it."""
+        """Handle keys that were pressed before the start: they move nothing, but may end driving."""
         if select.select([sys.stdin], [], [], 0)[0]:
             self._pressed()
 
@@ -118,7 +118,7 @@ class _Wheel:
         return pressed
 
     def let_go(self) -> None:
-        """Stand still, and be silent."""
+        """Command a halt, then be silent."""
         self._send(self._dead_man.release())
 
     def _send(self, velocity: Velocity | None) -> None:

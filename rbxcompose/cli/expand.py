@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the robot to stdout and its findings to stderr; with mistakes it is written as far as it could be read."""
+    """Write the robot to stdout and its findings to stderr; if it has mistakes, as far as it could be read."""
     compilation = compile_robot(arguments.path, **layers_of(arguments))
     tell_report(compilation.report, compilation.sources)
     if compilation.robot is not None:

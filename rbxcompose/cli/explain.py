@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write one page, or the list of all."""
+    """Write the page of one code, or the list of all codes."""
     kinds = all_kinds()
     if arguments.code is None:
         tell(_as_json(list(kinds.values())) if arguments.json else _listed(kinds))

@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the graph; a robot with mistakes is drawn as far as it could be read, and its findings go to stderr."""
+    """Write the graph; draw a robot with mistakes as far as it could be read, and write its findings to stderr."""
     compilation = compile_robot(arguments.path, **layers_of(arguments))
     tell_report(compilation.report, compilation.sources)
     if compilation.robot is not None:
@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _write(file: Path, text: str) -> str:
-    """Write a file; return what kept it from being written, or nothing."""
+    """Write a file; return why it could not be written, or nothing."""
     try:
         if file.exists() and not file.is_file():
             file.write_text(text, encoding="utf-8")  # `/dev/stdout`, a pipe

@@ -20,7 +20,7 @@ from rbxcompose.runtime.follow import Follower
 from rbxcompose.runtime.log import NAME
 from rbxcompose.runtime.records import Record
 
-_PAUSE = 0.05  # [s] between looks for more
+_PAUSE = 0.05  # [s] between checks for new records
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the records that are there and, if asked for, those that come."""
+    """Print the existing records and, if requested, new ones as they come."""
     try:
         folder, names = _meant(arguments.robot, arguments.names)
         follower = Follower(folder.path / NAME)
@@ -81,7 +81,7 @@ def _meant(robot: str | None, names: Sequence[str]) -> tuple[RobotFolder, Sequen
 
 
 def _know(names: Sequence[str], folder: RobotFolder, sources: Iterable[str]) -> None:
-    """See to it that all names are those of somebody who may write to the log.
+    """Check that all names are of sources that may write to the log.
 
     Raises:
         NotDoneError: if one is not.
@@ -95,7 +95,7 @@ def _know(names: Sequence[str], folder: RobotFolder, sources: Iterable[str]) -> 
 
 
 def _folder(wanted: str | None) -> RobotFolder:
-    """Return the folder of a robot that is up, else of the one that was up last.
+    """Return the folder of a running robot, else of the one that ran last.
 
     Raises:
         NotDoneError: if there is no log, or several.

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Serve until the editor says that it is enough."""
+    """Serve until the editor ends the session."""
     if find_spec("pygls") is None:
         help_text = "install it with: pip install 'rbxcompose[lsp]'"
         return refuse(NOT_INSTALLED.at(None, "the language server is not installed", help=help_text))

@@ -1,7 +1,7 @@
-"""The command `rbxcompose`: finds the verb's file and hands over. One file in this folder is one verb.
+"""The command `rbxcompose`: find the verb's file and run it. Each file in this folder is one verb.
 
 A verb's module has `add_arguments(parser)` and `run(arguments) -> exit code`; the first line of its docstring is its
-help. Only the verb in use is imported, and nothing that help does not need.
+help. Only the verb in use is imported, and for help only what help needs.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if words[0] == "--version":
         sys.stdout.write(f"rbxcompose {rbxcompose.__version__}\n")
         return 0
-    if words[0] == "__complete":  # what the scripts of `completion` ask
+    if words[0] == "__complete":  # the query of the scripts of `completion`
         from rbxcompose.cli.completions.known_values import complete
 
         return complete(words[1:])
@@ -48,12 +48,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _interrupted(number: int, frame: FrameType | None) -> NoReturn:
-    # At once and without a word, also in the middle of an import; a robot that is up is told by `up` itself.
+    # Immediately and silently, even in the middle of an import; `up` itself notifies its robot.
     os._exit(INTERRUPTED)
 
 
 def _run(name: str, words: Sequence[str]) -> int:
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # pydantic would search all that is installed for some
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else pydantic searches all packages for plugins
     from rbxcompose.cli.output.console import answered
 
     try:
@@ -73,6 +73,6 @@ def _help() -> str:
 
 
 def _about(name: str) -> str:
-    """Return the first line of a verb's docstring, the first of its text: importing all verbs would take its time."""
+    """Return the first line of a verb's docstring, read from its text: importing all verbs would take too long."""
     with open(os.path.join(cli.__path__[0], f"{name}.py"), encoding="utf-8") as file:
         return file.readline().strip().strip('"')

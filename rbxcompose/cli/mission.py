@@ -32,7 +32,7 @@ from rbxcompose.typed_json import to_data
 
 A = TypeVar("A")
 
-_PERIOD = 0.2  # [s] between two questions to a robot that is followed
+_PERIOD = 0.2  # [s] between two requests to a robot that is followed
 _FORMATS = "text", "mermaid", "dot", "html"
 
 
@@ -87,7 +87,7 @@ def _on_file(parser: argparse.ArgumentParser, *names: str) -> argparse.ArgumentP
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do what is asked for."""
+    """Run the chosen subcommand."""
     do: Callable[[argparse.Namespace], int] = arguments.do
     try:
         return do(arguments)
@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def ask(robot: str | None, query: Query[A]) -> A:
-    """Return the answer of a robot's executive to a question."""
+    """Return the answer of a robot's executive to a request."""
     return answer_of(find_robot(robot), query)
 
 
@@ -127,7 +127,7 @@ def _table(missions: Sequence[ListedMission]) -> str:
 
 
 def _chosen(arguments: argparse.Namespace) -> str:
-    """Return the mission that is meant: the one that is named, else the only one that runs, or ran last."""
+    """Return the addressed mission: the named one, else the only one that runs, or ran last."""
     if arguments.name:
         return str(arguments.name)
     from rbxcompose.missions.program.statuses import IDLE, NAMES

@@ -21,18 +21,18 @@ from rbxcompose.scaffold.answers import AnswerError, read_name, read_text, read_
 from rbxcompose.scaffold.new_files import write_new
 
 INTERRUPTED = 130
-_WIDEST = 4096  # characters of a line, enough for any path
+_WIDEST = 4096  # characters per line, enough for any path
 ABOUT = "What is it for?"
 
 
 @dataclass(frozen=True, slots=True)
 class New:
-    """What to write below a folder, and what a user may want to do next."""
+    """Files to write below a folder, and what a user may want to do next."""
 
     folder: Path
     files: Mapping[str, str]
     then: Sequence[str]
-    entry: Callable[[], list[str]] | None = None  # made when the files are there; returns the lines that tell of it
+    entry: Callable[[], list[str]] | None = None  # called once the files exist; returns the lines that report it
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -63,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Ask, write, and say what was written."""
+    """Ask, write the files, and report them."""
     asker = Asker(is_asking=not arguments.yes)
     try:
         return _write(_MAKERS[arguments.what](arguments, asker))

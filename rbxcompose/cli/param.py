@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do what is asked for."""
+    """Run the chosen subcommand."""
     return visit(arguments, lambda guest: int(arguments.do(_Nodes(guest, arguments.timeout), arguments)))
 
 
@@ -80,7 +80,7 @@ class _Nodes:
         """Return the full name of a node.
 
         Raises:
-            NotDoneError: if there is none of that name, with parameters.
+            NotDoneError: if no node of that name has parameters.
         """
         full = wanted if wanted.startswith("/") else f"/{wanted}"
         near = [name for name in self.names if name.endswith(full)]
@@ -91,7 +91,7 @@ class _Nodes:
         raise NotDoneError(NO_NAME.misspelt(None, words, wanted.removeprefix("/"), bare, "components"))
 
     def ask(self, nodes: Sequence[str], what: str, service: type[Service[Q, R]], requests: Sequence[Q]) -> list[R]:
-        """Ask all of `nodes` at once for `what`, and return their answers.
+        """Request `what` from all `nodes` in parallel, and return their answers.
 
         Raises:
             NotDoneError: if one of them does not answer.
@@ -174,7 +174,7 @@ def _set(nodes: _Nodes, arguments: argparse.Namespace) -> int:
 
 
 def _value(text: str) -> rcl.ParameterValue:
-    """Read a number, a flag or a list as YAML writes them; whatever else it is, it is text."""
+    """Read a number, a flag or a list in YAML; anything else is text."""
     root, findings = read_text(text, "VALUE")
     data = text if root is None or findings or isinstance(root, MappingNode) else to_plain(root)
     return to_message(text if data is None else data) or rcl.ParameterValue(

@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the plan of a robot without errors, or what is other than in another one."""
+    """Write the plan of a robot without errors, or its difference from another plan."""
     after = _compiled(arguments.path, arguments, is_layered=True)
     if after is None:
         return FINDINGS
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _compiled(path: str, arguments: argparse.Namespace, *, is_layered: bool) -> Plan | None:
-    """Return the plan of a robot; None after its errors."""
+    """Return the plan of a robot; on errors, report them and return None."""
     layers = layers_of(arguments)
     if not is_layered:
         layers = {**layers, "profiles": (), "overlays": (), "sets": ()}
@@ -69,7 +69,7 @@ def _compiled(path: str, arguments: argparse.Namespace, *, is_layered: bool) -> 
 
 
 def _other(written: str, arguments: argparse.Namespace) -> Plan | Finding | None:
-    """Return the plan to compare with: one that was saved, or that of a robot as its file alone has it."""
+    """Return the plan to compare with: a saved one, or that of a robot's file alone."""
     if not written.endswith(SAVED):
         return _compiled(written, arguments, is_layered=False)
     try:

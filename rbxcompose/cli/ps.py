@@ -15,9 +15,9 @@ from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import RobotStatus
 
 _COLUMNS = ("name", "type", "state", "process", "pid", "restarts")
-_ANSWER = 0.4  # [s] for a supervisor to answer; what it has written is as new as that, but for what died since
+_ANSWER = 0.4  # [s] for a supervisor to answer; its state file is as recent, except for what died since
 _NO_SUPERVISOR = "its supervisor has died, so it brakes and ends; 'rbxcompose down {}', or the next 'up', cleans up"
-_BLOCKED = "blocked"  # the state of what runs and cannot do its work
+_BLOCKED = "blocked"  # the state of a component that runs but cannot do its work
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Show what the supervisor says or, if it does not answer, what it last wrote."""
+    """Show the supervisor's answer or, if it does not answer, the last state that it wrote."""
     try:
         folder = find_robot(arguments.robot or arguments.path)
         shown = _shown(folder)
@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _shown(folder: RobotFolder) -> dict[str, Any]:
     written = known_state(folder)
     if written is not None and written.supervisor.is_stopped:
-        return _last_known(written)  # it cannot answer
+        return _last_known(written)  # the supervisor cannot answer
     try:
         state = answer_of(folder, RobotStatus(), timeout=_ANSWER)
     except NotDoneError:
@@ -62,7 +62,7 @@ def _data(state: RobotState, supervisor: int | None) -> dict[str, Any]:
 
 
 def _component(one: ComponentState) -> dict[str, object]:
-    """Return one component; one that is blocked tells by whom."""
+    """Return one component; a blocked one with what blocks it."""
     fields = {"name": one.name, "type": one.type, "process": one.process, "pid": one.pid, "restarts": one.restarts}
     if one.waits_for is None:
         return {**fields, "state": one.state}

@@ -31,7 +31,7 @@ from rbxcompose.recording.codes import LOST, UNWRITABLE
 from rbxcompose.recording.files import ENDING
 from rbxcompose.recording.recorder import Recorder, Split
 
-_PAUSE = 0.02  # [s] between looks for messages
+_PAUSE = 0.02  # [s] between checks for messages
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kMG])B")
 _TIMES = {"k": 1e3, "M": 1e6, "G": 1e9}
 
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Record, then tell what was recorded."""
+    """Record, then report what was recorded."""
     try:
         place = find_place(arguments)
         path = _path(arguments)

@@ -44,7 +44,7 @@ from rbxcompose.recording.summary import RecordingSummary, summary_of
 from rbxcompose.recording.topics import RecordedTopic, Selection, by_name, is_replayable
 from rbxcompose.regular_files import NotRegularError, open_regular
 
-_PAUSE = 0.05  # [s] before a recording starts again
+_PAUSE = 0.05  # [s] before a recording restarts
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read the file once to know what is in it, then replay it."""
+    """Read the file once to learn its contents, then replay it."""
     if problem := _misused(arguments):
         return misused("replay", problem)
     path = arguments.path
@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _misused(arguments: argparse.Namespace) -> str:
-    """Return what is wrong with options that do not fit together."""
+    """Return what is wrong with incompatible options."""
     layers = arguments.profile or arguments.overlays or arguments.sets or arguments.real
     if layers and not (arguments.into and arguments.robot):
         return "options that change the robot's file need --into and --robot PATH"
@@ -130,7 +130,7 @@ def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary
         return refuse(NOTHING.at(None, f"nothing of '{plain(str(path))}' is replayed: {why}"))
     place = find_place(arguments)
     if not arguments.over:
-        with Guest(place) as looking:  # its router knows all; who stays has to make its own links to them first
+        with Guest(place) as looking:  # its router knows everyone; a guest that stays has to make its own links first
             finding = _sent_already(looking, topics)
         if finding:
             return refuse(finding)
@@ -139,14 +139,14 @@ def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary
         player.wait_for_subscribers()
         tell(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
         count = _play(path, player, topics, arguments, guest)
-        while arguments.loop and _wait(guest.clock.now() + _PAUSE, guest):  # also if it lasts no time at all
+        while arguments.loop and _wait(guest.clock.now() + _PAUSE, guest):  # even if the recording has no duration
             count += _play(path, player, topics, arguments, guest)
     tell(f"replayed {count:,} messages")
     return 0
 
 
 def _sent_already(guest: Guest, topics: list[RecordedTopic]) -> Finding | None:
-    """Return the finding for topics that are being published now, None if there are none."""
+    """Return the finding for topics that are already being published; None if there are none."""
     chosen = {one.name for one in topics}
     names = [one.name for one in guest.graph().topics if one.givers and one.name in chosen]
     if not names:
@@ -157,7 +157,7 @@ def _sent_already(guest: Guest, topics: list[RecordedTopic]) -> Finding | None:
 
 
 def _chosen(summary: RecordingSummary, wanted: Selection) -> list[RecordedTopic]:
-    """Return the topics to publish and tell which others were wanted."""
+    """Return the topics to publish, and report which selected ones are left out."""
     topics = sorted((one for one in summary.counts if wanted.takes(one)), key=lambda one: one.name)
     unfit = [one.name for one in topics if not is_replayable(one)]
     commands = [one.name for one in topics if one.qos is Qos.COMMAND and not wanted.patterns]
@@ -170,7 +170,7 @@ def _chosen(summary: RecordingSummary, wanted: Selection) -> list[RecordedTopic]
 
 
 def _play(path: Path, player: Player, topics: list[RecordedTopic], arguments: argparse.Namespace, guest: Guest) -> int:
-    """Publish the recording once and return how many messages that were."""
+    """Publish the recording once and return the number of messages."""
     chosen = set(topics)
     count = 0
     start = guest.clock.now()
@@ -190,7 +190,7 @@ def _put(player: Player, message: Recorded, chosen: set[RecordedTopic]) -> int:
 
 
 def _wait(until: float, guest: Guest) -> bool:
-    """Wait for a time of the guest's clock; return False if an interrupt came first."""
+    """Wait until a time of the guest's clock; return False if an interrupt came first."""
     return not guest.run(lambda: guest.is_interrupted, until - guest.clock.now())
 
 

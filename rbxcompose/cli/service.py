@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do what is asked for."""
+    """Run the chosen subcommand."""
     return visit(arguments, lambda guest: int(arguments.do(guest, arguments)))
 
 
@@ -28,6 +28,6 @@ def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
 
 
 def _call(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.bus.service_call import call  # what messages need would slow down the list
+    from rbxcompose.cli.bus.service_call import call  # the imports for messages would slow down the list
 
     return call(guest, arguments)

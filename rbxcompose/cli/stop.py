@@ -33,12 +33,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _stopped(folder: RobotFolder) -> str:
     state = known_state(folder)
-    if state is None or not state.supervisor.is_stopped:  # else no time is lost on it
+    if state is None or not state.supervisor.is_stopped:  # waste no time on a stopped supervisor
         try:
             return answer_of(folder, StopRobot())
         except NotDoneError as error:
             if error.finding.code != NO_ANSWER.code:
                 raise
-    from rbxcompose.cli.robots.stop_by_bus import stop_by_bus  # joining the bus takes its time to import
+    from rbxcompose.cli.robots.stop_by_bus import stop_by_bus  # importing the bus takes time
 
     return stop_by_bus(folder)

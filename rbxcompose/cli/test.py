@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, run and judge the tests, and tell what came out."""
+    """Read, run and judge the tests, and report the results."""
     for path in arguments.paths:
         if not path.exists():
             return misused("test", f"there is no '{path}'")

@@ -30,7 +30,7 @@ from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.printable import plain
 
 _TOPICS = ("/tf", "/tf_static")
-_DIGITS = 4  # of metres and degrees
+_DIGITS = 4  # decimal places of metres and degrees
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,12 +51,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do what is asked for."""
+    """Run the chosen subcommand."""
     return visit(arguments, lambda guest: int(arguments.do(guest, arguments)))
 
 
 class _Frames:
-    """The tree as it is heard."""
+    """The tree as received so far."""
 
     def __init__(self, guest: Guest) -> None:
         self.tree = TransformTree()
@@ -68,7 +68,7 @@ class _Frames:
 
     @property
     def is_whole(self) -> bool:
-        """Return whether all who publish have been heard."""
+        """Return whether something has been received from every publisher."""
         return not self._waiting
 
     def _listen(self, topic: GraphName) -> None:
@@ -106,7 +106,7 @@ def _tree(guest: Guest, arguments: argparse.Namespace) -> int:
 
 
 def _lines(tree: TransformTree, children: dict[str | None, list[str]], parent: str | None, indent: str) -> list[str]:
-    """Return the frames below `parent`, each line with where it is; a stack, since a chain may be long."""
+    """Return a line for each frame below `parent`, with its pose; it uses a stack, since a chain may be long."""
     lines: list[str] = []
     waiting = [(frame, indent) for frame in reversed(children.get(parent, []))]
     while waiting:

@@ -21,9 +21,9 @@ from rbxcompose.cli.robots.lookup import NOT_UP, NotDoneError, add_robot_option,
 from rbxcompose.cli.robots.picture import RobotPicture, lines_of
 from rbxcompose.cli.robots.sampler import Sampler
 
-_PERIOD = 1.0  # [s] between two looks
-_MOST_READ = 1024  # bytes of keys at once
-_WIDTH, _HEIGHT = 100, 1000  # of a picture for no terminal
+_PERIOD = 1.0  # [s] between two samples
+_MOST_READ = 1024  # bytes of keys per read
+_WIDTH, _HEIGHT = 100, 1000  # columns and lines of a picture without a terminal
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Look, once or again and again."""
+    """Show the robot, once or repeatedly."""
     try:
         folder = find_robot(arguments.robot or arguments.path)
         with Guest(place_of(folder)) as guest:
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _once(guest: Guest, sampler: Sampler, as_json: bool) -> int:
     _sampled(sampler)
     guest.run(lambda: False, _PERIOD)
-    guest.run(lambda: sampler.is_complete, _PERIOD)  # they come once in a period
+    guest.run(lambda: sampler.is_complete, _PERIOD)  # the awaited messages come once in a period
     picture = _sampled(sampler)
     colour = has_colour(sys.stdout)
     tell(to_json(picture.to_data()) if as_json else "\n".join(lines_of(picture, _WIDTH, _HEIGHT, colour=colour)))
@@ -72,7 +72,7 @@ def _live(guest: Guest, sampler: Sampler) -> int:
     with guest.interruptible(), raw(keyboard), full_screen(sys.stdout):
         guest.watch(keyboard, read)
         while True:
-            size = shutil.get_terminal_size()  # of a terminal that says 0 x 0 it makes 80 x 24
+            size = shutil.get_terminal_size()  # takes 80 x 24 for a terminal that reports 0 x 0
             show(sys.stdout, lines_of(_sampled(sampler), size.columns, size.lines, colour=colour))
             if guest.run(lambda: is_over or guest.is_interrupted, _PERIOD):
                 return 0

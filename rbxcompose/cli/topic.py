@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do what is asked for."""
+    """Run the chosen subcommand."""
     return visit(arguments, lambda guest: int(arguments.do(guest, arguments)))
 
 
@@ -93,7 +93,7 @@ def _qos(end: GraphEnd) -> str:
     return f"{reliability}{durability}, {'all' if end.qos.keeps_all else f'newest {end.qos.depth}'}"
 
 
-# What messages need is imported by those who need it: a list answers in half of the time without.
+# Only the functions that use messages import what those need: a list takes half the time without it.
 
 
 def _echo(guest: Guest, arguments: argparse.Namespace) -> int:

@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Compile the robot, start its supervisor, tell what happens."""
+    """Compile the robot, start its supervisor, and report what happens."""
     if arguments.real and arguments.rate.is_stepped:
         sys.stderr.write("rbxcompose up: --real keeps its own time, so --rate cannot be given with it\n")
         return USAGE
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _write_problem(path: Path) -> str:
-    from rbxcompose.recording.files import write_problem  # only a recorded run needs MCAP
+    from rbxcompose.recording.files import write_problem  # imports MCAP, which only a recorded run needs
 
     return write_problem(path)
 

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write what is known of a path; a robot with mistakes is explained as far as it could be read."""
+    """Write what is known about a path; explain a robot with mistakes as far as it could be read."""
     compilation = compile_robot(arguments.robot, **layers_of(arguments))
     if compilation.robot is None:
         tell_report(compilation.report, compilation.sources)

@@ -26,7 +26,7 @@ from rbxcompose.sdk import (
 from rbxcompose.sim.battery import BatteryCore, BatterySettings
 
 PERCENT = 100.0  # a `battery_level` message counts from 0 to 100
-DIGITS = 6  # of a percentage; further ones are rounding, by which 80 % would lie below 80 %
+DIGITS = 6  # of a percentage; further ones are rounding errors, which would put 80 % below 80 %
 
 
 class BatterySimConfig(Config):
@@ -58,7 +58,7 @@ class BatterySim(Component[BatterySimConfig]):
 
     @classmethod
     def capabilities(cls, config: BatterySimConfig) -> tuple[Capability, ...]:
-        """Return that it is a battery."""
+        """Declare that it is a battery."""
         runtime = Setting(config.runtime, "runtime")
         warn, error = Setting(config.warn, "warn"), Setting(config.error, "error")
         return (Drains("battery_level", runtime, warn, error),)
@@ -69,12 +69,12 @@ class BatterySim(Component[BatterySimConfig]):
         self.told = Level.OK
 
     def reconfigure(self, old: BatterySimConfig) -> None:
-        """Drain and complain as it is set now; the charge stays as it is."""
+        """Apply the new runtime and thresholds; the charge stays unchanged."""
         self.core.settings = settings_of(self.config)
         self.publish()
 
     def activate(self) -> None:
-        """Publish the first level at once, since others wait for it."""
+        """Publish the first level immediately, since others wait for it."""
         self.publish()
 
     def step(self, dt: float) -> None:
@@ -83,7 +83,7 @@ class BatterySim(Component[BatterySimConfig]):
         self.publish()
 
     def on_set_battery_level(self, request: SetBatteryLevel.Request) -> SetBatteryLevel.Response:
-        """Set the charge, given from 0 to 100; one out of range is refused."""
+        """Set the charge, given from 0 to 100; refuse one out of range."""
         if refusal := self.core.set(request.value / PERCENT):
             raise Refused(refusal)
         self.info(f"set to {request.value:.0f} %")
@@ -91,7 +91,7 @@ class BatterySim(Component[BatterySimConfig]):
         return SetBatteryLevel.Response()
 
     def publish(self) -> None:
-        """Send level and status; a new status is an event of the story."""
+        """Publish level and status; log a new status level to the story."""
         percent = round(self.core.level * PERCENT, DIGITS)
         level, message = self.core.status
         self.battery_level(Float32(data=percent))

@@ -26,8 +26,8 @@ from rbxcompose.sdk import (
 )
 
 FULL = 100.0  # [%]
-NEARLY_FULL = 99.0  # [%] from here on a level counts as full: the battery drains while it is told
-PATIENCE = 10.0  # [s] for the battery to tell its level
+NEARLY_FULL = 99.0  # [%] a level from here on counts as full: the battery drains even while it reports
+PATIENCE = 10.0  # [s] for the battery to report its level
 
 
 class ChargerConfig(Config):
@@ -55,20 +55,20 @@ class Charger(Component[ChargerConfig]):
 
     @classmethod
     def capabilities(cls, config: ChargerConfig) -> tuple[Capability, ...]:
-        """Return that it charges at the dock until the battery is nearly full."""
+        """Declare that it charges at the dock until the battery is nearly full."""
         dock, reach = Setting(config.dock, "dock"), Setting(config.reach, "reach")
         return (Charges("recharge", dock, reach, until=Setting(NEARLY_FULL / FULL)),)
 
     def configure(self) -> None:
-        """Nothing is being charged."""
+        """Start without a goal."""
         self.charging: object = None  # the goal for which the level was set
         self.deadline = 0.0  # [s] of robot time
-        self.is_set = False  # the battery has answered that it is full
-        self.is_full = False  # and has told a level since, however much has drained meanwhile
+        self.is_set = False  # the battery has confirmed that it is set to full
+        self.is_full = False  # it has also reported a level since, however much has drained meanwhile
         self.error = ""
 
     def accept_recharge(self, goal: Recharge.Goal) -> str:
-        """Refuse to charge away from the dock."""
+        """Refuse a goal away from the dock."""
         dock, pose = self.config.dock, self.pose.now()
         if pose is None:
             return "the robot's position is unknown"
@@ -78,11 +78,11 @@ class Charger(Component[ChargerConfig]):
         return ""
 
     def on_battery_level(self, message: Float32) -> None:
-        """See whether the battery is full, or has been since the goal came."""
+        """Note whether the battery is full, or has been since the goal came."""
         self.is_full = self.is_full or self.is_set or message.data >= NEARLY_FULL
 
     def step(self, dt: float) -> None:
-        """Carry the goal on: set the level, then wait until the battery has told it."""
+        """Continue the goal: set the level, then wait until the battery has reported it."""
         goal = self.recharge.current
         if goal is None:
             return
@@ -100,6 +100,6 @@ class Charger(Component[ChargerConfig]):
             goal.aborted(f"the battery reported no level for {PATIENCE:.0f} s")
 
     def answered(self, goal: object, reply: Reply[SetBatteryLevel.Response]) -> None:
-        """Take the battery's answer, unless it is about a goal that has ended."""
+        """Handle the battery's answer, unless it concerns a goal that has ended."""
         if goal is self.charging:
             self.error, self.is_set = reply.error, not reply.error

@@ -58,7 +58,7 @@ class ChoreSim(Component[ChoreSimConfig]):
 
     @classmethod
     def capabilities(cls, config: ChoreSimConfig) -> tuple[Capability, ...]:
-        """Return how fast it moves the base."""
+        """Declare how fast it moves the base."""
         return (CommandsMotion("cmd_vel", Setting(config.speed, "speed"), Setting(config.turn_rate, "turn_rate")),)
 
     def configure(self) -> None:
@@ -68,18 +68,18 @@ class ChoreSim(Component[ChoreSimConfig]):
         self.moving = False
 
     def reconfigure(self, old: ChoreSimConfig) -> None:
-        """Continue with the same chore as it is set now."""
+        """Continue the current chore with the new settings."""
         self.core.settings = settings_of(self.config)
 
     def accept_chore(self, goal: Wait.Goal) -> str:
-        """Refuse a goal while another one is carried out, and a time that makes no sense."""
+        """Refuse a goal while another one is carried out, or one with an invalid time."""
         current, time = self.chore.current, to_seconds(goal.time)
         if current is not None and not current.cancel_requested:
             return f"{self.name} is busy for {self.core.left:.1f} s more"
         return "" if 0.0 <= time <= LONGEST else f"it cannot take {time:g} s"
 
     def step(self, dt: float) -> None:
-        """Carry the goal on, or hold it."""
+        """Continue the goal, or hold it."""
         goal = self.chore.current
         if goal is None:
             self.rest()
@@ -92,7 +92,7 @@ class ChoreSim(Component[ChoreSimConfig]):
             self.work(goal, dt)
 
     def work(self, goal: ServedGoal[Wait.Goal, Wait.Result, Wait.Feedback], dt: float) -> None:
-        """Work for one cycle and tell how much is left."""
+        """Work for one cycle and report how much is left."""
         if goal is not self.doing:
             self.doing = goal
             self.core.start(to_seconds(goal.request.time))
@@ -104,11 +104,11 @@ class ChoreSim(Component[ChoreSimConfig]):
         goal.feedback(Wait.Feedback(time_left=to_duration(max(self.core.left, 0.0))))
 
     def hold(self) -> None:
-        """Command rest: no step follows while robot time stands still."""
+        """Command a halt: no step follows while robot time stands still."""
         self.rest()
 
     def rest(self) -> None:
-        """Command rest, once."""
+        """Command a halt, once."""
         if self.moving:
             self.drive(AT_REST)
 

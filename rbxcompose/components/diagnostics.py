@@ -56,7 +56,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
         self.reported = self.now - PERIOD
 
     def analyzers(self) -> dict[str, Analyzer]:
-        """Return the configured groups; each expects those of the robot's components that it names."""
+        """Return the configured groups; each expects the robot's components that it matches."""
         return {
             name: Analyzer(
                 match=one.match,
@@ -70,26 +70,26 @@ class Diagnostics(Component[DiagnosticsConfig]):
         }
 
     def on_diagnostics(self, message: DiagnosticArray) -> None:
-        """Take statuses, and report at once if a group's level has changed."""
+        """Take statuses and report immediately if a group's level has changed."""
         self.core.feed(self.now, map(status_of, message.status))
         self.step(0.0)
 
     def lost(self, names: tuple[str, ...], cause: str) -> None:
-        """Mark components that have gone as STALE at once."""
+        """Mark lost components as STALE immediately."""
         self.core.lost(self.now, names, cause)
         self.step(0.0)
 
     def brake(self) -> None:
-        """Report no improvement from now on: what falls silent because it ends has not been mended."""
+        """Report no improvement from now on: a component that falls silent because it ends has not recovered."""
         self.is_going_down = True
 
     def step(self, dt: float) -> None:
-        """Report once a second, and at once when a group's level has changed."""
+        """Report once a second, and immediately when a group's level has changed."""
         if self.core.changed(self.now) or self.now - self.reported >= PERIOD:
             self.report()
 
     def report(self) -> None:
-        """Publish the tree; a group's new level is an event of the story."""
+        """Publish the tree; log a group's new level to the story."""
         self.reported = self.now
         tree = self.core.report(self.now)
         header = Header(stamp=to_time(self.stamp))
@@ -104,13 +104,13 @@ class Diagnostics(Component[DiagnosticsConfig]):
 
 
 def status_of(message: DiagnosticStatus) -> Status:
-    """Return a status as it came over the bus."""
+    """Return a status from its message."""
     values = tuple((pair.key, pair.value) for pair in message.values)
     return Status(message.name, level_of(message.level), message.message, message.hardware_id, values)
 
 
 def message_of(status: Status) -> DiagnosticStatus:
-    """Return a status as it goes over the bus."""
+    """Return a status as a message."""
     values = tuple(KeyValue(key=key, value=value) for key, value in status.values)
     return DiagnosticStatus(
         level=int(status.level),

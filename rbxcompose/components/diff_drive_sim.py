@@ -69,7 +69,7 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
 
     @classmethod
     def capabilities(cls, config: DiffDriveSimConfig) -> tuple[Capability, ...]:
-        """Return its limits, and the frame that it moves."""
+        """Declare its limits and the frame that it moves."""
         base = Drives(
             "cmd_vel",
             "odom",
@@ -83,11 +83,11 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
         return base, WritesFrame("tf", Setting(ODOM), Setting(BASE))
 
     def configure(self) -> None:
-        """Put the base to the origin of `odom`."""
+        """Put the base at the origin of `odom`."""
         self.core = DiffDriveCore(settings_of(self.config))
 
     def reconfigure(self, old: DiffDriveSimConfig) -> None:
-        """Follow commands within the limits as they are now; the last one holds as it was cut."""
+        """Apply the new limits to later commands; the last command stays as it was clamped."""
         self.core.settings = settings_of(self.config)
 
     @property
@@ -96,11 +96,11 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
         return self.core.at_rest
 
     def on_cmd_vel(self, message: geometry.Twist) -> None:
-        """Take a command; one that is absurd or too fast is said in the status."""
+        """Take a command; the status reports one that is absurd or too fast."""
         self.core.command(Velocity2(message.linear.x, message.angular.z), self.now)
 
     def step(self, dt: float) -> None:
-        """Move for `dt` [s] and tell where the base is."""
+        """Move for `dt` [s] and publish where the base is."""
         self.core.step(self.now, dt)
         header = Header(stamp=to_time(self.stamp), frame_id=ODOM)
         at = Transform3.from_pose2(self.core.pose)
@@ -124,7 +124,7 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
         )
 
     def tell_commands(self) -> None:
-        """Say in the status what was not followed as commanded."""
+        """Report in the status the commands that were not followed exactly."""
         dropped, clamped = self.core.dropped, self.core.clamped
         if dropped or clamped:
             counts = ((dropped, "dropped as absurd"), (clamped, "cut to the limits"))
@@ -132,15 +132,15 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
             self.status(Level.WARN, f"commands: {message}", dropped=dropped, clamped=clamped)
 
     def stop(self) -> None:
-        """Brake and take no command until `release`."""
+        """Brake and ignore commands until `release`."""
         self.core.brake()
 
     def release(self) -> None:
-        """Take commands again."""
+        """Accept commands again."""
         self.core.release()
 
     def go_on(self) -> None:
-        """Brake until the next command: time stood still, or has jumped."""
+        """Brake until the next command: robot time stood still, or has jumped."""
         self.core.forget()
 
     def brake(self) -> None:

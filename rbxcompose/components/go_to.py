@@ -62,7 +62,7 @@ class GoTo(Component[GoToConfig]):
 
     @classmethod
     def capabilities(cls, config: GoToConfig) -> tuple[Capability, ...]:
-        """Return how fast it drives and how near it comes."""
+        """Declare how fast it drives and how near it comes."""
         speed, turn_rate = Setting(config.speed, "speed"), Setting(config.turn_rate, "turn_rate")
         tolerance = Setting(config.tolerance, "tolerance")
         return CommandsMotion("cmd_vel", speed, turn_rate), Navigates("go_to", tolerance)
@@ -73,11 +73,11 @@ class GoTo(Component[GoToConfig]):
         self.driving: object = None  # the goal that the core drives to
 
     def reconfigure(self, old: GoToConfig) -> None:
-        """Continue to the same goal as it is set now."""
+        """Continue to the current goal with the new settings."""
         self.core.settings = settings_of(self.config)
 
     def accept_go_to(self, goal: NavigateToPose.Goal) -> str:
-        """Refuse a goal in another frame, or one that is no pose."""
+        """Refuse a goal in another frame, or one that is no valid pose."""
         frame, at = goal.pose.header.frame_id, goal.pose.pose.position
         if frame not in ("", MAP):
             return f"a goal must be given in '{MAP}', not in '{frame}'"
@@ -86,7 +86,7 @@ class GoTo(Component[GoToConfig]):
         return "" if math.hypot(at.x, at.y) <= FARTHEST else f"the goal is farther than {FARTHEST / 1000:g} km away"
 
     def step(self, dt: float) -> None:
-        """Drive on towards the goal."""
+        """Continue towards the goal."""
         goal = self.go_to.current
         if goal is None:
             self.driving = None
@@ -107,7 +107,7 @@ class GoTo(Component[GoToConfig]):
         pose: Pose2,
         dt: float,
     ) -> None:
-        """Command the base for one cycle and tell how far it is."""
+        """Command the base for one cycle and report the remaining distance."""
         if goal is not self.driving:
             self.driving = goal
             self.core.start(pose_of(goal.request.pose))
@@ -122,7 +122,7 @@ class GoTo(Component[GoToConfig]):
             goal.feedback(NavigateToPose.Feedback(distance_remaining=self.core.distance))
 
     def hold(self) -> None:
-        """Command rest: no step follows while robot time stands still."""
+        """Command a halt: no step follows while robot time stands still."""
         if self.driving is not None:
             self.drive(AT_REST)
 
@@ -142,6 +142,6 @@ def settings_of(config: GoToConfig) -> GoToSettings:
 
 
 def pose_of(message: PoseStamped) -> Pose2:
-    """Return a pose message as seen from above."""
+    """Return the planar pose of a pose message."""
     at, turn = message.pose.position, message.pose.orientation
     return Pose2(at.x, at.y, yaw_of((turn.x, turn.y, turn.z, turn.w)))

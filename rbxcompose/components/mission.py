@@ -56,16 +56,16 @@ from rbxcompose.sdk import (
     component,
 )
 
-LOOK_AGAIN = 0.1  # [s] between two looks for a pose that has not come yet
+LOOK_AGAIN = 0.1  # [s] between two checks for a pose that has not arrived yet
 NO_INPUTS: Mapping[str, str] = {}
 
 
 T = TypeVar("T")
-Made = Annotated[InstanceOf[T], WithJsonSchema({"type": "object"})]  # by the compiler, never by people
+Made = Annotated[InstanceOf[T], WithJsonSchema({"type": "object"})]  # made by the compiler, never by people
 
 
 class MissionConfig(Config):
-    """What the compiler has put together of the robot's missions."""
+    """The robot's missions as the compiler has prepared them."""
 
     programs: dict[str, Made[Program]] = {}
     """Missions by name."""
@@ -86,18 +86,18 @@ class MissionConfig(Config):
 
     @property
     def reads(self) -> frozenset[str]:
-        """Return the names that any mission reads."""
+        """Return all names that missions read."""
         return frozenset[str]().union(*(program.reads() for program in self.programs.values()))
 
     @property
     def used(self) -> dict[str, SkillSource]:
-        """Return the skills that any mission uses."""
+        """Return all skills that missions use."""
         names = {node.skill for program in self.programs.values() for node in program.nodes}
         return {name: self.skills[name] for name in sorted(names & self.skills.keys())}
 
     @cached_property
     def names(self) -> RobotNames:
-        """Return what the robot gives to missions."""
+        """Return what the robot offers to missions."""
         broken = Using(self.programs).broken
         return RobotNames(
             {name: source.type for name, source in self.values.items()},
@@ -124,12 +124,12 @@ class Mission(Component[MissionConfig]):
 
     @classmethod
     def ports(cls, config: MissionConfig) -> dict[str, Port[Any]]:
-        """Return an end for each value, skill, topic and service that is used, and for the pose if it is read."""
+        """Return a port for each used value, skill, topic and service, and for the pose if missions read it."""
         return ports_for(config)
 
     @classmethod
     def capabilities(cls, config: MissionConfig) -> tuple[Capability, ...]:
-        """Return that it is the executive."""
+        """Declare that it is the executive."""
         return (RunsMissions(),)
 
     @property
@@ -138,20 +138,20 @@ class Mission(Component[MissionConfig]):
         return self.config
 
     def configure(self) -> None:
-        """Nothing has arrived and nothing runs."""
+        """Start with no values and no missions."""
         self.arrivals, self.desks = Arrivals(self.config.values), Desks(self)
         self.missions = RunningMissions(self.config, self.world, self.story, self.publish)
         self.broadcast = broadcast.Broadcast(self.config.programs, self.context.window)
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
-        self.kept: dict[str, RunMission] = {}  # by which people began missions that still run
-        self.shown = ""  # the status that was told last
-        self.planned: float | None = None  # the wake that was asked for last [s]
+        self.kept: dict[str, RunMission] = {}  # requests by people that began missions that still run
+        self.shown = ""  # the last reported status
+        self.planned: float | None = None  # the last requested wake [s]
         self.misfits: set[str] = set()  # values whose messages have another shape
 
     def world(
         self, ended: Callable[[int, Result], None], say: Callable[[MissionEvent], None]
     ) -> tuple[World, RobotWorld]:
-        """Return the world of a mission, and the part of it that is the robot; tests put another one around it."""
+        """Return the world of a mission, and the robot in it; tests wrap the robot in another world."""
         robot = RobotWorld(self, self.arrivals, self.desks, ended, say)
         return robot, robot
 
@@ -165,11 +165,11 @@ class Mission(Component[MissionConfig]):
             one = self.begin(name)
             if self.is_held and not one.is_paused:
                 self.hold_back(one)
-        except Refused as refusal:  # it was begun by a person before
+        except Refused as refusal:  # a person has already begun it
             self.warn(f"mission {name} does not start: {refusal}")
 
     def begin(self, name: str, inputs: Mapping[str, str] = NO_INPUTS, state: str = "") -> MissionRun:
-        """Begin a mission; a robot that is stopped holds it until the resume.
+        """Begin a mission; while the robot is stopped, hold it until the resume.
 
         Raises:
             Refused: if it cannot run, with the reason.
@@ -183,12 +183,12 @@ class Mission(Component[MissionConfig]):
         return one
 
     def hold_back(self, one: MissionRun) -> None:
-        """Let a mission begin at the resume only."""
+        """Let a mission begin only at the resume."""
         one.is_paused = True
         self.tell(f"mission {one.name} is held until it is resumed")
 
     def received(self, port: str, message: Any) -> None:
-        """Take a value, and look at the missions that wait for it; or the end of an order."""
+        """Take a value and wake the missions that read it; or take the outcome of an order."""
         if port.startswith(ENDS):
             self.desks.told(port, message)
             return
@@ -201,7 +201,7 @@ class Mission(Component[MissionConfig]):
             self.look_soon()
 
     def look_soon(self) -> None:
-        """Be woken at this instant."""
+        """Request a wake at this instant."""
         self.context.wake_at(self.now)
 
     def wake(self) -> None:
@@ -217,7 +217,7 @@ class Mission(Component[MissionConfig]):
         self.broadcast.tell(self.missions)
 
     def turn(self, one: MissionRun) -> list[float]:
-        """Do what is due of a mission; return when it wants to be woken [s], if it does."""
+        """Do what is due in a mission; return its next wake [s], if any."""
         if one.engine.status == IDLE and (missing := one.missing()):
             return self.wait(one, ", ".join(missing))
         if one.began is None:
@@ -229,7 +229,7 @@ class Mission(Component[MissionConfig]):
         return [due] if due is not None else []
 
     def wait(self, one: MissionRun, missing: str) -> list[float]:
-        """Report what a mission waits for before it starts; return when to look again [s]."""
+        """Report what a mission waits for before it starts; return when to check again [s]."""
         self.show(Level.OK, f"waiting for {missing}")
         if one.loses_patience(self.now):
             text = f"waits for {missing}, which has not arrived for {PATIENCE:g} s"
@@ -238,7 +238,7 @@ class Mission(Component[MissionConfig]):
         return [self.now + LOOK_AGAIN if POSE in missing else one.patient_until or self.now]
 
     def plan(self, time: float) -> None:
-        """Ask for a wake, once for each time."""
+        """Request a wake, once per time."""
         if time != self.planned:
             self.context.wake_at(time)
         self.planned = time
@@ -256,17 +256,17 @@ class Mission(Component[MissionConfig]):
 
     def take_over(self, old: Mission) -> None:
         """Stay held if the missions were."""
-        self.is_held = old.is_held  # as the start mission was
+        self.is_held = old.is_held  # as the start mission was held
 
     def finish(self, name: str, end: MissionEnded) -> None:
-        """Report that a mission has ended; with the start mission the robot may go down."""
+        """Report that a mission has ended; after the start mission, the robot may go down."""
         self.show(Level.ERROR if end.result == "failure" else Level.OK, f"{name}: {end.result}")
         self.keep()
         if name == self.config.start:
             self.context.notify(MissionOver(name, end.result, end.words))
 
     def stop(self) -> None:
-        """Pause all missions; what they were at is asked for again at the resume."""
+        """Pause all missions; the resume requests their unfinished actions again."""
         self.is_held = not self.missions.runs
         for one in self.missions:
             if not one.is_paused:
@@ -279,11 +279,11 @@ class Mission(Component[MissionConfig]):
             one.abort(self.now)
         self.broadcast.tell(self.missions)
 
-    # What people want
+    # Commands from people
 
     @answers(RunMission)
     def run(self, request: RunMission) -> str:
-        """Begin a mission, and begin it again after a crash."""
+        """Begin a mission, and restart it after a crash."""
         self.begin(request.mission, request.inputs, request.start)
         self.keep(request)
         return f"mission {request.mission} starts"
@@ -330,12 +330,12 @@ class Mission(Component[MissionConfig]):
 
     @answers(LookAtMission)
     def look_at(self, request: LookAtMission) -> Seen:
-        """Return what is new of a mission."""
+        """Return the updates of a mission."""
         return self.missions.seen(request.mission, request.since)
 
     @answers(LookAtAll)
     def look_at_all(self, request: LookAtAll) -> Seen:
-        """Return how a mission stands, with its picture."""
+        """Return the state of a mission, with its picture."""
         return {**self.missions.seen(request.mission), "picture": self.missions.picture(request.mission)}
 
     @answers(ReadLog)
@@ -344,20 +344,20 @@ class Mission(Component[MissionConfig]):
         return self.missions.since(request.after)
 
     def hold_running(self, one: MissionRun, why: str) -> str:
-        """Hold a mission and return what is told of it."""
+        """Hold a mission and return the report of it."""
         one.pause(self.now)
         self.broadcast.tell(self.missions)
         return self.tell(f"mission {one.name} {why}")
 
     def keep(self, begun: RunMission | None = None) -> None:
-        """Have the supervisor tell us again, after a crash, which missions people have begun that still run."""
+        """Let the supervisor repeat, after a crash, the requests by which people began missions that still run."""
         kept = {**self.kept, **({begun.mission: begun} if begun else {})}
         still = {name: one for name, one in kept.items() if name in self.missions.names}
         if still != self.kept:
             self.kept = still
             self.context.repeat(tuple(still.values()))
 
-    # What is told
+    # Reports
 
     def story(self, mission: str, level: Level, text: str) -> None:
         """Log a line of a mission's story, with its name if several run."""
@@ -365,12 +365,12 @@ class Mission(Component[MissionConfig]):
         self.context.log(level, f"{mission}: {text}" if several and not text.startswith("mission ") else text)
 
     def publish(self, record: LogRecord) -> None:
-        """Publish a record of the log, unless it only tells what came in."""
+        """Publish a record of the log, unless it only records an input."""
         if record["event"] not in INPUTS:
             self.bound[port_name(PUBLISHES, EVENTS)](String(data=json.dumps(record)))
 
     def running_text(self) -> str:
-        """Return in words what runs."""
+        """Return the running missions in words."""
         return f"running {', '.join(self.missions.names)}"
 
     def tell(self, text: str) -> str:
@@ -380,13 +380,13 @@ class Mission(Component[MissionConfig]):
         return text
 
     def show(self, level: Level, text: str) -> None:
-        """Make a text the status, if it is another one."""
+        """Make a text the status, if it has changed."""
         if text != self.shown:
             self.shown = text
             self.status(level, text)
 
     def summary(self) -> dict[str, str]:
-        """Return how the missions stand and what they did."""
+        """Return the states of the missions and what they did."""
         runs = list(self.missions.runs.values())
         if not runs:
             return {}

@@ -12,7 +12,7 @@ from rbxcompose.msgs.types import Message
 from rbxcompose.mux.core import MuxCore, MuxSource
 from rbxcompose.sdk import Capability, Component, Config, Forwards, Frequency, In, Level, Out, Port, Time, component
 
-LOCK = "lock_"  # begins the port of a lock, which no input may be named like
+LOCK = "lock_"  # prefix of the ports of locks; no input name may begin with it
 
 
 class MuxSourceConfig(Config):
@@ -32,7 +32,7 @@ class MuxInputConfig(MuxSourceConfig):
 
 
 class MuxConfig(Config):
-    """What goes through, from where, in which order."""
+    """The output, its inputs and locks, and their priorities."""
 
     output: str
     """Topic that the winner's messages go to."""
@@ -58,7 +58,7 @@ class Mux(Component[MuxConfig]):
 
     @classmethod
     def ports(cls, config: MuxConfig) -> dict[str, Port[Any]]:
-        """Return the output, an input per source and one per lock."""
+        """Return the output, one input per source and one per lock."""
         message = registry.message(config.message)
         ports: dict[str, Port[Any]] = {"output": Out(message, config.output, qos="command").named("output")}
         for name, one in config.inputs.items():
@@ -70,11 +70,11 @@ class Mux(Component[MuxConfig]):
 
     @classmethod
     def capabilities(cls, config: MuxConfig) -> tuple[Capability, ...]:
-        """Return what it lets through."""
+        """Declare which inputs it forwards."""
         return (Forwards(tuple(config.inputs), "output"),)
 
     def configure(self) -> None:
-        """Build the core; a mux that comes back while the robot is stopped comes back closed."""
+        """Build the core; a mux restarted while the robot is stopped starts closed."""
         zero = registry.message(self.config.message)()
         self.core: MuxCore[Message] = MuxCore(
             {name: MuxSource(one.priority, one.timeout) for name, one in self.config.inputs.items()},
@@ -87,12 +87,12 @@ class Mux(Component[MuxConfig]):
         self.refused: list[str] = []
 
     def activate(self) -> None:
-        """Look whether all locks are heard, once each had the time for it."""
+        """Check that all locks send heartbeats, after each has had time to do so."""
         if self.config.locks:
             self.context.wake_at(self.now + max(lock.timeout for lock in self.config.locks.values()))
 
     def take_over(self, old: Mux) -> None:
-        """Know who was talking: otherwise all would have to come to rest once after a stop."""
+        """Take over who was sending: otherwise all sources would have to come to rest once after a stop."""
         self.core.take_over(old.core)
 
     def received(self, port: str, message: Any) -> None:
@@ -104,18 +104,18 @@ class Mux(Component[MuxConfig]):
         self.settle()
 
     def wake(self) -> None:
-        """Send the one zero that follows the end of the last source."""
+        """Send the single zero after the last source has ended."""
         if (zero := self.core.tick(self.now)) is not None:
             self.send(zero)
         self.settle()
 
     def stop(self) -> None:
-        """Latch the lock `stop` and send a zero at once."""
+        """Latch the lock `stop` and send a zero immediately."""
         self.send(self.core.stop(self.now))
         self.settle()
 
     def release(self) -> None:
-        """Open the lock; a source that is still talking must come to rest once."""
+        """Open the lock; a source that is still sending must come to rest once."""
         self.core.release(self.now)
         self.settle()
 
@@ -125,7 +125,7 @@ class Mux(Component[MuxConfig]):
         self.settle()
 
     def go_on(self) -> None:
-        """Let through what comes from now on."""
+        """Let new messages through."""
         self.core.resume(self.now)
         self.settle()
 
@@ -139,7 +139,7 @@ class Mux(Component[MuxConfig]):
         self.bound["output"](message)
 
     def settle(self) -> None:
-        """Ask for the next deadline and say who is let through and who is locked out, if that has changed."""
+        """Schedule the next deadline, and report changes in which source is let through and which are locked out."""
         if (deadline := self.core.next_deadline()) is not None:
             self.context.wake_at(deadline)
         active = "stop" if self.core.stopped else self.core.active

@@ -7,7 +7,7 @@ from rbxcompose.sdk import Component, Config, Out, component
 
 
 class RobotDescriptionConfig(Config):
-    """What is told."""
+    """The description to publish."""
 
     urdf: str
     """Text of the URDF."""
@@ -25,5 +25,5 @@ class RobotDescription(Component[RobotDescriptionConfig]):
     robot_description = Out(String, "robot_description", qos="latched")
 
     def activate(self) -> None:
-        """Publish once; who subscribes later is given it, too."""
+        """Publish once; late subscribers receive it, too."""
         self.robot_description(String(data=self.config.urdf))

@@ -10,7 +10,7 @@ from rbxcompose.sdk import Capability, Component, Config, Out, Setting, WritesFr
 
 
 class TransformsConfig(Config):
-    """Which frames coincide."""
+    """The frames that coincide."""
 
     map: str = "map"
     """Frame of places."""
@@ -31,11 +31,11 @@ class Transforms(Component[TransformsConfig]):
 
     @classmethod
     def capabilities(cls, config: TransformsConfig) -> tuple[Capability, ...]:
-        """Return the frame that it fixes."""
+        """Declare the frame that it fixes."""
         return (WritesFrame("tf_static", Setting(config.map, "map"), Setting(config.odom, "odom")),)
 
     def activate(self) -> None:
-        """Publish once; who subscribes later is given it, too."""
+        """Publish once; late subscribers receive it, too."""
         link = TransformStamped(
             header=Header(stamp=to_time(self.stamp), frame_id=self.config.map),
             child_frame_id=self.config.odom,

@@ -1,4 +1,4 @@
-"""What a part says of itself: the topics that it needs outside, and what it gives to the rest of the robot."""
+"""Claims of a part: the topics that it needs from outside, and what it provides to the rest of the robot."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rbxcompose.sections.provides import provides
 
 
 def claims_of(part: Contents) -> Iterator[Claim]:
-    """Yield what the file of a part says under `needs:` and `provides:`."""
+    """Yield the claims that a part's file makes under `needs:` and `provides:`."""
     needed, given = part.of(needs), part.of(provides)
     for section, about, ports in (("needs", About.NEED, needed.ports), ("provides", About.PORT, given.ports)):
         for topic, type_name in ports.items():
@@ -26,7 +26,7 @@ def claims_of(part: Contents) -> Iterator[Claim]:
 
 
 def renamed(claim: Claim, renaming: Renaming) -> Claim:
-    """Return a claim by the name outside of the part; a skill is named like the topic of its action."""
+    """Return a claim with its name outside the part; a skill is named like the topic of its action."""
     match claim.about:
         case About.VALUE:
             return replace(claim, name=renaming.name(VALUE, claim.name))

@@ -1,4 +1,4 @@
-"""A composed robot as YAML that gives the same robot when it is read again."""
+"""A composed robot as YAML that reads back as the same robot."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ _PLAIN = re.compile(r"(?!- |-$|---|\.\.\.)[\w./+-](?:[^\n:#]|:(?! |$)|(?<! )#)*(
 
 
 def dump_robot(manifest: RobotManifest, note: Note = lambda path, node: "") -> str:
-    """Return a robot with its parts, profiles, overlays and values put together and filled in, as one file.
+    """Return a robot as one file, with its parts, profiles, overlays and values merged and filled in.
 
-    It is meant for the folder of the robot's file: paths of files are relative to that. `note` gives
-    the comment behind a value. Secrets keep their names: `${secret.NAME}`.
+    It is meant for the folder of the robot's file: file paths are relative to that. `note` gives the
+    comment after a value. Secrets keep their names: `${secret.NAME}`.
     """
     return dump(_in_one_file(manifest), note)
 
 
 def dump(root: MappingNode, note: Note = lambda path, node: "") -> str:
-    """Return a filled tree as YAML in block style; `note` gives the comment behind a value."""
+    """Return a filled tree as YAML in block style; `note` gives the comment after a value."""
     return "".join(f"{line}\n" for line in _mapping(root, (), "", note))
 
 
 def _in_one_file(manifest: RobotManifest) -> MappingNode:
-    """Return the tree with each file that it names as the robot's own file would name it."""
+    """Return the tree with all file paths as the robot's own file would write them."""
 
     def named(kind: str, node: TreeNode) -> TreeNode:
         if kind != FILE or not isinstance(node, ScalarNode):
@@ -68,7 +68,7 @@ def _path_from(robot: Path, file: Path) -> str:
 
 
 def _lines(node: TreeNode, path: KeyPath, begin: str, indent: str, note: Note) -> Iterator[str]:
-    """Yield the lines of a value; the first one goes behind `begin`, a key or a dash."""
+    """Yield the lines of a value; the first follows `begin`, a key or a dash."""
     comment = note(path, node)
     behind = f"  # {comment}" if comment else ""
     match node:
@@ -117,13 +117,13 @@ def _text(text: str, plain: bool) -> str:
 
 
 def exact(value: float, dimension: Dimension) -> str:
-    """Return a quantity in the unit that people expect, with as many digits as its value needs."""
+    """Return a quantity in its usual unit, with as many digits as its value needs."""
     usual = format_quantity(value, dimension)
     units = [unit for unit in UNITS.values() if unit.dimension == dimension]
     units.sort(key=lambda unit: (not usual.endswith(f" {unit.name}"), unit.name))
     texts = [f"{digits} {unit.name}" for unit in units for digits in _digits(unit.from_si(value))] or [repr(value)]
     found = next((text for text in texts if _read(text, dimension) == value), None)
-    # Some ratios have no text in percent that gives them to the last bit; a product does.
+    # Some ratios have no text in percent that is exact to the last bit; a product is.
     return found or f"${{{value!r} * {format_quantity(1.0, dimension)}}}"
 
 

@@ -1,4 +1,4 @@
-"""Provenance: which layers gave a value at a path of the composed robot, from the first one to the one that holds."""
+"""Provenance: the layers that gave a value at a path of the composed robot, from the first to the effective one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ROBOT_LAYER = "the robot"
 
 @dataclass(frozen=True, slots=True)
 class HistoryStep:
-    """What one layer wrote: a node with its place, or None where it took the value away."""
+    """What one layer wrote: a node with its place, or None if it removed the value."""
 
     layer: str
     node: TreeNode | None
@@ -22,28 +22,28 @@ class HistoryStep:
 
 @dataclass(slots=True)
 class History:
-    """All that the layers wrote, in order; nodes are as written, with their `${...}` not filled in.
+    """All that the layers wrote, in order; nodes are as written, with `${...}` not filled in.
 
-    Only what a layer added, replaced or removed as a whole is kept, so it costs no more than what was changed.
+    It keeps only what a layer added, replaced or removed as a whole, so it costs no more than the changes.
     """
 
     _steps: dict[KeyPath, list[tuple[int, HistoryStep]]] = field(default_factory=dict)
     _count: int = 0
 
     def write(self, path: KeyPath, step: HistoryStep) -> None:
-        """Keep what a layer did at `path`."""
+        """Record what a layer did at `path`."""
         self._count += 1
         self._steps.setdefault(path, []).append((self._count, step))
 
     @property
     def paths(self) -> Iterable[KeyPath]:
-        """Return every path at which a layer wrote."""
+        """Return every path that a layer wrote."""
         return self._steps.keys()
 
     def of(self, path: KeyPath) -> tuple[HistoryStep, ...]:
-        """Return every layer's value at `path`, the one that holds last; empty if no layer ever wrote there.
+        """Return every layer's value at `path`, the effective one last; empty if no layer ever wrote there.
 
-        A last step without a node tells that the value was taken away.
+        A last step without a node means that the value was removed.
         """
         found: list[HistoryStep] = []
         for step in self._all(path):
@@ -52,7 +52,7 @@ class History:
         return tuple(found)
 
     def removed(self, section: str) -> dict[str, Span]:
-        """Return the entries of a section that were there and are gone, each with the place that took it away."""
+        """Return the removed entries of a section, each with the place that removed it."""
         names = {path[1] for path in self._steps if len(path) == 2 and path[0] == section}
         names |= {
             name for step in self.of((section,)) if isinstance(step.node, MappingNode) for name in step.node.entries
@@ -61,7 +61,7 @@ class History:
         return {name: step.span for name, step in last.items() if step.node is None}
 
     def layer(self, path: KeyPath) -> str:
-        """Return the layer whose value at `path` holds, of the nearest path above it that has one."""
+        """Return the layer with the effective value at `path`, or at the nearest path above that has one."""
         for length in range(len(path), -1, -1):
             if steps := self.of(path[:length]):
                 return steps[-1].layer

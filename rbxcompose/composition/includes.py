@@ -1,4 +1,4 @@
-"""Parts: reading what `include:` names, and what each instance brings under the names of the robot."""
+"""Parts: read what `include:` names, and put what each instance brings under the names of the robot."""
 
 from __future__ import annotations
 
@@ -74,11 +74,11 @@ include:
 
 @dataclass(frozen=True, slots=True)
 class PartInstance:
-    """One instance of a part: what its file brings under the names of the robot, and what its arguments are given."""
+    """One instance of a part: what its file brings, under the names of the robot, and the values of its arguments."""
 
     name: str  # its path: `arm.hand`
-    file: str  # as findings show it
-    span: Span  # of the entry that includes it
+    file: str  # file name in findings
+    span: Span  # span of the entry that includes it
     root: MappingNode
     arguments: MappingNode  # the section `args` of its file
     given: MappingNode  # `with:`
@@ -103,7 +103,7 @@ class _Open:
 
 @dataclass(slots=True)
 class Parts:
-    """Reads the instances of one robot; `is_complete` tells whether all could be read."""
+    """Reads the instances of one robot; `is_complete` is whether all could be read."""
 
     documents: Documents
     robot: Path
@@ -114,7 +114,7 @@ class Parts:
     _size: int = 0
 
     def instances(self, root: MappingNode, path: str = "", above: tuple[_Open, ...] = ()) -> Iterator[PartInstance]:
-        """Yield what `include:` of a file brings, an instance behind those that it includes itself."""
+        """Yield the instances from the `include:` of a file, each after those that it includes itself."""
         for name, entry, read in Contents(root, self.robot, self.documents).of(include):
             opened = self._open(read, entry, above) if read else None
             if read is None or opened is None:
@@ -130,7 +130,7 @@ class Parts:
                 yield from self._renamed(name, read, entry.value, inside)
 
     def _inside(self, instance: str, file: _File, above: tuple[_Open, ...]) -> Iterator[PartInstance]:
-        """Yield what a part includes itself."""
+        """Yield the instances that a part includes itself."""
         included = replace(file.root, entries={n: e for n, e in file.root.entries.items() if n == include.name})
         yield from self.instances(in_scope(settled(included, self.documents.report), instance), instance, above)
 
@@ -163,7 +163,7 @@ class Parts:
         return None
 
     def _read(self, path: Path, span: Span) -> _File | None:
-        """Return a part's file, which is read once; None after findings. `span` is the path that names it."""
+        """Return a part's file, read only once; None after findings. `span` is that of the path that names it."""
         if path not in self._files:
             root = self.documents.read(path, PART, span)
             if root is not None:
@@ -176,14 +176,14 @@ class Parts:
     def _renamed(
         self, name: str, read: Include, written: TreeNode, inside: list[PartInstance]
     ) -> Iterator[PartInstance]:
-        """Yield an instance and what it includes under the names of the file that includes it."""
+        """Yield an instance and those inside it, under the names of the file that includes it."""
         connect = {
             topic: RenamedTopic(new, value_span(written, ("connect", topic)), key_span(written, ("connect", topic)))
             for topic, new in read.connect.items()
         }
         renaming = Renaming.of(f"{name}_", connect, [instance.root for instance in inside])
         for instance in inside:
-            is_own = instance is inside[-1]  # what an instance is given are names of the file that includes it
+            is_own = instance is inside[-1]  # its given values already use the names of the including file
             yield replace(
                 instance,
                 root=renaming.root(instance.root),
@@ -199,7 +199,7 @@ class Parts:
 
 
 def _instance(name: str, file: _File, opened: _Open, entry: Entry) -> PartInstance:
-    """Return an instance as its own file describes it."""
+    """Return an instance with the names of its own file."""
     scoped = in_scope(file.root, name)
     own = {*ManifestHeader.model_fields, *(one.name for one in sections(PART) if not one.is_composed)}
     given = at(entry.value, ("with",))
@@ -215,7 +215,7 @@ def _instance(name: str, file: _File, opened: _Open, entry: Entry) -> PartInstan
 
 
 def _circle(chain: list[_Open], span: Span) -> Finding:
-    """Return the finding for a file that is included by itself; it stands last in `chain`, and once before."""
+    """Return the finding for a file that includes itself; it is last in `chain`, and in it once before."""
     start = next(index for index, one in enumerate(chain) if one.file == chain[-1].file)
     names = " -> ".join(shown_name(one.file) for one in chain[start:])
     related = [Related(one.span, f"'{shown_name(one.file)}' is included here") for one in chain[start + 1 :]]
@@ -223,7 +223,7 @@ def _circle(chain: list[_Open], span: Span) -> Finding:
 
 
 def in_scope(root: MappingNode, scope: str) -> MappingNode:
-    """Return a tree whose `${args...}` mean the arguments of the instance `scope`."""
+    """Return a tree whose `${args...}` refer to the arguments of the instance `scope`."""
 
     def scoped(node: TreeNode) -> TreeNode:
         match node:
@@ -238,7 +238,7 @@ def in_scope(root: MappingNode, scope: str) -> MappingNode:
 
 
 def included_parts(instances: Sequence[PartInstance]) -> dict[str, IncludedPart]:
-    """Return the instances as the checks see them; what a part includes counts as its own."""
+    """Return the instances for the checks; what a part includes counts as its own."""
     found = {}
     for one in instances:
         own = [other for other in instances if f"{other.name}.".startswith(f"{one.name}.")]

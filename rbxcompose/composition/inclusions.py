@@ -1,4 +1,4 @@
-"""Which file includes which, so that a finding inside an included file shows how the robot came to it."""
+"""Records which file includes which, so that a finding in an included file can show how the robot includes it."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from dataclasses import dataclass, field, replace
 from rbxcompose.findings import Finding, Related, Span
 from rbxcompose.manifest.given_values import told_where_given
 
-_MOST_CHAINS = 3  # of one finding: a part may have many instances
+_MOST_CHAINS = 3  # per finding: a part may have many instances
 
 
 @dataclass(frozen=True, slots=True)
 class Inclusion:
-    """One instance of a file: its path (`arm.hand`) and the entries that lead to it, the nearest first."""
+    """One instance of a file: its path (`arm.hand`) and the entries that lead to it, nearest first."""
 
     instance: str
     chain: tuple[Span, ...]
 
     @property
     def related(self) -> Iterator[Related]:
-        """Yield the chain, from the entry that includes the file up to the robot's own."""
+        """Yield the chain, from the entry that includes the file up to the one in the robot's own file."""
         names = self.instance.split(".")
         for length, span in zip(range(len(names), 0, -1), self.chain, strict=True):
             yield Related(span, f"included here as '{'.'.join(names[:length])}'")
@@ -28,18 +28,18 @@ class Inclusion:
 
 @dataclass(slots=True)
 class Inclusions:
-    """All instances, by the name that findings show of their file."""
+    """All instances, by the name of their file in findings."""
 
     of_file: dict[str, list[Inclusion]] = field(default_factory=dict)
 
     def add(self, file: str, inclusion: Inclusion) -> None:
-        """Keep one instance."""
+        """Add one instance."""
         self.of_file.setdefault(file, []).append(inclusion)
 
     def told(self, findings: Iterable[Finding]) -> list[Finding]:
-        """Return the findings with the chain of includes for each one inside a part.
+        """Return the findings, with the chain of includes added to each one inside a part.
 
-        A mistake of a part that has several instances is told once, one in a given value where that was given.
+        A mistake in a part with several instances is reported once; one in a given value, where it was given.
         """
         said: set[tuple[str, Span]] = set()
         out = []
@@ -58,5 +58,5 @@ def _with_chain(finding: Finding, inclusions: list[Inclusion]) -> Finding:
     fix = finding.fix
     prefixes = {one.instance.replace(".", "_") + "_" for one in inclusions}
     if fix and any(prefix in edit.text for edit in fix.edits for prefix in prefixes):
-        fix = None  # it would write a name of the robot into the part, which has its own names
+        fix = None  # the fix would write a name of the robot into the part, which has its own names
     return replace(finding, related=tuple(dict.fromkeys([*finding.related, *chain])), fix=fix)

@@ -1,9 +1,9 @@
-"""What a part brings, under the names that it has in the file that includes it.
+"""Rename what a part brings to its names in the file that includes it.
 
-Names of the instance `head` get `head_` in front, and what the part says of them follows. Topics get nothing in front:
-a mux is named after its topic, so it keeps its name; `connect` gives a topic of the part another name, and with it a
-mux, or one of its inputs. A name that the part itself does not have is one of the file that includes it. What holds
-`${` is filled in later and stays as it is. Which names a section has and where it refers to some, its descriptor tells.
+Names of the instance `head` get the prefix `head_`, and the part's references to them follow. Topics get no prefix: a
+mux is named after its topic, so it keeps its name; `connect` renames a topic of the part, and with it a mux or one of
+its inputs. A name that the part itself lacks belongs to the file that includes it. Text with `${` is filled in later
+and stays unchanged. The descriptor of a section defines its names and its references to names.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Rename = Callable[[str], str]
 
 @dataclass(slots=True)
 class Renaming:
-    """How the names of one instance change; `used` are the topics of `connect` that the part has."""
+    """The renaming of one instance; `used` are the topics of `connect` that the part has."""
 
     prefix: str
     connect: dict[str, RenamedTopic]
@@ -32,7 +32,7 @@ class Renaming:
 
     @classmethod
     def of(cls, prefix: str, connect: dict[str, RenamedTopic], roots: Iterable[MappingNode]) -> Renaming:
-        """Return the renaming for what `roots` bring: the file of a part and all that it includes."""
+        """Return the renaming for `roots`: the file of a part and all that it includes."""
         trees = list(roots)
         named = [one for one in sections() if one.names and one.is_composed]
         own = {one.name: frozenset(name for root in trees for name in one.names_in(root)) for one in named}
@@ -52,7 +52,7 @@ class Renaming:
         return replace(root, entries=entries)
 
     def topic(self, topic: str) -> str:
-        """Return the name that a topic of the part has outside; an input of a mux follows its mux."""
+        """Return the name of a topic of the part outside; an input of a mux follows its mux."""
         if found := self.connect.get(topic):
             self.used.add(topic)
             return found.name
@@ -62,15 +62,15 @@ class Renaming:
         return topic
 
     def written(self, topic: str) -> RenamedTopic:
-        """Return what gives a topic its other name: itself, or the topic that it stands below."""
+        """Return the entry that renames a topic: its own, or that of the topic above it."""
         return self.connect.get(topic) or self.connect[topic.rpartition("/")[0]]
 
     def component(self, name: str) -> str:
-        """Return the new name of something that runs; `component.port` keeps its port."""
+        """Return the new name of something that runs; in `component.port`, the port stays."""
         return self.name(PORT, name)
 
     def name(self, kind: str, name: str) -> str:
-        """Return what the name of something of a kind becomes."""
+        """Return the new name of something of a kind."""
         if kind == TOPIC:
             return self.topic(name)
         if kind == ANYTHING:
@@ -82,18 +82,18 @@ class Renaming:
         return name
 
     def any_name(self, name: str) -> str:
-        """Return what a word becomes that may name anything of the part: a value given by `with:`."""
+        """Return the new form of a word that may name anything in the part: a value given by `with:`."""
         kinds = (one.names for one in sections() if one.is_map and one.is_composed)
         changed = (self.name(kind, name) for kind in (COMPONENT, *kinds))
         return next((one for one in changed if one != name), name)
 
     def values(self, given: MappingNode) -> MappingNode:
-        """Return the values that a part gives to one that it includes."""
+        """Return the renamed values that a part gives to one that it includes."""
         entries = {name: Entry(one.key, self.texts(one.value, self.any_name)) for name, one in given.entries.items()}
         return replace(given, entries=entries)
 
     def texts(self, node: TreeNode, change: Rename) -> TreeNode:
-        """Return a node with every text below it changed, but for those that are filled in later."""
+        """Return a node with every text below it changed, except those that are filled in later."""
         match node:
             case ScalarNode(text=text):
                 changed = text if "${" in text else change(text)
@@ -104,14 +104,14 @@ class Renaming:
                 return replace(node, entries={n: Entry(e.key, self.texts(e.value, change)) for n, e in entries.items()})
 
     def topics(self, node: TreeNode, above: str = "") -> TreeNode:
-        """Return a map whose keys are topics (below `above`, if given) with these changed; what is no map stays."""
+        """Return a map with its keys renamed as topics (below `above`, if given); other nodes stay unchanged."""
         if not isinstance(node, MappingNode):
             return node
         entries = {}
         for name, entry in node.entries.items():
             topic = f"{above}{name}"
             changed = self.topic(topic).removeprefix(self.topic(above.removesuffix("/")) + "/" if above else "")
-            # A name that is wrong is shown where it was given.
+            # A wrong name is reported where it was given.
             span = self.connect[topic].span if topic in self.connect else entry.key.span
             entries[changed] = Entry(replace(entry.key, text=changed, span=span), entry.value)
         return replace(node, entries=entries)
@@ -141,7 +141,7 @@ class Renaming:
 
 
 def topics_of(roots: Iterable[MappingNode]) -> set[str]:
-    """Return the topics that trees have, as `connect:` of an instance may name them."""
+    """Return the topics in trees that `connect:` of an instance may name."""
     return {
         topic
         for root in roots
@@ -153,7 +153,7 @@ def topics_of(roots: Iterable[MappingNode]) -> set[str]:
 
 
 def _with(node: MappingNode, key: str, change: Callable[[TreeNode], TreeNode]) -> MappingNode:
-    """Return a map with the value of `key` changed, if it has it."""
+    """Return a map with the value of `key` changed, if it has that key."""
     if key not in node.entries:
         return node
     entry = node.entries[key]

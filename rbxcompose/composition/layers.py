@@ -1,4 +1,4 @@
-"""The layers of a robot, one over the other: parts -> robot -> profiles -> overlays -> `--set`."""
+"""The layers of a robot, bottom to top: parts -> robot -> profiles -> overlays -> `--set`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ INCLUDE = include.name
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """What a command lays over the robot's file: profiles by name, overlays by path, single values."""
+    """The layers that a command puts over the robot's file: profiles by name, overlays by path, single values."""
 
     profiles: Sequence[str] = ()
     overlays: Sequence[str] = ()
@@ -46,7 +46,7 @@ class Composed:
 
 
 def compose_robot(root: MappingNode, file: Path, chosen: Chosen, documents: Documents) -> Composed:
-    """Return a robot's file with its parts below and what was chosen on top."""
+    """Return a robot's file with its parts below and the chosen layers on top."""
     report, history = documents.report, History()
     overlays = [*_profiles(root, file, chosen.profiles, documents), *_overlays(chosen.overlays, documents)]
     own = _without(root, profiles.name)
@@ -57,7 +57,7 @@ def compose_robot(root: MappingNode, file: Path, chosen: Chosen, documents: Docu
     if instances:
         brought = join([(one.root, one.name, one.span) for one in instances], report, history)
         composed = compose(replace(brought, span=root.span), [(own, ROBOT_LAYER)], report, history)
-        order = dict.fromkeys((*own.entries, *composed.entries))  # as the robot's file has it
+        order = dict.fromkeys((*own.entries, *composed.entries))  # the order of the robot's file
         composed = replace(composed, entries={name: composed.entries[name] for name in order if name in composed})
     else:
         composed = settled(own, report)
@@ -76,7 +76,7 @@ def _include(
     history: History,
     documents: Documents,
 ) -> MappingNode:
-    """Return the section `include` as all layers have it: what it names is read before anything else is composed."""
+    """Return the section `include` after all layers: the parts it names are read before anything else is composed."""
     included = settled(only(root, INCLUDE), documents.report)
     for entry in included.entries.values():
         history.write((INCLUDE,), HistoryStep(ROBOT_LAYER, entry.value, entry.value.span))
@@ -87,7 +87,7 @@ def _include(
 
 
 def only(root: MappingNode, key: str) -> MappingNode:
-    """Return a tree with nothing but one of its keys."""
+    """Return a tree with only one of its keys."""
     return replace(root, entries={name: entry for name, entry in root.entries.items() if name == key})
 
 
@@ -113,7 +113,7 @@ def _profiles(
 
 
 def profile_spans(root: MappingNode) -> dict[str, Span]:
-    """Return where each profile of a robot's file stands, from its name to its end."""
+    """Return the span of each profile in a robot's file, from its name to its end."""
     there = root.get(profiles.name)
     named = there.entries if isinstance(there, MappingNode) else {}
     return {
@@ -124,7 +124,7 @@ def profile_spans(root: MappingNode) -> dict[str, Span]:
 
 
 def _overlays(chosen: Sequence[str], documents: Documents) -> Iterator[tuple[MappingNode, str]]:
-    """Yield the files of `-f`, in the order of the command; the header is their own."""
+    """Yield the files of `-f` without their headers, in the order of the command."""
     for written in chosen:
         file = find(written)
         if isinstance(file, Finding):

@@ -1,6 +1,6 @@
 """Composition: parts -> robot -> profile -> overlays -> `--set`.
 
-Maps merge by key, the rest is replaced; each value keeps its place, and a `History` keeps what it replaced.
+Maps merge by key, all else is replaced; each value keeps its place, and a `History` keeps what it replaced.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ SET = "--set"
 def compose(
     base: MappingNode, overlays: Iterable[tuple[MappingNode, str]], report: Report, history: History | None = None
 ) -> MappingNode:
-    """Return `base`, which is settled, changed by each overlay in turn; each comes with its name for findings."""
+    """Return the settled `base` changed by each overlay in turn; each overlay comes with its name for findings."""
     composed = base
     for overlay, name in overlays:
         composed = _Merge(name, report, history or History()).mapping(composed, _spelt_out(overlay), ())
@@ -104,9 +104,9 @@ def compose(
 
 
 def join(parts: Iterable[tuple[MappingNode, str, Span]], report: Report, history: History) -> MappingNode:
-    """Return what several parts bring together; each comes with its instance and the place that includes it.
+    """Return the union of what several parts bring; each comes with its instance and the place that includes it.
 
-    A part stands behind those that it includes, and may change them; what else two parts bring is a finding.
+    A part follows those that it includes and may change them; any other overlap of two parts is a finding.
     """
     joined = MappingNode()
     for root, instance, span in parts:
@@ -115,12 +115,12 @@ def join(parts: Iterable[tuple[MappingNode, str, Span]], report: Report, history
 
 
 def part_layer(instance: str) -> str:
-    """Return how findings call what an instance of a part brings."""
+    """Return the name of an instance's layer in findings."""
     return f"part '{instance}'"
 
 
 def settled(root: MappingNode, report: Report) -> MappingNode:
-    """Return a tree that nothing lies below: short forms written in full, and a finding for each `!remove`."""
+    """Return a tree for the bottom layer: with short forms written in full, and a finding for each `!remove`."""
     return _settled_map(_spelt_out(root), report)
 
 
@@ -156,7 +156,7 @@ class _Merge:
         return replace(base, entries=entries)
 
     def entry(self, entries: dict[str, Entry], entry: Entry, path: KeyPath) -> None:
-        """Lay one entry over those of the map above it."""
+        """Merge one entry into the entries of its map."""
         name = entry.key.text
         below = entries.get(name)
         is_gone = is_removal(entry.value)
@@ -207,17 +207,17 @@ class _Merge:
             self._enter(entries, entry, path)
 
     def _clash(self, below: Entry, entry: Entry, path: KeyPath) -> None:
-        """Say that this layer may not change what is at `path`."""
+        """Report that this layer must not change what is at `path`."""
         raise AssertionError("an overlay may change everything")
 
 
 class _Join(_Merge):
-    """One part laid beside others."""
+    """One part merged with others on the same level."""
 
     def __init__(self, instance: str, span: Span, report: Report, history: History) -> None:
         super().__init__(part_layer(instance), report, history)
         self.span = span
-        self.included = part_layer(f"{instance}.").removesuffix("'")  # how the layers of what it includes begin
+        self.included = part_layer(f"{instance}.").removesuffix("'")  # prefix of the layers of what it includes
 
     def may_merge(self, path: KeyPath) -> bool:
         return _is_shared(path) or self.may_change(path)
@@ -244,9 +244,9 @@ def _is_shared(path: KeyPath) -> bool:
 
 
 def _settled(node: TreeNode, report: Report) -> TreeNode:
-    """Return a node without the tags of maps: nothing lies below it that they could speak of.
+    """Return a node without the tags of maps: nothing lies below it that they could refer to.
 
-    A list keeps its `!replace`, which says that what is not in it any more was meant to go.
+    A list keeps its `!replace`, which says that the items it no longer has were removed on purpose.
     """
     match node:
         case ScalarNode():
@@ -259,7 +259,7 @@ def _settled(node: TreeNode, report: Report) -> TreeNode:
 
 
 def is_removal(node: TreeNode) -> bool:
-    """Return whether a layer takes away what lies below it."""
+    """Return whether a node removes what lies below it."""
     return isinstance(node, MappingNode) and node.tag == REMOVE
 
 
@@ -273,7 +273,7 @@ def _settled_map(node: MappingNode, report: Report) -> MappingNode:
         if is_removal(value):
             message = f"'!remove' has nothing to remove '{name}' from"
             report.add(NOT_AN_OVERLAY.at(value.span, message, help="it belongs in a profile"))
-            changed[name] = Entry(entry.key, ScalarNode("", value.span, filled=BROKEN))  # so that nobody misses it
+            changed[name] = Entry(entry.key, ScalarNode("", value.span, filled=BROKEN))  # so that it is not missed
         elif (inner := _settled(value, report)) is not value:
             changed[name] = Entry(entry.key, inner)
     return MappingNode({**node.entries, **changed}, node.span) if changed or node.tag else node

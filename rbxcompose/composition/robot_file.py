@@ -1,4 +1,4 @@
-"""A robot's file from text to `RobotManifest`, and every other manifest up to its checked header."""
+"""Read a robot's file from text to `RobotManifest`, and any other manifest up to its checked header."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def load_robot(
 ) -> RobotManifest | None:
     """Read a robot's file with its parts, profiles, overlays and `--set` changes; mistakes go into `report`.
 
-    Returns None if there is no robot to speak of, or one of its parts cannot be read; a robot with mistakes is returned
-    as far as it could be read.
+    Returns None if there is no usable robot, or one of its parts cannot be read; a robot with mistakes is returned as
+    far as it could be read.
     """
     file = find(str(path))
     if isinstance(file, Finding):
@@ -66,7 +66,7 @@ def _manifest(
     composed: Composed, file: Path, sim: bool, environment: Mapping[str, str], documents: Documents
 ) -> RobotManifest | None:
     if not composed.parts.is_complete:
-        return None  # what a missing part was to bring would be missing everywhere
+        return None  # else everything that the missing part brings would be reported as missing
     documents.check(file_model(ROBOT), composed.root)
     names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
     root, include = fill_scopes(composed, names)
@@ -91,7 +91,7 @@ def read_mission(
     sim: bool = True,
     environment: Mapping[str, str] | None = None,
 ) -> MappingNode | None:
-    """Read a mission's file, check its header and fill in `${...}`; what it does is left as nodes."""
+    """Read a mission's file, check its header and fill in `${...}`; its body stays as nodes."""
     documents = Documents(report, sources)
     root = documents.read(path, MISSION)
     if root is None:

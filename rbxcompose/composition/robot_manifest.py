@@ -1,4 +1,4 @@
-"""The robot as it comes out of the front end."""
+"""The robot as the front end returns it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from rbxcompose.sections.values import ValueModel, values
 
 
 class About(StrEnum):
-    """What a claim of a part is about."""
+    """The subject of a part's claim."""
 
     NEED = "a topic that it needs"
     PORT = "a topic that it gives"
@@ -35,7 +35,7 @@ class About(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One thing that a part needs or provides, by the name that it has in the robot; `type` is that of a topic."""
+    """One thing that a part needs or provides, by its name in the robot; `type` is that of a topic."""
 
     about: About
     name: str
@@ -45,23 +45,23 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class IncludedPart:
-    """An instance of a part: what it brought, by the names that this has in the robot.
+    """An instance of a part: what it brought, by its names in the robot.
 
-    `name` is the path of the instance (`arm.hand`); what a part includes belongs to it too.
+    `name` is the path of the instance (`arm.hand`); what a part includes belongs to it, too.
     """
 
     name: str
-    file: str  # as findings show it
-    span: Span  # of the entry that includes it
+    file: str  # file name in findings
+    span: Span  # span of the entry that includes it
     components: frozenset[str]
-    muxes: frozenset[str]  # those that it has an input or a lock of
+    muxes: frozenset[str]  # those to which it adds an input or a lock
     values: frozenset[str]
     claims: tuple[Claim, ...]  # what it needs and provides
 
 
 @dataclass(frozen=True, slots=True)
 class RobotManifest:
-    """A robot after composition: everything that its file says, in the order in which it says it."""
+    """A robot after composition: everything in its file, in the order of the file."""
 
     name: str
     about: str
@@ -71,10 +71,10 @@ class RobotManifest:
     contents: Contents
     parts: Mapping[str, IncludedPart] = field(default_factory=dict)
     profiles: Mapping[str, Span] = field(default_factory=dict)  # from the name to the end of what it changes
-    include: MappingNode = field(default_factory=MappingNode)  # composed; what it names is part of `root` already
+    include: MappingNode = field(default_factory=MappingNode)  # composed; the parts that it names are already in `root`
     history: History = field(default_factory=History)
-    overlays: tuple[str, ...] = ()  # the files of `-f`, as findings show them
-    files: Mapping[str, Path] = field(default_factory=dict)  # every file that was read, by the name that is shown
+    overlays: tuple[str, ...] = ()  # the files of `-f`, by their names in findings
+    files: Mapping[str, Path] = field(default_factory=dict)  # every file that was read, by its shown name
     inclusions: Inclusions = field(default_factory=Inclusions)
 
     @property
@@ -104,20 +104,20 @@ class RobotManifest:
 
     @property
     def diagnostics(self) -> DiagnosticsModel:
-        """Return how the states of components are grouped."""
+        """Return the groups of the components' diagnostics."""
         return self.contents.of(diagnostics)
 
     @property
     def bus(self) -> BusModel:
-        """Return how messages travel."""
+        """Return the settings of the bus."""
         return self.contents.of(bus)
 
     @property
     def body(self) -> Description | None:
-        """Return what describes the body."""
+        """Return the description of the body."""
         return self.contents.of(body)
 
     @property
     def start(self) -> str | None:
-        """Return the mission to start; None also if that mission has mistakes, which were said."""
+        """Return the mission to start; None also if that mission has mistakes, which are already reported."""
         return self.contents.of(start)

@@ -1,4 +1,4 @@
-"""Arguments of the robot and of the instances of parts, and filling in what names them, each in its own scope."""
+"""Arguments of the robot and of the instances of parts, and filling in references to them, each in its own scope."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def fill_scopes(composed: Composed, names: Names) -> tuple[MappingNode, MappingN
     values = {name: _own_value(name, one, composed.history, report) for name, one in declared.items()}
     names = with_arguments(names, values)
     include = fill(composed.include, names, report)
-    for instance in reversed(composed.instances):  # what includes stands behind what it includes
+    for instance in reversed(composed.instances):  # an instance follows those that it includes
         names = with_arguments(names, _given_values(instance, names, parts), instance.name)
     others = {name: entry for name, entry in root.entries.items() if name != args.name}
     filled = {**arguments.entries, **fill(replace(root, entries=others), names, report).entries}
@@ -73,7 +73,7 @@ def _own_value(name: str, declared: tuple[DeclaredArgument | None, Span], histor
 
 
 def _given_values(instance: PartInstance, names: Names, parts: Parts) -> dict[str, Typed]:
-    """Return the values of a part's arguments: given by `with:`, else their defaults."""
+    """Return the values of a part's arguments: those given by `with:`, else their defaults."""
     report = parts.documents.report
     declared = Contents(fill(instance.arguments, names, report), parts.robot, parts.documents).of(args)
     given = fill(instance.given, names, report)

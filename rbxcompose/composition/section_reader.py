@@ -1,4 +1,4 @@
-"""The sections of a composed robot, one by one: an error in one entry hides nothing in the others."""
+"""Read the sections of a composed robot one by one: an error in one entry hides nothing in the others."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def read_sections(root: MappingNode, file: Path, sim: bool, documents: Documents
 
 
 def reserved_names() -> frozenset[str]:
-    """Return the words that a section of a robot's file has or will have."""
+    """Return the names of present and future sections of a robot's file."""
     return frozenset((*RESERVED, *(one.name for one in sections(ROBOT))))
 
 
@@ -78,7 +78,7 @@ def _shown_secrets(root: MappingNode) -> Iterator[Finding]:
 
 
 def _taken_names(root: MappingNode) -> Iterator[Finding]:
-    """Yield a finding for each name of something that runs which something else has already."""
+    """Yield a finding for each name of something that runs that is already taken."""
     running = list(naming(COMPONENT))
     for index, section in enumerate(running):
         for name in () if section.has_topics else section.names_in(root):
@@ -91,7 +91,7 @@ def _taken_names(root: MappingNode) -> Iterator[Finding]:
 
 
 def _own_name(name: str, section: Section[Any, Any]) -> str:
-    """Return why nothing that a user writes may have a name, or nothing."""
+    """Return why a user must not use a name, or nothing."""
     if name in reserved_names():
         return f"a {section.entry} cannot be named like the section '{name}'"
     return f"every robot already runs a component '{name}'" if name in ALWAYS_THERE else ""
@@ -100,7 +100,7 @@ def _own_name(name: str, section: Section[Any, Any]) -> str:
 def _other_owner(
     root: MappingNode, name: str, section: Section[Any, Any], others: list[Section[Any, Any]]
 ) -> tuple[str, str, tuple[str, ...]] | None:
-    """Return what else has a name: in words, as a label, and its path."""
+    """Return the other owner of a name: a message, a label, and its path."""
     for one in sections(ROBOT):
         if name in one.brings and one.name in root:
             return f"the {one.name} already brings a component '{name}'", f"the {one.name}", (one.name,)

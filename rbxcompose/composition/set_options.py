@@ -24,15 +24,15 @@ Good: `--set battery.runtime="30 s"`
 """,
 )
 
-HEADER = ("about",)  # what it may change of the header
+HEADER = ("about",)  # keys of the header that it may change
 
 
 def read_sets(
     sets: Sequence[str], root: MappingNode, report: Report, sources: dict[str, str], *, of_include: bool = False
 ) -> list[tuple[MappingNode, str]]:
-    """Return one overlay for each `PATH=VALUE`; together they are one source, a line for each.
+    """Return one overlay for each `PATH=VALUE`; together they are one source text, with a line for each.
 
-    Those of `include` come in a run of their own, since parts are read before all else is composed.
+    Those of `include` need a call of their own, since parts are read before all else is composed.
     """
     if sets:
         sources[SET] = "\n".join(text.replace("\n", " ") for text in sets)
@@ -69,7 +69,7 @@ def _set_overlay(text: str, line: int, root: MappingNode, report: Report) -> Map
 
 
 def _set_path(names: list[str], span: Span, root: MappingNode, report: Report) -> list[str] | None:
-    """Return the path from the root, or None after a finding if it leads to nothing."""
+    """Return the path from the root; if it leads nowhere, report that and return None."""
     section = section_named(names[0]) if names[0] not in HEADER else None
     scope = section.scope if section else SetScope.NOTHING
     if names[0] in HEADER or (section and scope is not SetScope.NOTHING and not section.is_map):
@@ -89,12 +89,12 @@ def _set_path(names: list[str], span: Span, root: MappingNode, report: Report) -
 
 
 def settable() -> list[str]:
-    """Return the words that a path of `--set` may begin with, beside the names of components."""
+    """Return the words that may begin a path of `--set`, besides the names of components."""
     return [*HEADER, *(one.name for one in sections(ROBOT) if one.scope is not SetScope.NOTHING)]
 
 
 def in_section(names: Sequence[str], root: MappingNode) -> str:
-    """Return the help for a path that begins with a name of a section, not with the section; else nothing."""
+    """Return the help for a path that begins with an entry's name but lacks its section; else nothing."""
     for section in sections():
         if section.is_map and section.scope is not SetScope.NOTHING and names[0] in section.names_in(root):
             return f"did you mean '{section.name}.{'.'.join(names)}'?"
@@ -102,7 +102,7 @@ def in_section(names: Sequence[str], root: MappingNode) -> str:
 
 
 def _set_value(text: str, line: int, column: int, report: Report) -> TreeNode | None:
-    """Read the value of a `--set`; blank lines and columns before it make its places those of the argument."""
+    """Read the value of a `--set`; blank lines and columns before it give it the positions of the argument."""
     if not text.strip():
         return ScalarNode("", Span(SET, line, column, line, column + 1))
     node, findings = read_text("\n" * (line - 1) + " " * column + text, SET)

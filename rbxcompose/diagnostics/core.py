@@ -14,9 +14,9 @@ from rbxcompose.diagnostics.status import Status
 from rbxcompose.levels import Level, combined
 
 DEFAULT_TIMEOUT = 5.0  # [s]
-OTHER = "Other"  # the group of what no analyzer matches
+OTHER = "Other"  # the group of statuses that no analyzer matches
 _GLOB = frozenset("*?[")
-MOST_ITEMS = 10_000  # names come from the outside; the tree must not grow without end
+MOST_ITEMS = 10_000  # names come from outside; the tree must not grow without bound
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +38,14 @@ class Analyzer:
 
 @dataclass(frozen=True, slots=True)
 class _Item:
-    """The last thing known under a name; `status` is None as long as nothing was heard."""
+    """The latest status under a name; `status` is None until one has been received."""
 
     status: Status | None
     heard: float
-    cause: str = ""  # why the part is lost; empty while it is not
+    cause: str = ""  # why the part is lost; empty if it is not
 
     def seen(self, name: str, timeout: float, now: float) -> Status:
-        """Return the item as it stands in the tree at `now`."""
+        """Return the status of the item in the tree at `now`."""
         status = self.status or Status(name, Level.OK, "has not reported yet")
         if self.cause:
             return replace(status, level=Level.STALE, message=self.cause)
@@ -70,21 +70,21 @@ class Aggregator:
         }
         self._groups_of: dict[str, tuple[str, ...]] = {}
         self._reported: dict[str, Level] | None = None
-        self.dropped = 0  # statuses of new names that found no room
+        self.dropped = 0  # statuses of new names for which there was no room
 
     def feed(self, now: float, statuses: Iterable[Status]) -> None:
-        """Take statuses that arrived at `now`; a name that was lost is heard of again."""
+        """Receive statuses that arrived at `now`; a name that was lost is back."""
         for status in statuses:
             if status.name not in self._items and len(self._items) >= MOST_ITEMS:
                 self.dropped += 1
                 continue
             component = _component(status.name)
             if component in self._items and self._items[component].status is None:
-                del self._items[component]  # it stood for a part of which nothing had been heard
+                del self._items[component]  # a placeholder for a part that had not reported
             self._items[status.name] = _Item(status, now)
 
     def lost(self, now: float, names: Iterable[str], cause: str) -> None:
-        """Mark the components `names` as STALE at once, with the `cause`, until they report again."""
+        """Mark the components `names` as STALE immediately, with the `cause`, until they report again."""
         for name in names:
             known = [item for item in self._items if name in (item, _component(item))]
             for item in known or [name]:
@@ -114,7 +114,7 @@ class Aggregator:
         return {group: self._header(group, items, now).level for group, items in self._groups(now).items()}
 
     def _groups(self, now: float) -> dict[str, list[Status]]:
-        """Return the items of every group as they stand at `now`, sorted by name; Other only if it has any."""
+        """Return the items of every group with their status at `now`, sorted by name; Other only if it has any."""
         groups: dict[str, list[Status]] = {group: [] for group in (*self._analyzers, OTHER)}
         for name in sorted(self._items):
             for group in self._groups_with(name):
@@ -136,7 +136,7 @@ class Aggregator:
             return Status(
                 f"/{group}", *(Level.STALE, "nothing reported") if late else (Level.OK, "nothing reported yet")
             )
-        worst = max(items, key=lambda item: item.level)  # the first of equals
+        worst = max(items, key=lambda item: item.level)  # the first one if several are equal
         return Status(
             f"/{group}",
             combined(item.level for item in items),
@@ -150,12 +150,12 @@ def _component(name: str) -> str:
 
 
 def _matches(parts: tuple[str, str], pattern: str) -> bool:
-    # Equality first: a name may hold brackets, which are signs of a glob.
+    # Equality first: a name may contain brackets, which have a meaning in globs.
     if pattern in parts:
         return True
     return not _GLOB.isdisjoint(pattern) and any(fnmatchcase(part, pattern) for part in parts)
 
 
 def _flat(name: str) -> str:
-    """Return `name` as one step of a path: a slash would open a level of its own."""
+    """Return `name` as one step of a path: a slash would add a level."""
     return name.strip("/").replace("/", " ")

@@ -9,7 +9,7 @@ from rbxcompose.levels import Level
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What a part says of itself; `name` is `component` or `component: detail`, `values` are key and text."""
+    """What a part reports about itself; `name` is `component` or `component: detail`, `values` are keys and texts."""
 
     name: str
     level: Level

@@ -1,4 +1,4 @@
-"""Finds what is wrong with an expression before any value is known: names, dimensions, arguments."""
+"""Check expressions before any value is known: names, dimensions, arguments."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ from rbxcompose.units import LENGTH, NUMBER, QUOTIENT, TIME
 
 
 class StaticScope(Protocol):
-    """The names that exist, and what they will hold."""
+    """The names that exist, and their types."""
 
     def variable(self, name: str) -> Type | None:
-        """Return the type of `$name`, None if there is no such name."""
+        """Return the type of `$name`; None if there is no such name."""
         ...
 
     def word(self, name: str) -> Type | None:
-        """Return the type of what a bare word names, None if it names nothing; choices need not be known."""
+        """Return the type of what a bare word names; None if it names nothing. Choices need not be known."""
         ...
 
     def variables(self) -> Iterable[str]:
@@ -66,7 +66,7 @@ class StaticScope(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ExpressionProblem:
-    """Something wrong at `start` to `end` of an expression's text."""
+    """A problem at `start` to `end` of an expression's text."""
 
     message: str
     start: int
@@ -77,26 +77,26 @@ class ExpressionProblem:
 
 
 def check(expression: Expression, scope: StaticScope) -> tuple[Type, list[ExpressionProblem]]:
-    """Return the type of an expression, unknown where it is wrong, and what is wrong by place."""
+    """Return the type of an expression, unknown if it is wrong, and its problems in the order of the text."""
     checker = _Checker(scope)
     found = checker.type_of(expression.tree)
     return found, checker.sorted()
 
 
 def check_value(expression: Expression, scope: StaticScope, expected: Type) -> list[ExpressionProblem]:
-    """Return what is wrong with an expression that must give a value of the type `expected`."""
+    """Return the problems of an expression that must give a value of the type `expected`."""
     checker = _Checker(scope)
     checker.require(expression.tree, expected)
     return checker.sorted()
 
 
 def check_condition(expression: Expression, scope: StaticScope) -> list[ExpressionProblem]:
-    """Return what is wrong with an expression that must be true or false."""
+    """Return the problems of an expression that must be true or false."""
     return check_value(expression, scope, FLAG)
 
 
 class _Checker:
-    """Walks one tree; a node that is wrong is unknown to those above it, so that nothing is said twice."""
+    """Walks one tree; a wrong node has an unknown type for those above it, so that nothing is reported twice."""
 
     def __init__(self, scope: StaticScope) -> None:
         self.scope = scope
@@ -110,7 +110,7 @@ class _Checker:
         return UNKNOWN
 
     def type_of(self, node: ExpressionNode, expected: Type = UNKNOWN) -> Type:
-        """Return the type of a node; `expected` tells which choices a bare word may be."""
+        """Return the type of a node; `expected` has the choices that a bare word may be."""
         match node:
             case Number(value=value, dimension=dimension):
                 return COUNT if dimension == NUMBER and value.is_integer() else quantity_of(dimension)
@@ -147,7 +147,7 @@ class _Checker:
                 return self.arithmetic(node)
 
     def require(self, node: ExpressionNode, expected: Type) -> Type:
-        """Say what is wrong if a node is not of the type `expected`; return that type."""
+        """Report a node that is not of the type `expected`; return that type."""
         found = self.type_of(node, expected)
         if accepts(expected, found):
             return expected
@@ -253,7 +253,7 @@ class _Checker:
             self.wrong(node, f"{left.type.phrase} is compared with {right.type.phrase}", fix)
 
     def joined(self, node: ExpressionNode, left: _Typed, right: _Typed, verb: str) -> Type:
-        """Return the type of a sum, of the least or the greatest of two measured values."""
+        """Return the type of the sum, the least or the greatest of two measured values."""
         one, other = left.type.measure, right.type.measure
         if not one or not other:
             return UNKNOWN
@@ -271,7 +271,7 @@ class _Checker:
         )
 
     def is_measured(self, typed: _Typed) -> bool:
-        """Return whether a value can be computed with, and say so if not."""
+        """Return whether a value can be computed with; report it if not."""
         if typed.type != UNKNOWN and not typed.type.measure:
             self.wrong(typed.node, f"this must be a number; it is {typed.type.phrase}")
         return typed.type.measure is not None
@@ -290,7 +290,7 @@ class _Checker:
             return left.type if left.type == right.type else list_of(UNKNOWN)
         if node.operator == "+" and TypeKind.UNKNOWN in kinds:
             return UNKNOWN
-        # Both are asked, so that both are told.
+        # Check both, so that both are reported.
         if not all([self.is_measured(left), self.is_measured(right)]):
             return UNKNOWN
         if node.operator in _SUMS:

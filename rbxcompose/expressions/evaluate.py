@@ -1,6 +1,6 @@
-"""The value of an expression in a scope, and whether a condition holds; pure, and bounded by the size of the tree.
+"""Evaluate expressions and conditions in a scope; pure, and bounded by the size of the tree.
 
-A tree becomes a function of the scope at its first use: missions ask the same conditions again and again.
+A tree becomes a function of the scope at its first use: missions evaluate the same conditions again and again.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def evaluate(expression: Expression, scope: Scope) -> Value:
 
     Raises:
         NotArrivedError: if it needs a value that has not arrived yet.
-        EvaluationError: if it has no value otherwise, or one beyond the limits.
+        EvaluationError: if it has no value for another reason, or one beyond the limits.
     """
     tree = expression.tree
     run = expression.made.get("run")
@@ -71,9 +71,9 @@ def evaluate(expression: Expression, scope: Scope) -> Value:
 
 
 def holds(expression: Expression, scope: Scope) -> bool:
-    """Return whether a condition holds, reading it from left to right until it is decided.
+    """Return whether a condition holds, evaluating it from left to right until it is decided.
 
-    One that comes upon a value which has not arrived yet does not hold, not even under `not`.
+    A condition that reaches a value that has not arrived yet does not hold, not even under `not`.
 
     Raises:
         EvaluationError: if it is neither true nor false.
@@ -88,7 +88,7 @@ def holds(expression: Expression, scope: Scope) -> bool:
 
 
 def _run(node: ExpressionNode) -> Evaluate:
-    """Return what computes the value of a part of an expression."""
+    """Return a function that computes the value of a part of an expression."""
     match node:
         case Variable():
             return _variable(node)
@@ -113,7 +113,7 @@ def _run(node: ExpressionNode) -> Evaluate:
 
 
 def _ask(node: ExpressionNode) -> Predicate:
-    """Return what tells whether a part of an expression is true; it may be nothing else."""
+    """Return a function that evaluates a part of an expression that must be true or false."""
     match node:
         case Flag(value=flag):
             return lambda scope: flag
@@ -144,7 +144,7 @@ def _is_among(sought: Value, group: list[Value]) -> bool:
 
 
 def _measure(node: ExpressionNode) -> Measure:
-    """Return what computes a part of an expression that must be a number."""
+    """Return a function that computes a part of an expression that must be a number."""
     if isinstance(node, Number):
         number = node.value
         return lambda scope: number
@@ -152,7 +152,7 @@ def _measure(node: ExpressionNode) -> Measure:
 
     def measure(scope: Scope) -> float:
         value = run(scope)
-        # NaN compares as false whatever is asked, so that `not` would make it true.
+        # Every comparison with NaN is false, so `not` would make it true.
         return value if type(value) is float and value == value else _number(value, node)
 
     return measure
@@ -181,7 +181,7 @@ def _known(look_up: Callable[[str], Value], name: str, shown: str, node: Express
 
 
 def _number(value: Value, node: ExpressionNode) -> float:
-    # NaN compares as false whatever is asked, so that `not` would make it true.
+    # Every comparison with NaN is false, so `not` would make it true.
     if isinstance(value, float) and value == value:
         return value
     if isinstance(value, int) and not isinstance(value, bool):
@@ -204,7 +204,7 @@ def _limited(value: Value, node: ExpressionNode) -> Value:
 
 
 def _limited_within(value: Value, node: ExpressionNode) -> Value:
-    """Return a value; one that a mission makes larger with each round, such as `[$x, $x]`, comes to its end here."""
+    """Return a value within the limits; this stops one that a mission grows in each round, such as `[$x, $x]`."""
     level, left = [value], MOST_IN_ALL
     for _ in range(MOST_LEVELS):
         level = [item for group in level if not isinstance(group, float | str) for item in _inside(group)]
@@ -311,7 +311,7 @@ def _called(node: FunctionCall) -> Evaluate:
 
 
 def _asked(node: FunctionCall, scope: Scope, wrong: str) -> Value:
-    """Return what only the scope knows of a `$name`."""
+    """Return what only the scope knows about a `$name`."""
     if wrong:
         raise EvaluationError(f"{node.function}() {wrong}", node.start, node.end)
     argument = node.arguments[0]

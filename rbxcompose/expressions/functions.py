@@ -1,4 +1,4 @@
-"""The functions of the expression language: the whole list, how many values each takes, and what it computes."""
+"""The functions of the expression language: all of them, with their number of arguments and what they compute."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rbxcompose.units import MOST
 class Function:
     """A function: it takes `least` to `most` arguments; `compute` raises ValueError in plain words.
 
-    Without `compute` it asks the scope about a `$name`. `form` and `about` tell how it is written and what it gives.
+    Without `compute`, it asks the scope about a `$name`. `form` shows how it is written, `about` what it returns.
     """
 
     least: int
@@ -32,7 +32,7 @@ class Function:
 
 
 def items(value: Value) -> list[Value]:
-    """Return the items of a list, the keys of a map.
+    """Return the items of a list, or the keys of a map.
 
     Raises:
         ValueError: if it is neither, or has too many.
@@ -92,7 +92,7 @@ def _rounded(value: Value) -> float:
     return whole + math.copysign(1.0, number) if abs(number - whole) >= 0.5 else whole
 
 
-_MANY = 1000  # no expression is long enough for more
+_MANY = 1000  # no expression is long enough to have more
 
 FUNCTIONS: Mapping[str, Function] = {
     "count": Function(1, 1, "count(list)", "How many items a list has, or entries a map.", _count),

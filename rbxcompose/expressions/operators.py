@@ -1,4 +1,4 @@
-"""The operators of the expression language, from the one that binds weakest to the one that binds strongest."""
+"""The operators of the expression language, from the weakest to the strongest binding."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Operator:
-    """Operators that bind equally; those with `is_prefix` stand before their only operand."""
+    """Operators that bind equally; with `is_prefix`, they come before their only operand."""
 
     symbols: tuple[str, ...]
     about: str

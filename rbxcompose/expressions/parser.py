@@ -32,8 +32,8 @@ from rbxcompose.expressions.tree import (
 from rbxcompose.findings import suggest
 
 LONGEST = 1000  # characters
-LEVELS = 50  # of the tree, and of brackets
-_REMEMBERED = 1000  # texts; robots say the same again and again
+LEVELS = 50  # levels of the tree, and of brackets
+_REMEMBERED = 1000  # texts; robots use the same ones again and again
 STEPS = 500  # nodes; an expression has no loops, so this bounds its evaluation
 
 _OR, _AND, _NOT, _COMPARED, _SUM, _PRODUCT, _MINUS = range(1, 8)  # as in OPERATORS
@@ -67,7 +67,7 @@ def parse(text: str) -> Expression:
 
 
 def parse_fill(text: str) -> Expression:
-    """Read what stands between `${` and `}`, which is filled in when the files are put together: no `$name` there.
+    """Read the text between `${` and `}`, which is filled in when the files are composed: it allows no `$name`.
 
     Raises:
         ExpressionError: if it is no expression, or exceeds a limit.
@@ -104,7 +104,7 @@ class _Parser:
 
     def take(self) -> Token:
         token = self.now
-        self.now = next(self.tokens, token)  # END stays
+        self.now = next(self.tokens, token)  # END is never passed
         return token
 
     def at(self, *symbols: str) -> bool:
@@ -123,7 +123,7 @@ class _Parser:
             raise self.unexpected()
 
     def unexpected(self) -> ExpressionError:
-        """Return what is wrong with a token that stands where an operator should."""
+        """Return what is wrong with a token in the place of an operator."""
         token = self.now
         if token.kind is TokenKind.SYMBOL:
             return ExpressionError(f"'{token.text}' does not belong here", token.start, token.end)
@@ -131,7 +131,7 @@ class _Parser:
         return ExpressionError(message, token.start, token.end, _FOREIGN.get(token.text, ""))
 
     def expression(self, binding: int = 0) -> ExpressionNode:
-        """Read operands and all operators between them that bind more strongly than `binding`."""
+        """Read operands and all operators between them that bind tighter than `binding`."""
         self.level += 1
         if self.level > LEVELS:
             raise _too_much(self.now.start, self.now.end)
@@ -225,7 +225,7 @@ class _Parser:
         return FunctionCall(name.start, end, name.text, arguments)
 
     def items(self, closing: str, opened: Token) -> tuple[tuple[ExpressionNode, ...], int]:
-        """Read values between commas up to the closing bracket; return them and where it ends."""
+        """Read comma-separated values up to the closing bracket; return them and its end."""
         read: list[ExpressionNode] = []
         if not self.at(closing):
             read.append(self.expression())
@@ -235,7 +235,7 @@ class _Parser:
         return tuple(read), self.close(closing, opened).end
 
     def parts(self, node: ExpressionNode) -> ExpressionNode:
-        """Read the fields and indices that follow data."""
+        """Read the fields and indices that follow a value."""
         while self.at(".", "["):
             opened = self.take()
             if opened.text == "[":

@@ -22,7 +22,7 @@ _SLOT = re.compile(rf"\$(?:(?P<dollar>\$)|(?P<path>{NAME}(?:\.{NAME})*))")
 
 @dataclass(frozen=True, slots=True)
 class TextSlot:
-    """A place in a text, from `start` to `end`, that the value of `path` fills."""
+    """A slot in a text, from `start` to `end`, to be filled with the value of `path`."""
 
     path: str
     value: Expression
@@ -32,14 +32,14 @@ class TextSlot:
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """A text with its slots: `parts` follow each other."""
+    """A text with its slots; `parts` are in order."""
 
     text: str
     parts: tuple[str | TextSlot, ...]
 
     @property
     def names(self) -> tuple[Reference, ...]:
-        """Return the names to be filled in, without '$' and fields, with their places."""
+        """Return the names to fill in, without '$' and fields, with their positions."""
         slots = (part for part in self.parts if isinstance(part, TextSlot))
         roots = ((slot, slot.path.partition(".")[0]) for slot in slots)
         return tuple(Reference(root, slot.start, slot.start + 1 + len(root)) for slot, root in roots)
@@ -81,7 +81,7 @@ def fill(template: Template, scope: Scope, show: Show | None = None) -> str:
     for part in template.parts:
         filled.append(part if isinstance(part, str) else _filled(part, scope, show or show_value))
         left -= len(filled[-1])
-        if left < 0:  # asked each time, since many long values would take their time and memory
+        if left < 0:  # checked each time, since many long values would take time and memory
             raise EvaluationError(f"the text has more than {LONGEST_TEXT:,} characters", 0, len(template.text))
     return "".join(filled)
 
@@ -95,7 +95,7 @@ def _filled(slot: TextSlot, scope: Scope, show: Show) -> str:
 
 
 def show_value(name: str, value: Value) -> str:
-    """Write a value for people: short numbers, places by their names without underscores."""
+    """Return a value as text for people: short numbers, and places by their names without underscores."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

@@ -15,7 +15,7 @@ NAME = r"[A-Za-z][A-Za-z0-9_]*"
 
 
 class TokenKind(Enum):
-    """What a token is; the names are those of the groups in `_TOKEN`."""
+    """The kinds of tokens; their names are those of the groups in `_TOKEN`."""
 
     NUMBER = auto()
     TEXT = auto()
@@ -46,14 +46,14 @@ _TOKEN = re.compile(
     | (?P<END>\Z)""",
     re.VERBOSE,
 )
-# The longest unit wins; a letter behind it makes it another word: `6 m/step` is a division by `step`.
+# The longest unit wins; a letter after it makes it another word: `6 m/step` is a division by `step`.
 _LONGEST_FIRST = "|".join(re.escape(unit) for unit in sorted(UNITS, key=len, reverse=True))
 _UNIT = re.compile(rf"\s*({_LONGEST_FIRST})(?![A-Za-z0-9_])")
 _NO_UNIT = re.compile(r"\s*(?!(?:and|or|in|not)\b)((?:[^\W\d]|°)[\w/^]*)")
-# `3 in $list` asks a question where `3 in` is a length: here a value follows the word, there none does.
+# `3 in $list` is a membership test, while `3 in` is a length: only in the first does a value follow the word.
 _VALUE = re.compile(r"""\s*(?!(?:and|or|in|not)\b)[$\w'"(\[]""")
 
-# What other languages have and this one has not; the longer ones first.
+# Symbols that other languages have and this one lacks; longer ones first.
 _FOREIGN = {
     "${": "'${...}' is filled in earlier; here write '$name', which is looked up while the robot runs",
     "$": "a name follows the '$', such as '$battery'",
@@ -76,7 +76,7 @@ def tokens(text: str) -> Iterator[Token]:
     """Yield the tokens of a text; the last one is END.
 
     Raises:
-        ExpressionError: at what belongs to no expression, when the iteration comes to it.
+        ExpressionError: when the iteration reaches text that belongs to no expression.
     """
     position = 0
     kind = None

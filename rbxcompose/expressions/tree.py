@@ -1,4 +1,4 @@
-"""What an expression is once it has been read: a tree of frozen nodes, each with its place in the text."""
+"""A parsed expression: a tree of frozen nodes, each with its position in the text."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Word(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class Items(_Placed):
-    """`[a, b]`: a list that is written out."""
+    """`[a, b]`: a list literal."""
 
     items: tuple[ExpressionNode, ...]
 
@@ -89,7 +89,7 @@ class Index(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class FunctionCall(_Placed):
-    """`function(arguments)`, one of the few functions that exist."""
+    """`function(arguments)`, one of the few existing functions."""
 
     function: str
     arguments: tuple[ExpressionNode, ...]
@@ -137,7 +137,7 @@ class Membership(_Placed):
 
 @dataclass(frozen=True, slots=True)
 class Junction(_Placed):
-    """`a and b and c`, or the same with `or`: read from the left until decided."""
+    """`a and b and c`, or the same with `or`: evaluated from the left until decided."""
 
     operator: str
     operands: tuple[ExpressionNode, ...]
@@ -163,7 +163,7 @@ ExpressionNode: TypeAlias = (
 
 
 def children(node: ExpressionNode) -> tuple[ExpressionNode, ...]:
-    """Return the nodes right below this one, in the order of the text."""
+    """Return the direct children of this node, in the order of the text."""
     match node:
         case Items(items=nodes) | FunctionCall(arguments=nodes) | Junction(operands=nodes):
             return nodes
@@ -180,7 +180,7 @@ def children(node: ExpressionNode) -> tuple[ExpressionNode, ...]:
 
 
 def walk(tree: ExpressionNode) -> Iterator[tuple[ExpressionNode, int]]:
-    """Yield each node with its level, the root's being 1, in the order of the text; needs no recursion."""
+    """Yield each node with its level (1 for the root), in the order of the text; it needs no recursion."""
     waiting = [(tree, 1)]
     while waiting:
         node, level = waiting.pop()
@@ -190,7 +190,7 @@ def walk(tree: ExpressionNode) -> Iterator[tuple[ExpressionNode, int]]:
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A name that an expression uses, without its `$`, and the place where it does."""
+    """A name that an expression uses, without its `$`, and its position."""
 
     name: str
     start: int
@@ -199,7 +199,7 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """A text that was read; two are equal if they mean the same at the same places."""
+    """A parsed text; two are equal if they mean the same at the same positions."""
 
     text: str
     tree: ExpressionNode

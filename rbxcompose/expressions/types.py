@@ -1,4 +1,4 @@
-"""What type of value an expression gives, known without its values; and which type fits where."""
+"""Types of expressions, known without their values; and which type fits where."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rbxcompose.units import DIMENSIONS, NUMBER, Dimension
 
 
 class TypeKind(Enum):
-    """The kinds of types; the values are the words for them in a sentence."""
+    """The kinds of types; the values name them in a sentence."""
 
     QUANTITY = "a quantity"
     COUNT = "a count"
@@ -27,7 +27,7 @@ class TypeKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Type:
-    """The type of a value: quantities have a dimension, choices their words, lists and maps the type of an entry."""
+    """The type of a value: a quantity has a dimension, a choice its words, a list or map the type of its entries."""
 
     kind: TypeKind
     dimension: Dimension | None = None
@@ -36,21 +36,21 @@ class Type:
 
     @property
     def phrase(self) -> str:
-        """Return the type as it stands in a sentence: 'a ratio'."""
+        """Return the type as used in a sentence: 'a ratio'."""
         if self.kind is TypeKind.QUANTITY and self.dimension:
             return self.dimension.phrase
         return self.kind.value
 
     @property
     def detail(self) -> str:
-        """Return the phrase with what is inside: 'one of red, green', 'a list, each a place'."""
+        """Return the phrase with its contents: 'one of red, green', 'a list, each a place'."""
         if self.choices:
             return f"one of {', '.join(self.choices)}"
         return f"{self.phrase}, each {self.of.detail}" if self.of and self.of != UNKNOWN else self.phrase
 
     @property
     def measure(self) -> Dimension | None:
-        """Return the dimension of what can be computed with; a count is a number."""
+        """Return the dimension for computing, if there is one; a count is a number."""
         return NUMBER if self.kind is TypeKind.COUNT else self.dimension
 
     @property
@@ -112,7 +112,7 @@ _EQUAL_ACROSS = {frozenset({TypeKind.TEXT, TypeKind.PLACE}), frozenset({TypeKind
 
 
 def accepts(expected: Type, given: Type) -> bool:
-    """Return whether a value of the type `given` may stand where `expected` is."""
+    """Return whether a value of the type `given` is allowed where `expected` is."""
     if UNKNOWN in (expected, given):
         return True
     if expected.dimension:
@@ -125,7 +125,7 @@ def accepts(expected: Type, given: Type) -> bool:
 
 
 def are_comparable(one: Type, other: Type) -> bool:
-    """Return whether it makes sense to ask if values of the two types are equal; poses never are, to the last digit."""
+    """Return whether values of the two types can be tested for equality; not poses, which never match exactly."""
     if UNKNOWN in (one, other):
         return True
     if one.measure and other.measure:

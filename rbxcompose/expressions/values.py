@@ -1,4 +1,4 @@
-"""What an evaluation meets: values, the scope that knows them, and the errors that it may end in."""
+"""Data of an evaluation: values, the scope that has them, and the errors that may end it."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from enum import Enum
 from typing import Final, Protocol, TypeAlias, runtime_checkable
 
 LONGEST_TEXT = 4096  # characters
-MOST_ITEMS = 1000  # of a list or a map
-MOST_IN_ALL = 10_000  # items of lists within lists, each as often as it is reached
-MOST_LEVELS = 50  # of lists within lists
+MOST_ITEMS = 1000  # in a list or a map
+MOST_IN_ALL = 10_000  # items of nested lists, each counted as often as it is reached
+MOST_LEVELS = 50  # of nested lists
 
 Value: TypeAlias = object
 """A number in SI (float), bool, str, list, dict with text keys, or something opaque such as a place or a pose."""
@@ -26,7 +26,7 @@ NOT_ARRIVED: Final = NotArrived.NOT_ARRIVED
 
 @runtime_checkable
 class Located(Protocol):
-    """Something that is somewhere."""
+    """Something with a position."""
 
     @property
     def x(self) -> float:
@@ -62,7 +62,7 @@ class Scope(Protocol):
         ...
 
     def word(self, name: str) -> Value:
-        """Return what a bare word names: a place, else (a choice, a result) its own text; KeyError if nothing."""
+        """Return what a bare word names: a place, else (a choice, a result) its own text; raise KeyError if nothing."""
         ...
 
     def age(self, name: str) -> float | NotArrived:
@@ -70,7 +70,7 @@ class Scope(Protocol):
         ...
 
     def is_new(self, name: str) -> bool:
-        """Return whether a message of `$name` came since this node started; KeyError if there is no such name."""
+        """Return whether a message of `$name` came since this node started; raise KeyError if there is no such name."""
         ...
 
 
@@ -85,7 +85,7 @@ class EvaluationError(Exception):
 
 
 class NotArrivedError(Exception):
-    """Raised when a value is needed of which no message has come yet."""
+    """Raised when an evaluation needs a value that has not arrived yet."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"'${name}' has not arrived yet")
@@ -93,12 +93,12 @@ class NotArrivedError(Exception):
 
 
 def is_number(value: Value) -> bool:
-    """Return whether a value is a number; a flag is none."""
+    """Return whether a value is a number; a flag is not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def is_same(one: Value, other: Value) -> bool:
-    """Return whether two values are equal; a text equals the place of that name, a flag equals no number."""
+    """Return whether two values are equal; a text equals the place of that name, and a flag equals no number."""
     if isinstance(one, str) != isinstance(other, str):
         text, thing = (one, other) if isinstance(one, str) else (other, one)
         return isinstance(thing, NamedPose) and thing.name == text

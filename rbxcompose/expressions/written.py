@@ -1,4 +1,4 @@
-"""Numbers as they are written in an expression, and what to write where their unit does not fit."""
+"""Literal numbers in an expression, and suggestions where their unit does not fit."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from rbxcompose.units import DIMENSIONS, NUMBER, RATIO, Dimension, bare_number_h
 
 
 def _written(node: ExpressionNode) -> Number | None:
-    """Return the number that a node writes out, None if it is something else."""
+    """Return the literal number of a node; None if it is something else."""
     while isinstance(node, Minus):
         node = node.operand
     return node if isinstance(node, Number) else None
 
 
 def is_bare(node: ExpressionNode) -> bool:
-    """Return whether a node is a number as written, without a unit."""
+    """Return whether a node is a literal number without a unit."""
     number = _written(node)
     return number is not None and number.dimension == NUMBER
 
 
 def missing_unit(node: ExpressionNode, dimension: Dimension) -> str:
-    """Return what to write instead of a bare number, or nothing if it is understood as SI."""
+    """Return what to write instead of a bare number, or nothing if it is read as SI."""
     if dimension == RATIO and isinstance(node, Number):
         percentage = node.value * 100 if node.value < 1 else node.value
         return f"write '{format_number(percentage)} %'"
@@ -29,7 +29,7 @@ def missing_unit(node: ExpressionNode, dimension: Dimension) -> str:
 
 
 def other_unit(left: tuple[ExpressionNode, Type], right: tuple[ExpressionNode, Type]) -> str:
-    """Return what a quantity that is written out has to look like beside one that is not; nothing for two alike."""
+    """Return the form required of a literal quantity next to one that is not; nothing if both are alike."""
     for (written, _), (other, kind) in ((left, right), (right, left)):
         dimension = kind.dimension
         if dimension in DIMENSIONS.values() and dimension and _written(written) and not _written(other):

@@ -1,1 +1,1 @@
-"""Seeing a robot before it runs: composed, value by value, as a diagram, as a plan. Values in, text out."""
+"""Inspecting a robot before it runs: composed, value by value, as a diagram, as a plan. Values in, text out."""

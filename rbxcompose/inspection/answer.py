@@ -1,4 +1,4 @@
-"""What `why` answers, as text and as data."""
+"""The answers of `why`, as text and as data."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LABEL = 15  # width of the labels
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """What one layer wrote; None where it took the value away."""
+    """What one layer wrote; None if it removed the value."""
 
     name: str
     value: str | None
@@ -27,13 +27,13 @@ class Layer:
 
     @property
     def place(self) -> str:
-        """Return where it stands; nothing for what the command line says."""
+        """Return the place where it is written; empty for the command line."""
         return "" if self.span.file == SET else str(self.span)
 
 
 @dataclass(frozen=True, slots=True)
 class ArgumentSource:
-    """An argument that a value was filled in from; `below` are the layers whose values it took the place of."""
+    """An argument that a value was filled in from; `below` are the layers whose values it replaced."""
 
     name: str
     value: str
@@ -43,7 +43,7 @@ class ArgumentSource:
 
 @dataclass(frozen=True, slots=True)
 class PathAnswer:
-    """All that is known of one path; the last of `layers` holds."""
+    """Everything known about one path; the last of `layers` is in effect."""
 
     path: str
     value: str
@@ -59,7 +59,7 @@ class PathAnswer:
     node: TreeNode | None = None
 
     def text(self) -> str:
-        """Return it for people."""
+        """Return the answer as text for people."""
         lines = [f"{self.path} = {plain(self.value)}", *([f"  {self.about}"] if self.about else [])]
         lines += [f"  {label:<{LABEL}}{text}".rstrip() for label, text in self._rows()]
         if self.body:
@@ -97,7 +97,7 @@ class PathAnswer:
             yield f"{row[0]:<{widths[0]}}  {plain(row[1]):<{widths[1]}}  {row[2]}".rstrip() + holds
 
     def data(self) -> dict[str, Any]:
-        """Return it for programs."""
+        """Return the answer as data for programs."""
         return {
             "path": self.path,
             "value": as_data(self.node) if self.node is not None else self.value,

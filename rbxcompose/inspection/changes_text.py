@@ -1,4 +1,4 @@
-"""What a running robot says that another manifest would change: with the places that say so, as text or as data."""
+"""What another manifest would change in a running robot, with the places that say so, as text or as data."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from rbxcompose.model.robot import Robot
 from rbxcompose.plan.diff import Change
 from rbxcompose.printable import plain
 
-LONGEST = 6  # reasons that are shown of one component
-_TOPIC = "topic of "  # begins the key of a wire
+LONGEST = 6  # reasons shown for one component
+_TOPIC = "topic of "  # prefix of the key of a wire
 _TEXT = 200  # characters of a reason
 
 
 def with_places(found: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
-    """Return the difference with the place of each new value in the robot's files, as far as one is written."""
+    """Return the difference, with the place of each new value that is written in the robot's files."""
     components = [
         {**one, "reasons": [{**each, "place": _place(robot, one["name"], each)} for each in one["reasons"]]}
         for one in found["components"]
@@ -27,7 +27,7 @@ def with_places(found: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
 
 
 def changes_text(found: Mapping[str, Any]) -> str:
-    """Return what `with_places` made, for people: component by component, with the reasons."""
+    """Return the result of `with_places` for people: component by component, with the reasons."""
     return "\n".join(_lines(found))
 
 
@@ -52,7 +52,7 @@ def _reason(each: Mapping[str, str]) -> str:
 
 
 def _place(robot: Robot, component: str, reason: Mapping[str, str | None]) -> str:
-    """Return where the new value stands, nothing where it is not written."""
+    """Return the place of the new value, empty if it is not written."""
     key = str(reason["key"])
     if component not in robot.components or reason["after"] is None:
         return ""
@@ -65,7 +65,7 @@ def _place(robot: Robot, component: str, reason: Mapping[str, str | None]) -> st
 
 
 def _source(robot: Robot, component: str, key: str) -> tuple[TreeNode, KeyPath, int]:
-    """Return the tree in which a key of a component is written, its path there, and how much of that must be there."""
+    """Return the tree that contains a key of a component, its path there, and how much of that path must exist."""
     root, own = robot.manifest.root, robot.components[component].path
     if key.startswith(_TOPIC):
         return root, (*own, "connect", key.removeprefix(_TOPIC)), len(own) + 2
@@ -81,7 +81,7 @@ def _source(robot: Robot, component: str, key: str) -> tuple[TreeNode, KeyPath, 
 
 
 def _indexed(root: TreeNode, path: KeyPath) -> KeyPath:
-    """Return a path with the numbers of items as numbers."""
+    """Return a path whose list indices are numbers."""
     found: KeyPath = ()
     for key in path:
         is_item = isinstance(at(root, found), SequenceNode) and str(key).isdigit()

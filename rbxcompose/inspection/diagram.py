@@ -1,4 +1,4 @@
-"""A robot as boxes and wires: what every kind of graph draws."""
+"""A robot as boxes and wires: the common basis of all graphs."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction
 
 MISSION = "mission"  # the component that runs missions
-TRANSFORMS = ("/tf", "/tf_static")  # what a look-up reads
-STATUSES = "/diagnostics"  # where every component reports, though none declares it
+TRANSFORMS = ("/tf", "/tf_static")  # what a look-up subscribes to
+STATUSES = "/diagnostics"  # where every component publishes without declaring it
 
 
 class BoxShape(StrEnum):
-    """What a box stands for."""
+    """What a box represents."""
 
     COMPONENT = "component"
     MUX = "mux"
@@ -38,7 +38,7 @@ class WireContent(StrEnum):
     LOOK_UP = "look-up"
 
 
-# By which a mission reaches its skills; those in Python are within it.
+# How a mission reaches its skills; those in Python run inside it.
 _LINES = {SkillWay.ACTION: WireContent.ACTION, SkillWay.SERVICE: WireContent.SERVICE, SkillWay.TOPIC: WireContent.TOPIC}
 
 
@@ -56,7 +56,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Tip:
-    """Where a wire begins or ends at a box; `note` is a word beside it, such as a priority."""
+    """The end of a wire at a box; `note` is a word beside it, such as a priority."""
 
     box: str
     note: str = ""
@@ -64,7 +64,7 @@ class Tip:
 
 @dataclass(frozen=True, slots=True)
 class DiagramWire:
-    """A topic, service or action: from who sends or asks to who takes or answers."""
+    """A topic, service or action: from those that send or request to those that receive or respond."""
 
     name: str
     kind: WireContent
@@ -81,18 +81,18 @@ class DiagramWire:
 
     @property
     def note(self) -> str:
-        """Return the word beside its only target, if there is only one."""
+        """Return the note at its target if there is only one."""
         return self.targets[0].note if len(self.targets) == 1 else ""
 
     @property
     def is_pair(self) -> bool:
-        """Return whether it leads from one box to one other."""
+        """Return whether it connects exactly one box to one other."""
         return len(self.sources) == len(self.targets) == 1
 
 
 @dataclass(frozen=True, slots=True)
 class Diagram:
-    """A whole robot. `runs` are the executive with each program, the one that `up` starts first."""
+    """A whole robot. `runs` pairs the executive with each mission's program, first the one that `up` starts."""
 
     robot: str
     about: str
@@ -109,7 +109,7 @@ class Diagram:
 
 @dataclass(slots=True)
 class _Open:
-    """A wire that is being put together."""
+    """A wire under construction."""
 
     kind: WireContent
     type: str
@@ -119,7 +119,7 @@ class _Open:
 
 
 def diagram_of(robot: Robot) -> Diagram:
-    """Return a robot as boxes and wires; one with mistakes as far as it could be read."""
+    """Return a robot as boxes and wires; if it has mistakes, as far as it could be read."""
     boxes = [*_boxes(robot)]
     runs = tuple((MISSION, key_of(name)) for name in _programs(robot))
     return Diagram(
@@ -139,7 +139,7 @@ def key_of(mission: str | None) -> str:
 
 
 def _programs(robot: Robot) -> list[str]:
-    """Return the missions, the one that `up` starts first."""
+    """Return the missions, first the one that `up` starts."""
     return sorted(robot.missions, key=lambda name: name != robot.manifest.start) if MISSION in robot.components else []
 
 
@@ -154,10 +154,10 @@ def _boxes(robot: Robot) -> Iterator[Box]:
 
 
 def _wires(robot: Robot) -> Iterator[DiagramWire]:
-    """Yield the wires by what they carry and by name; unused ones are not drawn."""
+    """Yield the wires sorted by what they carry and by name; unused ones are not drawn."""
     found: dict[tuple[WireContent, str], _Open] = {}
     for component in robot.components.values():
-        if component.name != MISSION:  # its missions are drawn in its place
+        if component.name != MISSION:  # its missions are drawn instead
             for end in component.ends:
                 _add(robot, component, end, found)
     for name in _programs(robot):
@@ -200,7 +200,7 @@ def _note(robot: Robot, component: RobotComponent, end: PortEnd) -> str:
 
 
 def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tuple[WireContent, str], _Open]) -> None:
-    """Add what a mission uses: actions, services and topics. A skill in Python runs in the mission itself."""
+    """Add the actions, services and topics that a mission uses. A skill in Python runs in the mission itself."""
 
     def lead(kind: WireContent, topic: str, type_name: str) -> None:
         found.setdefault((kind, topic), _Open(kind, type_name)).sources.append(Tip(key))
@@ -228,7 +228,7 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
 
 
 def _add_look_ups(robot: Robot, found: dict[tuple[WireContent, str], _Open]) -> None:
-    """Let each topic of transforms lead to those that look something up, by a line of its own kind."""
+    """Draw a line of its own kind from each topic of transforms to those that look something up."""
     boxes = [
         component.name
         for component in robot.components.values()

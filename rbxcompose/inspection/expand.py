@@ -10,14 +10,15 @@ from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.inspection.origin import as_data, is_leaf, origin_of
 from rbxcompose.manifest.tree import KeyPath, MappingNode, TreeNode, children
 
-WIDEST = 60  # columns up to which comments stand below each other
-_MARK = "\0"  # before a comment: no manifest holds it
+WIDEST = 60  # columns within which comments are aligned
+_MARK = "\0"  # precedes a comment: no manifest contains it
 
 
 def expand(manifest: RobotManifest, *, has_origins: bool = True) -> str:
-    """Return the robot with parts, profiles, overlays and values put together, as a manifest in block style.
+    """Return the robot with parts, profiles, overlays and values combined, as a manifest in block style.
 
-    It stands for the folder of the robot's own file. Comments tell where each value is from. Secrets keep their names.
+    Its paths are relative to the folder of the robot's own file. Comments show the origin of each value. Secrets are
+    shown by name.
     """
     if not has_origins:
         return dump_robot(manifest)
@@ -25,7 +26,7 @@ def expand(manifest: RobotManifest, *, has_origins: bool = True) -> str:
 
 
 def expand_below(manifest: RobotManifest, path: KeyPath, root: MappingNode, defaults: Mapping[str, str]) -> str:
-    """Return what stands below `path`, with origins, and then the defaults of what is not written there.
+    """Return everything below `path`, with origins, followed by the defaults of keys that are not written there.
 
     `root` is the map at `path`.
     """
@@ -38,14 +39,14 @@ def _comment(manifest: RobotManifest, path: KeyPath, node: TreeNode) -> str:
 
 
 def aligned(text: str) -> str:
-    """Return lines with their comments below each other; those of long lines follow them directly."""
+    """Return lines with aligned comments; those of long lines follow directly."""
     lines = [line.partition(f"  # {_MARK}") for line in text.splitlines()]
     width = max((len(line) for line, mark, _ in lines if mark and len(line) <= WIDEST), default=0)
     return "".join(f"{line:<{width}}  # {comment}\n" if mark else f"{line}\n" for line, mark, comment in lines)
 
 
 def expand_data(manifest: RobotManifest) -> dict[str, Any]:
-    """Return the robot as data: its values as a manifest has them, and the origin of each by its path with dots."""
+    """Return the robot as data: its values as in a manifest, and the origin of each by its dotted path."""
     origins = {
         ".".join(map(str, path)): {
             "file": origin.span.file,
@@ -61,7 +62,7 @@ def expand_data(manifest: RobotManifest) -> dict[str, Any]:
 
 
 def leaves(node: TreeNode, path: KeyPath = ()) -> Iterator[tuple[KeyPath, TreeNode]]:
-    """Yield everything below which nothing stands, with its path."""
+    """Yield every node without children, with its path."""
     if is_leaf(node):
         yield path, node
     for key, inner in children(node):

@@ -17,7 +17,7 @@ _SHAPES = {BoxShape.COMPONENT: "box", BoxShape.MUX: "hexagon", BoxShape.PROGRAM:
 
 
 def dot(diagram: Diagram) -> str:
-    """Return the text of a directed graph: processes are clusters."""
+    """Return a directed graph in DOT, with processes as clusters."""
     return "".join(f"{line}\n" for line in _lines(diagram))
 
 

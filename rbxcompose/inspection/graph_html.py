@@ -1,4 +1,4 @@
-"""A robot as one HTML page that needs nothing else: a picture to hover over, and tables of what is in it."""
+"""A robot as one self-contained HTML page: a picture to hover over, and tables of its contents."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _RUNS = "runs"
 
 
 def html(diagram: Diagram) -> str:
-    """Return the text of the page: light or dark as the reader has it."""
+    """Return the HTML of the page: light or dark, as the reader has set it."""
     return "".join(f"{line}\n" for line in _page(diagram))
 
 
@@ -35,7 +35,7 @@ def _page(diagram: Diagram) -> Iterator[str]:
 
 
 def _legend(diagram: Diagram) -> Iterator[str]:
-    """Yield what the lines mean, with a box to tick for each kind that is drawn."""
+    """Yield the legend of the lines, with a checkbox for each kind that is drawn."""
     yield '<div class="legend">'
     for kind in WireContent:
         if count := sum(wire.kind is kind for wire in diagram.wires):
@@ -78,7 +78,7 @@ def _run(program: str) -> str:
 
 
 def _layout(diagram: Diagram) -> Layout:
-    """Return the places of boxes, and of wires, which stand between those that they connect."""
+    """Return the positions of boxes, and of wires, which are placed between the boxes they connect."""
     groups = {box.key: box.group for box in diagram.boxes}
     items = [
         LayoutItem(box.key, _width(box.name, box.type), _BOX_HEIGHT, box.group, is_round=box.shape is BoxShape.PROGRAM)
@@ -122,7 +122,7 @@ def _second_line(wire: DiagramWire) -> str:
 
 
 def _told(wire: DiagramWire) -> str:
-    """Return a wire in words."""
+    """Return a description of a wire."""
     lines = [f"{wire.kind} {wire.name}", wire.type, *([f"quality of service: {wire.qos}"] if wire.qos else [])]
     lines += [f"from {_names(wire.sources) or wire.about or 'outside'}", f"to {_names(wire.targets) or 'nothing here'}"]
     return "\n".join(lines)

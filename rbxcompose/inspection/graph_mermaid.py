@@ -20,7 +20,7 @@ _STYLES = (
 
 
 def mermaid(diagram: Diagram) -> str:
-    """Return the text of a flowchart: processes are boxes round what runs in them."""
+    """Return the text of a flowchart: processes are boxes around their components."""
     return "".join(f"{line}\n" for line in _lines(diagram))
 
 

@@ -1,6 +1,6 @@
 """Where the boxes and lines of a picture go, from left to right: Graphviz decides.
 
-It is given sizes and no texts, so that the same graph gives the same picture whatever fonts a machine has.
+It gets sizes, not texts, so that the same graph gives the same picture whatever fonts a machine has.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 from rbxcompose.findings import Finding, kind
 
-MARGIN, GROUP_EDGE = 10.0, 26.0  # round the picture, and round what is in a group: room for its name [px]
+MARGIN, GROUP_EDGE = 10.0, 26.0  # around the picture, and around a group's contents: room for its name [px]
 _INCH = 72.0  # [px]
 _GRAPH = {"rankdir": "LR", "nodesep": "0.2", "ranksep": "0.5"}
 _NODE = {"fixedsize": "true", "label": ""}
@@ -32,7 +32,7 @@ Edge = tuple[str, str]
 
 
 class NotDrawnError(Exception):
-    """There is no picture; the finding tells why."""
+    """Raised if no picture could be drawn; the finding says why."""
 
     def __init__(self, finding: Finding) -> None:
         super().__init__(finding.message)
@@ -41,7 +41,7 @@ class NotDrawnError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class LayoutItem:
-    """Something to be placed: its size [px], its group, if it is in one, and whether its ends are round."""
+    """An item to be placed: its size [px], its group, if any, and whether its ends are round."""
 
     key: str
     width: float
@@ -62,7 +62,7 @@ class Rect:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where everything is [px]; a path is the data of an SVG path, from where the edge begins to where it ends."""
+    """The positions of everything [px]; a path is the data of an SVG path, from the start of an edge to its end."""
 
     places: Mapping[str, Rect]
     paths: Mapping[Edge, str]
@@ -72,7 +72,7 @@ class Layout:
 
 
 def lay_out(items: Sequence[LayoutItem], edges: Sequence[Edge]) -> Layout:
-    """Return a place for each item and a path for each edge; the same input gives the same picture.
+    """Return a position for each item and a path for each edge; the same input gives the same picture.
 
     Raises:
         NotDrawnError: if Graphviz is not installed.
@@ -97,7 +97,7 @@ def lay_out(items: Sequence[LayoutItem], edges: Sequence[Edge]) -> Layout:
 
 
 def _read(drawn: dict[str, Any], items: Sequence[LayoutItem]) -> Layout:
-    """Return the layout that Graphviz wrote, which counts y upwards."""
+    """Return the layout written by Graphviz, which counts y upwards."""
     _, _, width, height = _numbers(drawn["bb"])
     sizes = {item.key: item for item in items}
     places, groups, names = {}, {}, {}
@@ -121,7 +121,7 @@ def _numbers(text: str) -> list[float]:
 
 
 def _path(spline: str, height: float) -> str:
-    """Return Graphviz's spline as the data of an SVG path: where it begins, then curves of three points each."""
+    """Return Graphviz's spline as the data of an SVG path: its start, then curves of three points each."""
     points = [_numbers(point) for point in spline.split()]
     first, *rest = [f"{x + MARGIN:.1f} {height - y + MARGIN:.1f}" for x, y in points]
     return f"M{first}C{' '.join(rest)}"

@@ -15,24 +15,24 @@ _SAFE = str.maketrans({'"': "'", "<": "&lt;", ">": "&gt;", "#": "&num;"})
 
 
 def mission_mermaid(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
-    """Return the text of a flowchart, with how each node stands if that is known."""
+    """Return the text of a flowchart, with the status of each node if known."""
     return "".join(f"{line}\n" for line in _mermaid(picture, statuses))
 
 
 def mission_dot(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
-    """Return the text of a graph for Graphviz, with how each node stands if that is known."""
+    """Return the text of a graph for Graphviz, with the status of each node if known."""
     return "".join(f"{line}\n" for line in _dot(picture, statuses))
 
 
 def label_of(drawn: Drawn) -> str:
-    """Return what stands in a box, in lines."""
+    """Return the label of a box, as lines."""
     names = [one for one in dict.fromkeys((drawn.role, drawn.name)) if one]
     title = "state" if drawn.form == Form.STATE else drawn.title
     return "\n".join([*([": ".join(names)] if names else []), title, *drawn.notes])
 
 
 def _keys(picture: MissionPicture) -> dict[int, str]:
-    """Return the key of each box by the identity of what is drawn."""
+    """Return the key of each box by the identity of what it shows."""
     drawn = [one for root in picture.roots for one in root.all()]
     return {id(one): f"n{number}" for number, one in enumerate(drawn)}
 
@@ -50,7 +50,7 @@ def _edges(picture: MissionPicture) -> Iterator[tuple[str, str, str, bool]]:
 
 
 def _ends(picture: MissionPicture) -> Iterator[tuple[str, str]]:
-    """Yield the ends of machines that are reached: key and name."""
+    """Yield the reachable ends of machines: key and name."""
     keys = _keys(picture)
     for one in (one for root in picture.roots for one in root.all()):
         states = {child.name for child in one.children if child.form == Form.STATE}

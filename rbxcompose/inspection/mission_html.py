@@ -1,4 +1,4 @@
-"""A mission as one HTML page that needs nothing else: boxes in boxes, machines as diagrams of their states."""
+"""A mission as one self-contained HTML page: nested boxes, with machines as diagrams of their states."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _BOX, _PILL = 34.0, 22.0  # heights [px]
 
 
 def mission_html(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
-    """Return the text of the page, with how each node stands if that is known; light or dark as the reader has it."""
+    """Return the HTML of the page, light or dark as the reader has set it, with the status of each node if known."""
     return "".join(f"{line}\n" for line in _page(picture, statuses))
 
 
@@ -75,7 +75,7 @@ def _head(drawn: Drawn, status: int, is_live: bool) -> str:
 
 
 def _states(machine: Drawn, statuses: Sequence[int]) -> Iterator[str]:
-    """Yield the diagram of a machine: states, ends, and between them what leads from one to another."""
+    """Yield the diagram of a machine: states, ends, and the transitions between them."""
     states = {one.name: one for one in machine.children}
     joined: dict[tuple[str, str], list[str]] = {}
     for state in machine.children:

@@ -1,4 +1,4 @@
-"""A mission as lines of text: one node per line, with its state."""
+"""A mission as lines of text: one node per line, with its status."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _STEP = "  "
 
 
 def mission_text(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
-    """Return the text of a mission, with the status of each node if they are known."""
+    """Return the text of a mission, with the status of each node if known."""
     return "".join(f"{line}\n" for line in mission_lines(picture, statuses))
 
 
@@ -42,7 +42,7 @@ def _lines(drawn: Drawn, indent: str, statuses: Sequence[int], width: int, colou
 
 
 def running_lines(picture: MissionPicture, statuses: Sequence[int], width: int) -> list[str]:
-    """Return the lines of the nodes that run, and of those that they run in."""
+    """Return the lines of the running nodes and of those that contain them."""
     return [fitted(line, width) for root in picture.roots for line in _running(root, "", statuses)]
 
 
@@ -54,7 +54,7 @@ def _running(drawn: Drawn, indent: str, statuses: Sequence[int]) -> Iterator[str
 
 
 def status_of(drawn: Drawn, statuses: Sequence[int]) -> int:
-    """Return how a node stands; an interrupt stands as its reaction does."""
+    """Return the status of a node; an interrupt has that of its reaction."""
     number = drawn.number
     if number is None:
         number = drawn.children[0].number if drawn.children else None

@@ -16,12 +16,12 @@ from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, S
 from rbxcompose.printable import plain
 from rbxcompose.units import Quantity
 
-LONGEST = 60  # characters of a text that is shown beside a value
+LONGEST = 60  # characters of a text shown beside a value
 
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """`layer` is as findings call it ("the robot", "profile 'tired'"); `written` is empty if nothing was filled in."""
+    """`layer` is its name in findings ("the robot", "profile 'tired'"); `written` is empty if nothing was filled in."""
 
     span: Span
     layer: str
@@ -29,7 +29,7 @@ class Origin:
 
     @property
     def comment(self) -> str:
-        """Return it in one line, without the column: "robots/one/robot.yaml:12, profile 'tired'"."""
+        """Return the origin in one line, without the column: "robots/one/robot.yaml:12, profile 'tired'"."""
         if self.span.file == SET:
             return self.layer.strip("'")
         layer = "overlay" if self.layer.startswith("overlay ") else self.layer
@@ -38,7 +38,7 @@ class Origin:
 
 
 def origin_of(manifest: RobotManifest, path: KeyPath, node: TreeNode) -> Origin:
-    """Return where the value at `path` comes from; `node` is what stands there, filled in."""
+    """Return the origin of the value at `path`; `node` is the filled-in node there."""
     steps = manifest.history.of(path)
     source = steps[-1].node if steps else None
     is_filled = isinstance(source, ScalarNode) and "${" in source.text
@@ -48,7 +48,7 @@ def origin_of(manifest: RobotManifest, path: KeyPath, node: TreeNode) -> Origin:
 
 
 def is_leaf(node: TreeNode) -> bool:
-    """Return whether nothing stands below a node."""
+    """Return whether a node has no children."""
     match node:
         case MappingNode(entries=entries):
             return not entries

@@ -1,4 +1,4 @@
-"""What is the same in every HTML page of a graph: its style, and what happens when a pointer comes over a box."""
+"""What all HTML pages of graphs share: the style, and what happens when the pointer is over a box."""
 
 STYLE = """
 :root{--page:#fff;--text:#1f2328;--soft:#59636e;--edge:#d0d7de;--group:#f6f8fa;--body:#fff;

@@ -29,7 +29,7 @@ Good: `rbxcompose why battery.runtime robots/turtlebot`
 
 
 def path_of(robot: Robot, text: str) -> KeyPath:
-    """Return the path from the root that a text means; an item of a list is counted from 0."""
+    """Return the path from the root that a text means; list items are counted from 0."""
     names: list[str | int] = list(text.strip().split("."))
     manifest = robot.manifest
     if names[0] not in robot_keys():
@@ -42,7 +42,7 @@ def path_of(robot: Robot, text: str) -> KeyPath:
 
 
 def _section_of(manifest: RobotManifest, name: str) -> str:
-    """Return the section in which something that runs has its name; that of the components, if nothing has it."""
+    """Return the section that names something that runs; that of the components if no section does."""
     running = sorted(naming(COMPONENT), key=lambda one: one.scope is SetScope.BARE)
     return next((one.name for one in running if name in one.names_in(manifest.root)), running[-1].name)
 
@@ -53,17 +53,17 @@ def short(path: KeyPath) -> str:
 
 
 def tree_of(manifest: RobotManifest, path: KeyPath) -> MappingNode:
-    """Return the tree that a path leads into: what is included is read before the rest, and kept beside it."""
+    """Return the tree that a path belongs to: the section `include` is read before the rest, and kept beside it."""
     return manifest.include if path[:1] == (include.name,) else manifest.root
 
 
 def found_at(manifest: RobotManifest, path: KeyPath) -> TreeNode | None:
-    """Return what stands at a path of the composed robot, or None."""
+    """Return the node at a path of the composed robot, or None."""
     return at(tree_of(manifest, path), path)
 
 
 def no_such_path(robot: Robot, path: KeyPath, guide: Guide) -> Finding:
-    """Return the finding for a path that leads nowhere, with what was probably meant at the first wrong name."""
+    """Return the finding for a path that does not exist, with the probable meaning of its first wrong name."""
     if path[0] == "profiles":
         return NO_SUCH_PATH.at(None, "profiles have no value of their own", help="'--profile NAME' applies one")
     length = next(n for n in range(1, len(path) + 1) if not is_known(robot.manifest, guide, path[:n]))
@@ -85,5 +85,5 @@ def no_such_path(robot: Robot, path: KeyPath, guide: Guide) -> Finding:
 
 
 def is_known(manifest: RobotManifest, guide: Guide, path: KeyPath) -> bool:
-    """Return whether a path leads to something, or is a key that could be written where it stands."""
+    """Return whether a path exists, or is a key that could be written there."""
     return found_at(manifest, path) is not None or str(path[-1]) in guide.keys(path[:-1])

@@ -1,4 +1,4 @@
-"""A plan for people: what would run, in which process, in which order, and where it would be on the bus."""
+"""A plan for people: what would run, in which process and order, and where it would be on the bus."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rbxcompose.restarts import Restart
 from rbxcompose.sdk.ports import Looks, Port
 from rbxcompose.sdk.registry import component_type
 
-_NUMBER = 4  # width of a place in the start order
+_NUMBER = 4  # width of a position in the start order
 
 
 def plan_text(plan: Plan) -> str:

@@ -10,7 +10,7 @@ from rbxcompose.model.wires import PortEnd, resolve
 from rbxcompose.plan.model import BusPlan
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Serves, ServesAction, ServesTopic
 
-_OTHER = {  # the first that a port is an instance of counts
+_OTHER = {  # the first one that matches a port counts
     ServesTopic: (Out, "ordered by"),
     Out: (In, "read by"),
     In: (Out, "sent by"),
@@ -22,7 +22,7 @@ _OTHER = {  # the first that a port is an instance of counts
 
 
 def why_port(robot: Robot, path: KeyPath) -> PathAnswer | None:
-    """Return what is known of a component (`transforms`) or of one of its ports (`go_to.cmd_vel`), None if none is."""
+    """Return what is known about a component (`transforms`) or its port (`go_to.cmd_vel`), None if there is none."""
     name, *rest = [str(key) for key in (path[1:] if path[0] in ("components", "muxes") else path)] or [""]
     component = robot.components.get(name)
     if component is None or len(rest) > 1:

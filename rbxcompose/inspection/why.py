@@ -1,4 +1,4 @@
-"""Why a value of the robot is what it is: where it is written, what it replaced, what it means."""
+"""Why a value of the robot is as it is: where it is written, what it replaced, what it means."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from rbxcompose.schema.guide import Guide
 from rbxcompose.units import Dimension, Quantity, UnitError, parse_quantity, to_si
 
 _ARGUMENT = re.compile(r"\bargs\.([a-z][a-z0-9_]*)")
-_MEASURED = ("args", "missions", "include")  # sections in which only the value itself says what it measures
+_MEASURED = ("args", "missions", "include")  # sections in which only the value itself shows its dimension
 
 
 def why(robot: Robot, text: str) -> PathAnswer | Finding:
-    """Return all that is known of a path of the robot, written as for `--set`, or of a port: `go_to.cmd_vel`."""
+    """Return everything known about a path of the robot, written as for `--set`, or about a port: `go_to.cmd_vel`."""
     path = path_of(robot, text)
     node = found_at(robot.manifest, path)
     guide = _guide(robot.manifest, path)
@@ -69,7 +69,7 @@ def _written(robot: Robot, guide: Guide, path: KeyPath, node: TreeNode) -> PathA
 
 
 def _argument_in_effect(robot: Robot, guide: Guide, path: KeyPath, declared: MappingNode) -> PathAnswer:
-    """Return the value that an argument has: its default, or what a layer above has put in the place of that."""
+    """Return the value of an argument: its default, or what a layer above has replaced it with."""
     written = {name: shown(entry.value) for name, entry in declared.entries.items()}
     limits = [f"{words} {written[key]}" for key, words in (("min", "at least"), ("max", "at most")) if key in written]
     limits += [f"one of {written['choices']}"] if "choices" in written else []
@@ -90,7 +90,7 @@ def _kind(path: KeyPath, node: MappingNode) -> str:
 
 
 def _about(robot: Robot, guide: Guide, path: KeyPath) -> str:
-    """Return what a key is for, in the words of its type."""
+    """Return the purpose of a key, as its type describes it."""
     if len(path) == 2 and path[0] == "components" and str(path[1]) in robot.components:
         return (robot.components[str(path[1])].cls.__doc__ or "").strip().partition("\n")[0]
     return guide.describe(path)
@@ -102,7 +102,7 @@ def _layer(step: HistoryStep) -> Layer:
 
 
 def _removed(manifest: RobotManifest, path: KeyPath) -> tuple[Layer, ...]:
-    """Return the layers of a value that is not there any more, the one that took it away last."""
+    """Return the layers of a removed value, the one that removed it last."""
     return tuple(_layer(step) for step in manifest.history.of(path))
 
 
@@ -120,7 +120,7 @@ def _dimension(guide: Guide, path: KeyPath, node: TreeNode) -> Dimension | None:
 
 
 def _si(node: TreeNode, dimension: Dimension | None) -> float | None:
-    """Return a quantity in SI, None if it is none or wrong, which `check` tells."""
+    """Return a quantity in SI; None if it is not one, or is wrong, which `check` reports."""
     if dimension is None or not isinstance(node, ScalarNode):
         return None
     try:
@@ -130,7 +130,7 @@ def _si(node: TreeNode, dimension: Dimension | None) -> float | None:
 
 
 def _sources(manifest: RobotManifest, path: KeyPath) -> Iterator[ArgumentSource]:
-    """Yield the arguments that a value was filled in from, each followed by those that it was given."""
+    """Yield the arguments that a value was filled in from, each followed by those it was itself given."""
     steps = manifest.history.of(path)
     written = steps[-1].node if steps else None
     if not isinstance(written, ScalarNode) or "${" not in written.text:
@@ -153,7 +153,7 @@ def _argument(manifest: RobotManifest, name: str, scope: str) -> Iterator[Argume
 
 
 def _unwritten(robot: Robot, guide: Guide, path: KeyPath) -> PathAnswer | None:
-    """Return what holds for a key that exists but is not written."""
+    """Return the answer for a key that exists but is not written."""
     if given := _input(robot, path):
         return _unwritten_input(path, given)
     if not all(is_known(robot.manifest, guide, path[:length]) for length in range(1, len(path) + 1)):
@@ -200,7 +200,7 @@ def _to_set(path: KeyPath) -> str:
 
 
 def _input(robot: Robot, path: KeyPath) -> Input | None:
-    """Return the input of a mission that a path names."""
+    """Return the mission input that a path names."""
     match path:
         case ("missions", str(mission), "with", str(name)) if mission in robot.missions:
             return robot.missions[mission].program.inputs.get(name)
@@ -214,7 +214,7 @@ def _default(value: object) -> str:
 
 
 def _defaults(guide: Guide, path: KeyPath, node: MappingNode) -> Iterator[tuple[str, str]]:
-    """Yield the keys of a map that are not written and have a default, with that."""
+    """Yield the keys of a map that are not written but have a default, with that default."""
     for key in guide.keys(path):
         if key not in node and (default := _default(guide.value((*path, key)).default)):
             yield key, default

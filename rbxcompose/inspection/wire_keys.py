@@ -1,4 +1,4 @@
-"""What an end of a wire is on the bus: its data keys, and its class of quality of service."""
+"""How an end of a wire appears on the bus: its data keys, and its quality-of-service class."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from rbxcompose.msgs.types import Interface
 from rbxcompose.plan.model import BusPlan
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Serves, ServesAction, ServesTopic
 
-Keys = tuple[tuple[str, str], ...]  # what it is for, the key
+Keys = tuple[tuple[str, str], ...]  # its purpose, and the key
 
 
 def keys_of(port: Port[Any], topic: str, bus: BusPlan) -> Keys:
-    """Return the Zenoh keys of a port that stands at an absolute topic; none for a look-up."""
+    """Return the Zenoh keys of a port with this absolute topic; none for a look-up."""
     interface = port.interface
     if interface is None:
         return ()
@@ -41,7 +41,7 @@ def qos_of(port: Port[Any]) -> str:
 
 
 def does(port: Port[Any]) -> str:
-    """Return what a component does at a port, as a verb with what follows."""
+    """Return the verb phrase for what a component does at a port."""
     match port:
         case Out():
             return "sends"

@@ -1,4 +1,4 @@
-"""What may be written at a position: keys, words, names of other sections and files, units."""
+"""What can be written at a position: keys, words, names of other sections and files, units."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _QUANTITY = re.compile(rf"\s*[+-]?{NUMBER_TEXT}(?P<space>\s*)(?P<unit>(?:[A-Za-z
 
 @dataclass(frozen=True, slots=True)
 class CompletionItem:
-    """One proposal: `text` is written in the place of the `replaces` characters before the position.
+    """One proposal: `text` replaces the `replaces` characters before the position.
 
     `sort` is 'key', 'name', 'word', 'unit' or 'variable'.
     """
@@ -39,7 +39,7 @@ class CompletionItem:
 
 
 def complete(document: Document, line: int, column: int) -> list[CompletionItem]:
-    """Return what may be written at a position (from 0), in the order in which it is best shown."""
+    """Return what can be written at a position (from 0), in the best order to show it."""
     spot = document.at(line, column)
     if spot is None:
         return []
@@ -66,7 +66,7 @@ def _of_key(spot: Spot) -> Iterator[CompletionItem]:
 
 
 def _open_keys(spot: Spot) -> dict[str, Schema]:
-    """Return the keys that may stand at the position; beside a skill there is no second step."""
+    """Return the keys allowed at the position; there is no second step beside a skill."""
     guide = spot.guide
     schemas = Guide(guide.schema, spot.cursor.around, guide.types).keys(spot.cursor.path)
     if _takes_nodes(schemas) and any(key not in anywhere() for key in spot.cursor.siblings):
@@ -89,7 +89,7 @@ def _kind_of_value(schema: Mapping[str, Any]) -> str:
 
 
 def _words_of_item(spot: Spot) -> Iterator[CompletionItem]:
-    """Yield what may stand as a word in a list, where a key may stand as well."""
+    """Yield what can be written as a word in a list where a key is possible as well."""
     path = spot.cursor.path
     if spot.document.is_mission and _takes_nodes(spot.guide.keys(path)):
         for name, about in spot.known.of(SKILL).items():
@@ -125,7 +125,7 @@ def _of_value(spot: Spot, path: tuple[str | int, ...]) -> Iterator[CompletionIte
 
 
 def _is_expression(value: GuidedValue) -> bool:
-    """Return whether places may be compared here."""
+    """Return whether places can be compared here."""
     return value.dimension is None and not value.words
 
 

@@ -1,4 +1,4 @@
-"""From what the core says to the types of the protocol."""
+"""Conversion of the core's results to the types of the protocol."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SORTS = {
 
 
 class Converter:
-    """Knows the units in which the editor counts, and how it calls its files."""
+    """Knows the units in which the editor counts, and its names for files."""
 
     def __init__(self, text: Callable[[Path], str], codec: PositionCodec) -> None:
         self.text = text
@@ -37,7 +37,7 @@ class Converter:
         self._uris: dict[Path, str] = {}
 
     def path(self, uri: str) -> Path | None:
-        """Return the real path of a document, None if it is no file; its name is kept for the answers."""
+        """Return the real path of a document, None if it is not a file; its name is remembered for the answers."""
         written = to_fs_path(uri)
         if not written:
             return None
@@ -46,16 +46,16 @@ class Converter:
         return path
 
     def uri(self, path: Path) -> str:
-        """Return how the editor calls a file."""
+        """Return the editor's name for a file."""
         return self._uris.get(path) or from_fs_path(str(path)) or ""
 
     def position(self, text: str, position: types.Position) -> tuple[int, int]:
-        """Return line and character from 0."""
+        """Return the line and character, counted from 0."""
         found = self.codec.position_from_client_units(text.split("\n"), position)
         return found.line, found.character
 
     def range(self, text: str, start: tuple[int, int], end: tuple[int, int]) -> types.Range:
-        """Return a range of a text between two positions of ours."""
+        """Return the range of a text between two of our positions."""
         lines = text.split("\n")
         first, last = (self.codec.position_to_client_units(lines, ServerTextPosition(*one)) for one in (start, end))
         return types.Range(first, last)
@@ -69,7 +69,7 @@ class Converter:
         return self.range(text, (span.line - 1, span.column - 1), (span.end_line - 1, span.end_column - 1))
 
     def diagnostic(self, path: Path, finding: Finding) -> types.Diagnostic:
-        """Return a finding; what to do about it stands below what is wrong."""
+        """Return a finding as a diagnostic; its help follows below the message."""
         words = f"{finding.message} ({finding.label})" if finding.label else finding.message
         related = [types.DiagnosticRelatedInformation(self.location(one.span), one.message) for one in finding.related]
         span = finding.span or Span("", 1, 1, 1, 1)
@@ -83,7 +83,7 @@ class Converter:
         )
 
     def item(self, text: str, place: tuple[int, int], number: int, item: CompletionItem) -> types.CompletionItem:
-        """Return a proposal at a place of a text; `number` is its turn."""
+        """Return a proposal at a place of a text; `number` is its rank."""
         line, column = place
         edit = types.TextEdit(self.range(text, (line, column - item.replaces), place), item.text)
         about = types.MarkupContent(types.MarkupKind.Markdown, item.about) if item.about else None

@@ -1,7 +1,7 @@
-"""Where in a manifest a position is, also while the text around it is being typed and is no YAML yet.
+"""The place of a position in a manifest, even while the text around it is being typed and is not valid YAML yet.
 
-A mark is put into the text at the position, which is then read by the ordinary parser; where that cannot be, the line
-is completed first, and at last what follows is left out.
+A mark is inserted into the text at the position, and the ordinary parser reads the result; if that fails, the line is
+completed first, and as a last resort the rest of the text is dropped.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from rbxcompose.lsp.quick import LARGE, near, quick_tree
 from rbxcompose.manifest.garbage_collection import paused_collection
 from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
 
-MARK = "\ue000"  # a character for private use, so that it stands in no manifest
+MARK = "\ue000"  # a private-use character, so that no manifest contains it
 _TOKEN_BEHIND = re.compile(r"[^\s:,\[\]{}#]*")
 _BEGINS_NODE = re.compile(r"(\s|- )*[^\s:]*")
 _COMMENT = re.compile(r"(^|\s)#")
@@ -27,8 +27,8 @@ class Cursor:
     """A position in a manifest.
 
     `path` leads to the map whose key it is in, or to the value that it is in; `before` and `after` are the parts of
-    that key or value on both sides. The tree is that of the text as it was completed, `siblings` are the other keys of
-    the map. `begins_item` tells that the key is the first of a list's item, so that it may become a plain word as well.
+    that key or value on either side. The tree is that of the completed text; `siblings` are the other keys of the map.
+    `begins_item` means that the key is the first one of a list item, so that it may also become a plain word.
     """
 
     root: MappingNode
@@ -42,7 +42,7 @@ class Cursor:
 
     @property
     def around(self) -> MappingNode:
-        """Return the tree without the key that is being written."""
+        """Return the tree without the key being written."""
         tree = _without_key(self.root, self.path, self.text) if self.is_key else self.root
         return tree if isinstance(tree, MappingNode) else self.root
 
@@ -53,12 +53,12 @@ class Cursor:
 
     @property
     def place(self) -> KeyPath:
-        """Return the path of what is meant: for a key, that of its value."""
+        """Return the path that is meant: for a key, that of its value."""
         return (*self.path, self.text) if self.is_key else self.path
 
 
 def locate(text: str, line: int, column: int) -> Cursor | None:
-    """Return where a position (from 0) is, None for a comment or if the text before it cannot be read."""
+    """Return the cursor at a position (from 0), None in a comment or if the text before it cannot be read."""
     lines = text.split("\n")
     if line >= len(lines):
         return None
@@ -66,7 +66,7 @@ def locate(text: str, line: int, column: int) -> Cursor | None:
     if _is_comment(before):
         return None
     with paused_collection():
-        # An alias needs its anchor, wherever that is.
+        # An alias needs its anchor, which may be anywhere.
         around = near(lines, line) if len(lines) > LARGE and "&" not in text else lines
         for candidate in _candidates(around, line, before, after):
             tree = quick_tree(candidate)
@@ -109,7 +109,7 @@ def _without_key(node: TreeNode, path: KeyPath, key: str) -> TreeNode:
 
 
 def _without_mark(node: TreeNode, path: KeyPath) -> TreeNode:
-    """Return the tree of the text as if the mark had never been in the scalar; `path` leads towards that."""
+    """Return the tree as if the mark had never been in the scalar; `path` leads there."""
     match node:
         case ScalarNode(text=text):
             return replace(node, text=text.replace(MARK, ""))
@@ -140,7 +140,7 @@ def _is_comment(before: str) -> bool:
 
 
 def _candidates(lines: list[str], line: int, before: str, after: str) -> Iterator[str]:
-    """Yield texts with the mark in them, the likeliest to be meant first."""
+    """Yield texts that contain the mark, the most likely one first."""
     above, below = lines[:line], lines[line + 1 :]
     rest = _after_token(after)
     as_it_is = f"{before}{MARK}{after}"
@@ -166,7 +166,7 @@ def _closing(before: str) -> str:
 
 
 def _marked(node: TreeNode, path: KeyPath, seen: set[int]) -> tuple[KeyPath, ScalarNode, bool] | None:
-    """Return the path, the scalar with the mark in it, and whether that is a key; what aliases repeat is seen once."""
+    """Return the path, the scalar with the mark, and whether it is a key; what aliases repeat is visited once."""
     if isinstance(node, ScalarNode):
         return (path, node, False) if MARK in node.text else None
     if id(node) in seen:

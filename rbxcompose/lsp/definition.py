@@ -1,4 +1,4 @@
-"""Where what is named at a position is written: a place, a component, a value, the component of a skill, a file."""
+"""Where the thing named at a position is defined: a place, a component, a value, the component of a skill, a file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SERVING = ("serves_action", "serves", "serves_topic")  # kinds of ports that ar
 
 
 def define(document: Document, line: int, column: int) -> Span | None:
-    """Return where what is named at a position (from 0) is written, or None."""
+    """Return the place that defines what a position (from 0) names, or None."""
     spot = document.at(line, column)
     if spot is None:
         return None

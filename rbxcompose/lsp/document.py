@@ -12,12 +12,12 @@ from rbxcompose.model.robot import Robot
 from rbxcompose.schema.documents import MAKERS, installed_schema
 from rbxcompose.schema.guide import Guide
 
-DEFAULT_KIND = "Robot"  # until the text says another
+DEFAULT_KIND = "Robot"  # unless the text names another
 
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A text, its file, and the robot that it is part of (as it was when it could last be read), if there is one."""
+    """A text, its file, and the robot that it is part of (as last read successfully), if there is one."""
 
     path: Path
     text: str
@@ -25,7 +25,7 @@ class Document:
 
     @property
     def kind(self) -> str:
-        """Return the kind of manifest that has a schema; one that is not known is taken for a robot."""
+        """Return the kind of manifest, if it has a schema; an unknown one is treated as a robot."""
         written = kind_of(self.text)
         return written if written in MAKERS else DEFAULT_KIND
 
@@ -40,7 +40,7 @@ class Document:
         return self.kind == OVERLAY
 
     def at(self, line: int, column: int) -> Spot | None:
-        """Return what is at a position (from 0), None if nothing can be said of it."""
+        """Return what is at a position (from 0), None if nothing is known about it."""
         cursor = locate(self.text, line, column)
         if cursor is None:
             return None
@@ -50,7 +50,7 @@ class Document:
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """A position in a document, with all that tells what belongs there."""
+    """A position in a document, with all that determines what belongs there."""
 
     document: Document
     cursor: Cursor

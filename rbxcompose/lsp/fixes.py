@@ -1,4 +1,4 @@
-"""Fixes of findings as changes of texts."""
+"""Fixes of findings as changes to texts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rbxcompose.lsp.project import Project
 
 @dataclass(frozen=True, slots=True)
 class TextChange:
-    """A text that is written in the place of what stands between two positions (line, column, from 0)."""
+    """A text that replaces what is between two positions (line, column, from 0)."""
 
     start: tuple[int, int]
     end: tuple[int, int]
@@ -22,7 +22,7 @@ class TextChange:
 
 @dataclass(frozen=True, slots=True)
 class CodeAction:
-    """What an editor offers to do about a finding."""
+    """An action that an editor offers for a finding."""
 
     title: str
     finding: Finding
@@ -31,7 +31,7 @@ class CodeAction:
 
 
 def actions(project: Project, findings: Iterable[Finding], first: int, last: int) -> Iterator[CodeAction]:
-    """Yield the fixes of the findings that stand on the lines `first` to `last` (from 0)."""
+    """Yield the fixes of the findings on the lines `first` to `last` (from 0)."""
     for finding in findings:
         span, fix = finding.span, finding.fix
         if span is None or fix is None or not _meets(span, first, last):
@@ -49,7 +49,7 @@ def _meets(span: Span, first: int, last: int) -> bool:
 
 
 def change_of(before: str, after: str) -> TextChange:
-    """Return the one change that makes `after` of `before`, as small as it can be."""
+    """Return the smallest single change that turns `before` into `after`."""
     shortest = min(len(before), len(after))
     start = next((index for index in range(shortest) if before[index] != after[index]), shortest)
     most = shortest - start

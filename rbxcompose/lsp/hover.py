@@ -15,7 +15,7 @@ from rbxcompose.units import Quantity, format_quantity
 
 
 def describe(document: Document, line: int, column: int) -> str:
-    """Return what is known of a position (from 0): what it is for, what it measures, its value and where that is."""
+    """Return what is known about a position (from 0): its purpose, dimension, value and the origin of that."""
     spot = document.at(line, column)
     if spot is None or not spot.cursor.text:
         return ""
@@ -23,7 +23,7 @@ def describe(document: Document, line: int, column: int) -> str:
 
 
 def _name(spot: Spot) -> str:
-    """Return what the name at the position stands for."""
+    """Return what the name at the position refers to."""
     word, cursor = word_at(spot), spot.cursor
     if word.startswith("${"):
         name = word.removeprefix("${").strip()
@@ -44,7 +44,7 @@ def _told(name: str, about: str) -> str:
 
 
 def _field(spot: Spot) -> str:
-    """Return what the key is for, what it measures, and what holds without it."""
+    """Return the purpose of the key, what it measures, and its default."""
     path = spot.cursor.place
     value = spot.guide.value(path)
     words = _type(spot) if spot.cursor.is_key else value.words.get(spot.cursor.text, "")
@@ -54,14 +54,14 @@ def _field(spot: Spot) -> str:
 
 
 def _type(spot: Spot) -> str:
-    """Return what the type of the entry is whose name stands at the position."""
+    """Return what the type of the entry named at the position is."""
     place = (*spot.cursor.place, "type")
     word = at(spot.cursor.root, place)
     return spot.guide.value(place).words.get(word.text, "") if isinstance(word, ScalarNode) else ""
 
 
 def _value(spot: Spot) -> str:
-    """Return the value in the composed robot with its file, line and column, and those that it took the place of."""
+    """Return the value in the composed robot with its file, line and column, and the values it replaced."""
     robot = spot.known.robot
     if robot is None or spot.document.is_mission:
         return ""
@@ -75,7 +75,7 @@ def _value(spot: Spot) -> str:
 
 
 def _lost(robot: Robot, path: KeyPath) -> Iterator[str]:
-    """Yield the values that a later layer has replaced, the last one first."""
+    """Yield the values that a later layer has replaced, latest first."""
     for step in reversed(robot.manifest.history.of(path)[:-1]):
         if isinstance(step.node, ScalarNode):
             yield f"; {step.layer} had `{step.node.text}` ({step.node.span})"

@@ -1,4 +1,4 @@
-"""The names that cross files: of what the keys of a map are names, and which names of a kind there are."""
+"""The names that cross files: the kind of thing that the keys of a map name, and the known names of a kind."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ def below_profile(path: KeyPath) -> KeyPath:
 
 
 def named_by_key(path: KeyPath, is_overlay: bool) -> str:
-    """Return of what the keys of the map at `path` are names that exist, or nothing."""
+    """Return the kind of existing things that the keys of the map at `path` name, or nothing."""
     below = below_profile(path)
     section = section_named(below[0]) if below else None
     if section is None:
         return ""
     if len(below) == 1:
-        is_over = is_overlay or below != path  # its keys name what is there already
+        is_over = is_overlay or below != path  # its keys name existing entries
         return section.names if is_over and section.is_map else ""
     return kind_of_keys(section.type, below[1:])
 
 
 @dataclass(frozen=True, slots=True)
 class KnownNames:
-    """The names of a robot as it was last read, and those of the file that is being typed, each with a few words."""
+    """The names of a robot as last read, and those of the file being typed, each with a few words."""
 
     path: Path
     root: MappingNode
     robot: Robot | None
 
     def of(self, kind: str, path: KeyPath = ()) -> dict[str, str]:
-        """Return the names of a kind with what each is; `path` is where one of them is to stand."""
+        """Return the names of a kind, each with a short description; `path` is where one of them is to be written."""
         special: dict[str, Callable[[], dict[str, str]]] = {
             PORT: lambda: {**self._in_text(COMPONENT), **dict(self._ports())},
             RUNNING: lambda: {**self._in_text(COMPONENT), **self._parts()},
@@ -103,7 +103,7 @@ class KnownNames:
         return {name: one.type.phrase for name, one in found.program.inputs.items()} if found else {}
 
     def _part_arguments(self, instance: str) -> dict[str, str]:
-        """Return the arguments of the part that an instance is of."""
+        """Return the arguments of the part that an include entry instantiates."""
         written = at(self.root, (include.name, instance, "part"))
         path = resolve(written.text, self.path, written.span) if isinstance(written, ScalarNode) else None
         part = read_file(path, str(path), {})[0] if isinstance(path, Path) else None

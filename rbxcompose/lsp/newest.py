@@ -1,4 +1,4 @@
-"""Compiles the newest texts in a thread of its own, while the editor is answered from what was compiled last."""
+"""Compiles the newest texts in a thread of its own, while the editor gets answers from the last compilation."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ from pathlib import Path
 from rbxcompose.lsp.project import FoundByFile, OutdatedError, Project
 from rbxcompose.schema.documents import MAKERS, installed_schema
 
-PAUSE = 0.1  # [s] without a key stroke before robots are compiled again
+PAUSE = 0.1  # [s] without a keystroke before robots are compiled again
 
 
 class Newest:
-    """The project as it was compiled last, and the texts that have changed since.
+    """The project as last compiled, and the texts that have changed since.
 
-    A thread works on a copy of the project, which takes the project's place when it is done. A text that comes
-    meanwhile makes that outdated: it ends at the next robot, and the work starts again with all texts. So what is
-    `told` is always of the newest texts. All methods belong to the thread of the event loop.
+    A thread works on a copy of the project, which replaces the project when it is done. A text that arrives meanwhile
+    makes the copy outdated: it stops at the next robot, and the work starts again with all texts. So what is `told`
+    always comes from the newest texts. All methods belong to the thread of the event loop.
     """
 
     def __init__(self, project: Project, told: Callable[[FoundByFile], None]) -> None:
         self.project = project
         self._told = told
         self._waiting: dict[Path, str | None] = {}
-        self._number = 0  # of changes so far
-        self._due = 0.0  # time of the loop
+        self._number = 0  # count of changes so far
+        self._due = 0.0  # in loop time
         self._task: asyncio.Task[None] | None = None
         self._thread = ThreadPoolExecutor(1, "compile")
 
     def prepare(self) -> None:
-        """Read in the thread what the first answer needs."""
+        """Load what the first answer needs, in the thread."""
         for kind in MAKERS:
             self._thread.submit(installed_schema, kind)
 
     def has(self, path: Path) -> bool:
-        """Return whether the editor's text of a file counts in place of the saved one."""
+        """Return whether the editor's text of a file replaces the saved one."""
         return self._waiting.get(path) is not None or (path in self.project.unsaved and path not in self._waiting)
 
     def is_compiled(self, path: Path, text: str) -> bool:
@@ -44,7 +44,7 @@ class Newest:
         return not self._waiting and self.project.text(path) == text
 
     def change(self, path: Path, text: str | None, pause: float = 0.0) -> None:
-        """Take a new text (None: the saved one counts again), to be compiled after a pause [s]."""
+        """Take a new text (None: the saved one counts again) and compile it after a pause [s]."""
         self._waiting[path] = text
         self._number += 1
         loop = asyncio.get_running_loop()
@@ -53,7 +53,7 @@ class Newest:
             self._task = loop.create_task(self._work())
 
     def close(self) -> None:
-        """End the thread; what it is at becomes outdated."""
+        """Stop the thread; its current work becomes outdated."""
         self._number += 1
         self._waiting.clear()
         self._thread.shutdown(wait=False, cancel_futures=True)
@@ -76,5 +76,5 @@ class Newest:
                 self._told(found)
 
     def _copy(self, number: int) -> Project:
-        """Return a copy of the project that is outdated by the next change after `number` of them."""
+        """Return a copy of the project that becomes outdated with the first change after `number`."""
         return self.project.copy(lambda: number != self._number)

@@ -1,4 +1,4 @@
-"""The robots that an editor has to do with: compiled with the texts as they are being typed."""
+"""The robots that an editor works on: compiled with the texts as they are being typed."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from rbxcompose.model.robot import Robot
 ROBOT, MISSION, OVERLAY = "Robot", "Mission", "Overlay"
 _KIND = re.compile(r"^kind:[ ]*[\"']?(\w+)", re.MULTILINE)
 _HEADER = re.compile(r"^rbx:", re.MULTILINE)
-_MOST_ROBOTS = 200  # of one project, that are looked at
-_BEGINNING = 4_000  # characters in which the header of a manifest stands
+_MOST_ROBOTS = 200  # examined per project
+_BEGINNING = 4_000  # characters that contain the header of a manifest
 
 FoundByFile = dict[Path, list[Finding]]
 
 
 class OutdatedError(Exception):
-    """Raised where a project is compiled whose texts have changed meanwhile."""
+    """Raised when a project is compiled whose texts have changed since."""
 
 
 def kind_of(text: str) -> str:
-    """Return what a manifest says that it describes, or nothing."""
+    """Return the kind that a manifest declares, or nothing."""
     match = _KIND.search(text[:_BEGINNING])
     return match[1] if match else ""
 
 
 @dataclass(slots=True)
 class _Watched:
-    """A robot: its newest compilation, the files of that, and the newest one from which a robot came."""
+    """A robot: its newest compilation, the files of that, and the robot of the last compilation that had one."""
 
     compilation: Compilation
     files: frozenset[Path]
@@ -54,15 +54,15 @@ class Project:
     _alone: FoundByFile = field(default_factory=dict)  # findings in files that belong to no robot
 
     def copy(self, is_outdated: Callable[[], bool]) -> Project:
-        """Return a project that can change without this one; it raises `OutdatedError` once it is outdated."""
+        """Return a project that changes independently of this one; it raises `OutdatedError` once it is outdated."""
         return Project(self.environment, dict(self.unsaved), is_outdated, dict(self._watched), dict(self._alone))
 
     def has(self, path: Path, text: str) -> bool:
-        """Return whether a text is one of ours: editors send every YAML file."""
+        """Return whether a text is a manifest: editors send every YAML file."""
         return _HEADER.search(text[:_BEGINNING]) is not None or bool(self._concerned(path))
 
     def text(self, path: Path) -> str:
-        """Return the text of a file as the editor has it, else as it is saved; nothing if it cannot be read."""
+        """Return the text of a file from the editor, else the saved one; empty if it cannot be read."""
         if path in self.unsaved:
             return self.unsaved[path]
         sources: dict[str, str] = {}
@@ -72,7 +72,7 @@ class Project:
     def change(self, path: Path, text: str | None) -> FoundByFile:
         """Take a new text (None: the saved one counts again) and return the findings of all files concerned.
 
-        A file without findings has an empty list, so that what was shown of it can be taken away.
+        A file without findings has an empty list, so that its old findings are cleared.
         """
         if text is None:
             self.unsaved.pop(path, None)
@@ -91,28 +91,28 @@ class Project:
         return {file: self.findings(file) for file in sorted({path} | before | after)}
 
     def change_all(self, texts: Mapping[Path, str | None]) -> FoundByFile:
-        """Take several new texts, as `change` takes one.
+        """Take several new texts in the way of `change`.
 
         Raises:
-            OutdatedError: when the project has become outdated; it is of no more use then.
+            OutdatedError: if the project has become outdated; it must not be used any more.
         """
         files = {file: None for path, text in texts.items() for file in self.change(path, text)}
         return {file: self.findings(file) for file in files}
 
     def findings(self, path: Path) -> list[Finding]:
-        """Return what is known to be wrong in a file, whichever robot it was found in."""
+        """Return the known findings in a file, from all robots."""
         found = [finding for robot in self._watched for finding in self._of(robot, path)]
         return list(dict.fromkeys([*found, *self._alone.get(path, ())]))
 
     def robot_of(self, path: Path) -> Robot | None:
-        """Return a robot that a file belongs to, as it was when it could last be read; None before it was compiled."""
+        """Return a robot that a file belongs to, as last read successfully; None before it was compiled."""
         robots = self._concerned(path)
         if not robots and (base := self._base_of(path)):
             robots = self._concerned(base)
         return next((robot for one in robots if one in self._watched and (robot := self._watched[one].robot)), None)
 
     def _base_of(self, path: Path) -> Path | None:
-        """Return the robot that an overlay is taken to be for: the one beside it."""
+        """Return the robot that an overlay is assumed to belong to: the one beside it."""
         robot = path.parent / ROBOT_FILE
         return robot if kind_of(self.text(path)) == OVERLAY and robot.is_file() else None
 
@@ -141,7 +141,7 @@ class Project:
         made = compile_robot(str(path), environment=self.environment, unsaved=self.unsaved)
         before = self._watched.get(path)
         files = frozenset({path, *(Path(shown).resolve() for shown in made.sources)})
-        # While a text cannot be read, names of the robot as it was serve best.
+        # While a text cannot be read, the names of the last readable robot serve best.
         robot = made.robot or (before.robot if before else None)
         self._watched[path] = _Watched(made, files, robot)
 
@@ -158,7 +158,7 @@ class Project:
         return list(report)
 
     def _overlay_findings(self, path: Path, base: Path) -> list[Finding]:
-        """Return what is wrong in an overlay when it is laid over the robot beside it."""
+        """Return the findings in an overlay when it is applied to the robot beside it."""
         made = compile_robot(str(base), overlays=[str(path)], environment=self.environment, unsaved=self.unsaved)
         return [one for one in made.report if one.span and Path(one.span.file).resolve() == path]
 

@@ -1,4 +1,4 @@
-"""A manifest's tree in a hurry: without any check, since a person waits for each key stroke."""
+"""A manifest's tree, built fast and without any checks, since a person waits for each keystroke."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.yaml_nodes import compose
 
-LARGE = 300  # lines; of longer manifests only what is near the position is read
-SMALL = 100  # lines; a section of that size is always read
+LARGE = 300  # lines; of longer manifests only the parts near the position are read
+SMALL = 100  # lines; a section up to this size is always read
 _MERGE = "<<"
 _SECTION = re.compile(r"[A-Za-z_\"']")
 _ENTRY = re.compile(r"( +)[^\s#]")
 
 
 def quick_tree(text: str) -> TreeNode | None:
-    """Return the tree of a text, None if it is no YAML; spans have no file, a key that is written twice counts last.
+    """Return the tree of a text, None if it is not YAML; spans have no file, of a repeated key the last one counts.
 
-    What an alias repeats is the same object again; one that leads back to what it lies in is an empty map.
+    What an alias repeats is the same object again; an alias to something that contains it is an empty map.
     """
     root, _ = compose(text, "")
     return None if root is None else _node(root, {})
@@ -57,9 +57,9 @@ def _entries(pairs: list[tuple[yaml.Node, yaml.Node]], done: dict[int, TreeNode]
 
 
 def near(lines: list[str], line: int) -> list[str]:
-    """Return the lines of a manifest with those left empty that are not needed to know what is at `line` (from 0).
+    """Return the lines of a manifest, emptied where they are not needed to know what is at `line` (from 0).
 
-    Kept are small sections, and of a large one the entry that the line is in: other names are those of the robot.
+    Small sections are kept, and of a large one the entry that contains the line: other names come from the robot.
     """
     starts = [number for number, text in enumerate(lines) if _SECTION.match(text)]
     kept = set(range(starts[0] if starts else 0))
@@ -72,7 +72,7 @@ def near(lines: list[str], line: int) -> list[str]:
 
 
 def _entry(lines: list[str], start: int, end: int, line: int) -> Iterator[int]:
-    """Yield the lines of the entry of a section that `line` is in, and that of the section's name."""
+    """Yield the lines of the section's entry that contains `line`, and the line of the section's name."""
     yield start
     first = next((match for text in lines[start + 1 : end] if (match := _ENTRY.match(text))), None)
     indent = first[1] if first else ""

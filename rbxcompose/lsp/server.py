@@ -21,7 +21,7 @@ from rbxcompose.lsp.project import FoundByFile, Project
 
 P = TypeVar("P")
 R = TypeVar("R")
-SWITCH = 0.001  # [s] that an answer waits for its turn while the other thread compiles
+SWITCH = 0.001  # [s] that an answer waits for the other thread, which may be compiling
 TRIGGERS = (" ", ":", "$", "{", ".", "-", "[", ",")
 
 
@@ -35,12 +35,12 @@ class Session:
 
     @property
     def project(self) -> Project:
-        """Return the project as it was compiled last."""
+        """Return the project as last compiled."""
         return self.newest.project
 
     @property
     def convert(self) -> Converter:
-        """Return the converter, which needs what was agreed upon at the start."""
+        """Return the converter, which needs the settings negotiated at the start."""
         if self._converter is None:
             self._converter = Converter(lambda path: self.project.text(path), self.server.workspace.position_codec)
         return self._converter
@@ -53,21 +53,21 @@ class Session:
             self.newest.change(path, text, pause)
 
     def changed(self, uri: str) -> None:
-        """Check a document when nothing has been typed for a moment."""
+        """Check a document after a short pause in typing."""
         self.opened(uri, PAUSE)
 
     def closed(self, uri: str) -> None:
-        """Take the saved text again."""
+        """Use the saved text again."""
         path = self.convert.path(uri)
         if path is not None and self.newest.has(path):
             self.newest.change(path, None)
 
     def begun(self, _: object) -> None:
-        """Make ready for the first question."""
+        """Prepare for the first request."""
         self.newest.prepare()
 
     def ended(self, _: object) -> None:
-        """Let the thread end."""
+        """Stop the thread."""
         self.newest.close()
 
     def _publish(self, found: FoundByFile) -> None:
@@ -80,14 +80,14 @@ class Session:
         return self.server.workspace.get_text_document(uri).source.replace("\r\n", "\n")
 
     def document(self, uri: str) -> Document | None:
-        """Return a document with its newest text, None if it is none of ours."""
+        """Return a document with its newest text, None if it is not one of ours."""
         path, text = self.convert.path(uri), self._text(uri)
         if path is None or (text.strip() and not self.project.has(path, text)):
             return None
         return Document(path, text, self.project.robot_of(path))
 
     def completion(self, params: types.CompletionParams) -> types.CompletionList:
-        """Propose what may be written."""
+        """Propose what can be written."""
         document = self.document(params.text_document.uri)
         if document is None:
             return types.CompletionList(is_incomplete=False, items=[])
@@ -98,22 +98,22 @@ class Session:
         )
 
     def definition(self, params: types.DefinitionParams) -> types.Location | None:
-        """Tell where something is written."""
+        """Return the place where something is defined."""
         document = self.document(params.text_document.uri)
         span = define(document, *self.convert.position(document.text, params.position)) if document else None
         return self.convert.location(span) if span else None
 
     def hover(self, params: types.HoverParams) -> types.Hover | None:
-        """Say what something is."""
+        """Describe what is at a position."""
         document = self.document(params.text_document.uri)
         text = describe(document, *self.convert.position(document.text, params.position)) if document else ""
         return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, text)) if text else None
 
     def code_action(self, params: types.CodeActionParams) -> list[types.CodeAction]:
-        """Offer the fixes of what is wrong here."""
+        """Offer the fixes of the findings here."""
         path, text = self.convert.path(params.text_document.uri), self._text(params.text_document.uri)
         if path is None or not self.newest.is_compiled(path, text):
-            return []  # the places of an older text would be the wrong ones
+            return []  # the places of an older text would be wrong
         findings = self.project.findings(path)
         lines = params.range.start.line, params.range.end.line
         return [self.convert.action(one) for one in actions(self.project, findings, *lines)]
@@ -151,7 +151,7 @@ class _Notice(Protocol):
 
 
 def _of_document(take: Callable[[str], None]) -> Callable[[_Notice], None]:
-    """Return a handler that hands on which document a notification is about."""
+    """Return a handler that passes on the document that a notification is about."""
     return lambda params: take(params.text_document.uri)
 
 

@@ -1,4 +1,4 @@
-"""The `$names` of a mission and the `${...}` of other manifests, as they are seen at one place."""
+"""The `$names` of a mission and the `${...}` of other manifests that are visible at one place."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _FILLS |= {"secret.": "a secret, from a file of its own or the environment; it i
 
 
 def fills(spot: Spot) -> dict[str, str]:
-    """Return what `${...}` may name."""
+    """Return the names that `${...}` may use."""
     arguments = {f"args.{name}": about or "argument" for name, about in spot.known.of(ARGUMENT).items()}
     return {**arguments, **_FILLS}
 
 
 def variables(spot: Spot) -> dict[str, str]:
-    """Return the `$names` that may be read at a place of a mission, each with its type and where it comes from."""
+    """Return the `$names` readable at a place of a mission, each with its type and origin."""
     root, robot = spot.cursor.root, spot.known.robot
     found = {POSE: "a pose, in `map`"}
     if robot is not None:
@@ -66,7 +66,7 @@ def _declared(spot: Spot, root: MappingNode, section: str) -> Iterator[tuple[str
 
 
 def _items(spot: Spot) -> Iterator[tuple[str, str]]:
-    """Yield the items of the loops around a place, with their types as far as the mission could be read."""
+    """Yield the items of the loops around a place, with their types if the mission could be read."""
     program, robot = _program(spot), spot.known.robot
     types = {}
     if program is not None and robot is not None:

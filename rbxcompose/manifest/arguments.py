@@ -47,7 +47,7 @@ class ArgumentModel(Config):
 
 @dataclass(frozen=True, slots=True)
 class DeclaredArgument:
-    """A declared argument: what a value of it must be."""
+    """A declared argument: what its values must be."""
 
     name: str
     type: Type
@@ -67,7 +67,7 @@ class DeclaredArgument:
 
 
 def read_argument(name: str, node: TreeNode, path: KeyPath, report: Report) -> DeclaredArgument | None:
-    """Return the declaration of an argument that stands at `path`, or None after its findings."""
+    """Return the declaration of an argument at `path`, None after its findings."""
     model = validate(ArgumentModel, node, path, report)
     if model is None or not isinstance(node, MappingNode):
         return None
@@ -102,7 +102,7 @@ def read_value(node: TreeNode, expected: Type, name: str, report: Report) -> obj
     """Return a node as a value of the type `expected`, `BROKEN` after a finding.
 
     Quantities for dimensions, float for `number`, int for `count`, text for words, names and places, bool for flags,
-    the node itself for lists, maps and poses that are written out.
+    the node itself for lists, maps and written-out poses.
     """
     if isinstance(node, ScalarNode) and node.filled is BROKEN:
         return BROKEN
@@ -153,7 +153,7 @@ def _size(value: object) -> float:
 
 
 def show(value: object) -> str:
-    """Return a typed value as it stands inside a text: `0.3 m/s`, `2`, `true`."""
+    """Return a typed value as text: `0.3 m/s`, `2`, `true`."""
     match value:
         case bool():
             return "true" if value else "false"

@@ -1,4 +1,4 @@
-"""Lists that were written without their brackets."""
+"""Lists written without their brackets."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ _ITEM = re.compile(r"\s*+([A-Za-z0-9_.$+-]++(?: [A-Za-z0-9_.%/]++)?)\s*+")  # a 
 
 
 def without_brackets(node: TreeNode | None) -> list[tuple[str, int]]:
-    """Return the items, with their offsets, of a text that lacks but the brackets of a list; nothing of any other.
+    """Return the items, with their offsets, of a text that lacks only the brackets of a list; none of any other.
 
-    Round brackets in their place are taken as well.
+    Round brackets in their place are accepted, too.
     """
     if not isinstance(node, ScalarNode) or not node.plain or node.filled is not None or not node.text:
         return []
@@ -30,6 +30,6 @@ def without_brackets(node: TreeNode | None) -> list[tuple[str, int]]:
 
 
 def bracketed(node: ScalarNode) -> tuple[str, Fix]:
-    """Return the help for a text that lacks the brackets of a list, and its fix."""
+    """Return the help and the fix for a text that lacks the brackets of a list."""
     meant = f"[{', '.join(text for text, _ in without_brackets(node))}]"
     return f"a list needs brackets: write '{meant}'", replacement(node.span, node.text, meant)

@@ -1,4 +1,4 @@
-"""What a strict field takes and YAML cannot write, converted from what was read."""
+"""Conversion of values that YAML cannot write to the types that strict fields require."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from rbxcompose.units import Quantity, format_quantity
 
 
 def repaired(data: Any, error: ErrorDetails, node: TreeNode) -> Any:
-    """Return `data` with what a strict field takes and YAML cannot write: text for a number, a tuple for a list."""
+    """Return `data` with one value converted to what a strict field requires: a number to text, a list to a tuple."""
     convert = _REPAIRS.get(error["type"])
     if convert is None:
         return data
     try:
         return changed(data, error["loc"], lambda value: convert(value, at(node, error["loc"])))
-    except (KeyError, IndexError, TypeError):  # a place that is not in the data, such as a member of a union
+    except (KeyError, IndexError, TypeError):  # the place is not in the data, for example a member of a union
         return data
 
 

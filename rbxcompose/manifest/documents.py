@@ -1,4 +1,4 @@
-"""Reading the files of one robot: each once, of the kind that is wanted."""
+"""Reading the files of one robot: each once, and of the required kind."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class Documents:
     files: dict[str, Path] = field(default_factory=dict)
 
     def read(self, file: Path, wanted: str, span: Span | None = None) -> MappingNode | None:
-        """Return the tree of a manifest of the kind that is wanted, or None after findings.
+        """Return the tree of a manifest of the wanted kind, or None after findings.
 
-        `span` is the place that names the file, for what is wrong with it as a whole.
+        `span` is the place that names the file; findings about the whole file point there.
         """
         shown = shown_name(file)
         self.files[shown] = file
@@ -61,11 +61,11 @@ class Documents:
         return root if isinstance(root, MappingNode) else None
 
     def writer(self, span: Span, robot: Path) -> Path:
-        """Return the file that a value was written in; the robot's for one of the command line."""
+        """Return the file that a value was written in; the robot's file for a value from the command line."""
         return self.files.get(span.file, robot)
 
     def check(self, model: type[ManifestHeader], root: MappingNode) -> None:
-        """Add what is wrong with the keys of a whole file; what a section holds is looked at where it is read."""
+        """Add findings for the top-level keys of a file; the contents of a section are checked where it is read."""
         anything = {name for name, field in model.model_fields.items() if field.annotation is Any}
         keys = {
             name: Entry(entry.key, ScalarNode("", entry.value.span)) if name in anything else entry
@@ -75,7 +75,7 @@ class Documents:
 
 
 def _trouble(root: TreeNode, wanted: str) -> Finding | None:
-    """Return why a document is not of the kind that is wanted."""
+    """Return the finding for a document of another kind, None if it is of the wanted one."""
     if not isinstance(root, MappingNode):
         return OTHER_KIND.at(root.span, "a manifest is a map that starts with 'rbx: 1' and 'kind:'")
     written = root.get("kind")

@@ -19,7 +19,7 @@ FILES = {
 
 
 def file_model(kind: str) -> type[ManifestHeader]:
-    """Return the keys of a robot's, part's or overlay's file, with anything in each section."""
+    """Return the model of a robot's, part's or overlay's file: its keys, with anything allowed in each section."""
     return _model(kind, tuple((one.name, one.doc) for one in sections(kind)))
 
 

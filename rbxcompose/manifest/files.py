@@ -1,4 +1,4 @@
-"""Paths that manifests write: relative to their file, inside the project or the shipped library."""
+"""Paths written in manifests: relative to their file, inside the project or the shipped library."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ missions:
 ```
 """,
 )
-ROBOT_FILE = "robot.yaml"  # what a folder stands for
+ROBOT_FILE = "robot.yaml"  # the file that a folder means
 _MOST_NEIGHBOURS = 1000
 _MOST_NAMESAKES = 3
 
 
 def shown_name(path: Path) -> str:
-    """Return how findings call a file: relative to the current folder where it lies below it, else as it was named."""
+    """Return the name of a file in findings: relative to the current folder if it is below it, else as it was named."""
     relative = os.path.relpath(path)
     if relative.startswith("..") and path.is_relative_to(library_root() / PARTS):
         return PREFIX + path.relative_to(library_root()).as_posix()
@@ -43,7 +43,7 @@ def shown_name(path: Path) -> str:
 
 
 def project_of(path: Path) -> Path:
-    """Return the nearest folder above a file that holds `robots/` or `missions/`, else the file's own."""
+    """Return the nearest folder above a file that contains `robots/` or `missions/`, else the file's own folder."""
     folders = path.resolve().parents
     return next(
         (folder for folder in folders if any((folder / n).is_dir() for n in ("robots", "missions"))), folders[0]
@@ -51,7 +51,7 @@ def project_of(path: Path) -> Path:
 
 
 def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
-    """Return the file that a manifest names, or the finding that says why it may not or cannot."""
+    """Return the file that a manifest names, or the finding that says why it must not or cannot be used."""
     path = _absolute(written, writer.resolve().parent)
     if path is None or not any(path.is_relative_to(root) for root in (project_of(writer), library_root())):
         message, folder = f"'{plain(written)}' is outside the project", plain(shown_name(project_of(writer)))
@@ -69,20 +69,20 @@ def find(written: str) -> Path | Finding:
 
 
 def _absolute(written: str, folder: Path) -> Path | None:
-    """Return the real path, that of its robot if it is a folder; None if it cannot be one or leaves the library."""
+    """Return the real path (of its robot file, if it is a folder); None if it is impossible or leaves the library."""
     is_library = written.startswith(PREFIX)
     base = library_root() if is_library else folder
     try:
         path = (base / written.removeprefix(PREFIX)).resolve()
         if path.is_dir():
             path = (path / ROBOT_FILE).resolve()
-    except (OSError, ValueError, RuntimeError):  # a name too long for the system, a zero byte, links in a circle
+    except (OSError, ValueError, RuntimeError):  # a name too long for the system, a zero byte, a circle of links
         return None
     return None if is_library and not path.is_relative_to(base) else path
 
 
 def _missing(written: str, path: Path, span: Span | None, writer: Path | None = None) -> Finding:
-    if os.path.lexists(path):  # a pipe, a device, a link to what is not there
+    if os.path.lexists(path):  # a pipe, a device, a dangling link
         return UNREADABLE.at(span, f"'{plain(written)}' is not a regular file")
     if writer is not None and (namesakes := files_named(path.name, writer)):
         message, help_text = f"'{plain(written)}' does not exist", " or ".join(f"'{one}'" for one in namesakes)

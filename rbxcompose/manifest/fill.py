@@ -148,16 +148,16 @@ _ENVIRONMENT = re.compile(r"\s*env\.(?P<name>[A-Za-z_][A-Za-z0-9_]*)(:(?P<mode>[
 
 
 def fill(root: tree.MappingNode, names: Names, report: Report, *, runs: bool = False) -> tree.MappingNode:
-    """Return the tree with every `${...}` filled in; `runs` tells that `$name` has a meaning in it (missions).
+    """Return the tree with every `${...}` filled in; `runs` means that `$name` has a meaning in it (missions).
 
-    A scalar that is nothing but `${...}` holds the typed value in `filled`, or is the list or map that it names; one
-    that could not be filled in holds `BROKEN`.
+    A scalar that is nothing but `${...}` holds the typed value in `filled`, or becomes the list or map that it names;
+    one that could not be filled in holds `BROKEN`.
     """
     return _Filler(names, report, runs).mapping(root)
 
 
 class _Filler:
-    """One pass over a tree; what holds no `$` stays the same object."""
+    """One pass over a tree; a node without `$` stays the same object."""
 
     def __init__(self, names: Names, report: Report, runs: bool) -> None:
         self.names = names
@@ -165,7 +165,7 @@ class _Filler:
         self.runs = runs
         self.scope = ""
         self.known = names.known("")
-        self.left = ALL_BYTES  # by which the tree may grow
+        self.left = ALL_BYTES  # how much the tree may still grow
 
     def node(self, node: TreeNode) -> TreeNode:
         match node:
@@ -210,14 +210,14 @@ class _Filler:
         return self.within(scalar, replace(scalar, text="".join(parts) + scalar.text[position:])) if parts else scalar
 
     def where_given(self, filled: TreeNode, piece: re.Match[str]) -> TreeNode:
-        """Return what was filled in for one `${...}` with its place, where it is an argument that was given a value."""
+        """Return what was filled in for one `${...}`, with the place of its value if that was given to an argument."""
         named = self.known.get((piece["body"] or "").strip())
         if named is None or named.given is None or not isinstance(filled, ScalarNode):
-            return filled  # lists and maps are as they were written, with their own places
+            return filled  # lists and maps keep the places where they were written
         return replace(filled, span=given_span(named.given, filled.span))
 
     def within(self, scalar: ScalarNode, filled: TreeNode) -> TreeNode:
-        """Return what was filled in, or `BROKEN` after a finding if all of it together has become too large."""
+        """Return what was filled in, or `BROKEN` after a finding if everything filled in is too large together."""
         if self.left >= 0:
             self.left -= size(filled) - size(scalar)
             if self.left >= 0:
@@ -227,7 +227,7 @@ class _Filler:
         return replace(scalar, filled=BROKEN)
 
     def piece(self, scalar: ScalarNode, piece: re.Match[str]) -> object:
-        """Return the value of one `${...}`, None for what stays as it is, `BROKEN` after a finding."""
+        """Return the value of one `${...}`, None if it stays as it is, `BROKEN` after a finding."""
         body, name = piece["body"], piece["name"]
         if body is None and name:
             return None if self.runs else self.running_name(scalar, piece)
@@ -331,7 +331,7 @@ class _Filler:
 
 @dataclass(frozen=True, slots=True)
 class _FromEnvironment:
-    """Text that nothing is known of: it counts as if it had been written in the manifest without quotes."""
+    """Text of unknown type: it is treated as if it were written in the manifest without quotes."""
 
     text: str
 

@@ -1,4 +1,4 @@
-"""What `${...}` may name, and how the check and the evaluation of an expression see it."""
+"""The names that `${...}` may use, and how the check and the evaluation of an expression see them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rbxcompose.units import Quantity
 
 
 class Typed(NamedTuple):
-    """A type and a value of it; `given` is where another than the author of the default wrote that."""
+    """A type and a value of it; `given` is the place where it was given, None for a default."""
 
     type: Type
     value: object
@@ -26,9 +26,9 @@ class Typed(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """What `${...}` may name: a type and a typed value by dotted name, the environment and the secrets.
+    """The names that `${...}` may use: a type and a typed value by dotted name, the environment and the secrets.
 
-    `arguments` are those of each scope: of the robot (the empty one), and of each instance of a part.
+    `arguments` holds those of each scope: of the robot (the empty scope), and of each instance of a part.
     """
 
     values: Mapping[str, Typed] = field(default_factory=dict)
@@ -47,7 +47,7 @@ def names_of(robot: str, sim: bool, environment: Mapping[str, str], secrets: Sec
 
 
 def with_arguments(names: Names, arguments: Mapping[str, Typed], scope: str = "") -> Names:
-    """Return `names` with `args.NAME` for each argument of a scope; the value of a broken one is `BROKEN`."""
+    """Return `names` with `args.NAME` for each argument of a scope; a broken argument has the value `BROKEN`."""
     known = {f"args.{name}": value for name, value in arguments.items()}
     return replace(names, arguments={**names.arguments, scope: known})
 

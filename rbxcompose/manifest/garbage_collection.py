@@ -1,4 +1,4 @@
-"""Python's garbage collector held off while a tree is built: it would walk the growing tree again and again."""
+"""Pausing Python's garbage collector while a tree is built: it would traverse the growing tree again and again."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def paused_collection() -> Iterator[None]:
-    """Build what has no cycles in about half the time; the collector is as before at the end."""
+    """Pause the collector while data without cycles is built, in about half the time; restore it at the end."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:

@@ -9,23 +9,23 @@ from rbxcompose.findings import Finding, Related, Span
 
 
 class GivenSpan(Span):
-    """The place of a value that was given to an argument; `uses` are where that stands, the outermost first.
+    """The place of a value that was given to an argument; `uses` are the places where it is used, outermost first.
 
-    It is equal to the plain place of the value.
+    It equals the plain place of the value.
     """
 
     uses: tuple[Span, ...] = ()
 
 
 def given_span(given: Span, use: Span) -> GivenSpan:
-    """Return the place `given` for what is filled in at `use`; the former may be one that was handed on itself."""
+    """Return the place `given` with `use`, where it is filled in; `given` may already have been passed on itself."""
     made = GivenSpan(*given)
     made.uses = (*(given.uses if isinstance(given, GivenSpan) else ()), use)
     return made
 
 
 def told_where_given(finding: Finding) -> Finding:
-    """Return a finding with plain places; one about a given value also tells where that is used."""
+    """Return a finding with plain places; if it is about a given value, it also shows where that value is used."""
     related = [one for other in finding.related for one in _plain(other)]
     if not isinstance(finding.span, GivenSpan):
         return finding if related == list(finding.related) else replace(finding, related=_once(related))

@@ -8,7 +8,7 @@ from rbxcompose.config import Config, Name
 
 
 class ManifestHeader(Config):
-    """The keys that every manifest begins with."""
+    """The keys at the start of every manifest."""
 
     rbx: Literal[1]
     """Version of the language."""

@@ -1,13 +1,13 @@
-"""How large a manifest may be: anything above is a finding before it costs time or memory."""
+"""How large a manifest may be: anything larger is reported before it costs time or memory."""
 
 FILE_BYTES = 2_000_000
 URDF_BYTES = 4_000_000
 ALL_BYTES = 8_000_000  # sum over the files of one robot
 FILES = 500
-INSTANCES = 500  # of parts; each instance counts its file's text towards `ALL_BYTES`
+INSTANCES = 500  # of parts; each counts the text of its file towards `ALL_BYTES`
 INCLUDE_DEPTH = 16
-PROFILES_BYTES = 2_400_000  # of text that is compiled again to try the profiles of a robot, each with all its files
-PROFILE_BYTES = 48_000  # what a profile counts at least
+PROFILES_BYTES = 2_400_000  # of text compiled again to try the profiles of a robot, each with all its files
+PROFILE_BYTES = 48_000  # the least that a profile counts
 SECRET = 64_000  # bytes of a secret's file
 NODES = 40_000  # values per file
 URDF_ELEMENTS = 200_000

@@ -1,4 +1,4 @@
-"""Values that are handed to missions as a whole: their data and inputs."""
+"""Values passed to missions as a whole: their data and inputs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 
 
 def is_moderate(section: TreeNode | None, what: str, report: Report) -> bool:
-    """Return whether each entry of a section holds no more than a mission takes, after a finding for each that does."""
+    """Return whether every entry of a section is small enough for a mission, after a finding for each that is not."""
     entries = section.entries.values() if isinstance(section, MappingNode) else ()
     large = [entry for entry in entries if is_larger(entry.value, DATA_NODES)]
     for entry in large:

@@ -52,7 +52,7 @@ _DASHES = re.compile(r" *+(- ++)*")
 
 
 class Trouble:
-    """An error, where it is, and the lines of the text; lines and columns count from 0, spans from 1."""
+    """An error with its position and the lines of the text; lines and columns count from 0, those of spans from 1."""
 
     def __init__(self, error: yaml.MarkedYAMLError, text: str, file: str) -> None:
         self.problem = error.problem or ""
@@ -81,12 +81,12 @@ class Trouble:
 
     @property
     def opening(self) -> Span:
-        """The place where what the parser was reading began."""
+        """The place where the construct began that the parser was reading."""
         return self.span(self.start.line, self.start.column, self.start.column + 1) if self.start else self.here
 
     @property
     def value_column(self) -> int:
-        """Where the value begins, behind whose key the error stands; 0 if it stands behind none."""
+        """The column of the value that contains the error, after its key; 0 if no key precedes the error."""
         key = _BEHIND_KEY.match(self.before)
         return key.end() if key and key.end() < len(self.before) else 0
 
@@ -96,7 +96,7 @@ class Trouble:
         return self.before.rstrip().endswith(("'", '"'))
 
     def span(self, line: int, start: int, end: int) -> Span:
-        """Return the place of some columns of a line."""
+        """Return the place of a range of columns in a line."""
         return Span(self.file, line + 1, start + 1, line + 1, end + 1)
 
     def to_line_end(self, column: int) -> Span:
@@ -104,15 +104,15 @@ class Trouble:
         return self.span(self.line, column, max(len(self.line_text.rstrip()), column + 1))
 
     def above(self, line: int) -> Iterator[int]:
-        """Yield the lines above one that hold something, the nearest first."""
+        """Yield the non-empty lines above a line, nearest first."""
         return (one for one in range(line - 1, -1, -1) if is_written(self.lines[one]))
 
     def next_line(self, line: int) -> str:
-        """Return the next line that holds something, empty if there is none."""
+        """Return the next non-empty line, empty if there is none."""
         return next((one for one in self.lines[line + 1 :] if is_written(one)), "")
 
     def quoting(self, span: Span) -> Fix | None:
-        """Return the fix that puts quotes around a text that goes to the end of its line, if that is all of it."""
+        """Return the fix that quotes a text ending its line, None if it may continue or its quotes are ambiguous."""
         written = self.line_text[span.column - 1 : span.end_column - 1]
         meant = written
         if written[:1] == written[-1:] == "'":
@@ -122,7 +122,7 @@ class Trouble:
         is_simple = '"' not in meant and "\\" not in meant
         quoted = f'"{meant}"' if is_simple else "'" + meant.replace("'", "''") + "'"
         below = next((line for line in self.lines[self.line + 1 :] if line.strip()), "")
-        goes_on = indent(below) > indent(self.line_text)  # so that the next line may belong to the same text
+        goes_on = indent(below) > indent(self.line_text)  # then the next line may belong to the same text
         return replacement(span, written, quoted) if written and " #" not in written and not goes_on else None
 
 
@@ -132,11 +132,11 @@ def indent(line: str) -> int:
 
 
 def behind_dashes(line: str) -> int:
-    """Return the column in which a line begins behind its dashes."""
+    """Return the column in which a line begins after its dashes."""
     found = _DASHES.match(line)
     return found.end() if found else 0
 
 
 def is_written(line: str) -> bool:
-    """Return whether a line holds more than a comment."""
+    """Return whether a line contains more than a comment."""
     return bool(line.strip()) and not line.lstrip().startswith("#")

@@ -50,9 +50,9 @@ INDENT = "  "  # of one level
 
 
 class Texts(dict[str, str]):
-    """The texts of the files that were read, by the names that findings show.
+    """The texts of the files that were read, by the names used in findings.
 
-    `unsaved` are texts that an editor holds: each stands in the place of that of its file.
+    `unsaved` are texts in an editor: each replaces that of its file.
     """
 
     def __init__(self, unsaved: Mapping[Path, str]) -> None:
@@ -69,9 +69,9 @@ def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> tupl
 def read_source(
     path: Path, shown: str, sources: MutableMapping[str, str], most: int = FILE_BYTES, what: str = "a manifest"
 ) -> tuple[str | None, list[Finding]]:
-    """Read the text of one file and enter it into `sources`; None with what keeps it from being text.
+    """Read the text of one file and enter it into `sources`; return None with findings if it is not text.
 
-    `most` is the limit [B] of a file of this kind, `what` the kind in words.
+    `most` is the limit [B] for a file of this kind, `what` names the kind.
     """
     data = _bytes(path, shown, sources, most, what)
     if isinstance(data, Finding):
@@ -112,7 +112,7 @@ def _saved(path: Path, shown: str, most: int) -> bytes | Finding:
 
 
 def _decode(data: bytes, file: str) -> tuple[str, list[Finding]]:
-    """Return the text with newlines only, and what keeps it from being one."""
+    """Return the text with newlines only, and the findings if it is not UTF-8."""
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n"), []
     except UnicodeDecodeError as error:
@@ -149,7 +149,7 @@ def read_text(text: str | bytes, file: str) -> tuple[TreeNode | None, list[Findi
 
 
 def _trouble_in_characters(text: str, file: str) -> Iterator[Finding]:
-    """Find what must not reach the parser: it would stop there with a byte position, or pass it."""
+    """Find characters that must not reach the parser, which would stop at a byte position or let them pass."""
     if found := FORBIDDEN.search(text):
         message = f"a manifest may not contain the character {code_point(found.group())}"
         yield CHARACTER.at(_character_span(text, found.start(), file), message, help="remove it")
@@ -166,11 +166,11 @@ def _trouble_in_characters(text: str, file: str) -> Iterator[Finding]:
             span = Span(file, number, 1, number, len(line) + 1)
             yield NOT_YAML.at(span, "a manifest has no lines that start with '%'", help="remove this line")
         if line.strip() and not line.lstrip().startswith("#"):
-            return  # directives stand before everything else
+            return  # directives precede everything else
 
 
 def _spaces_for_tabs(text: str, file: str) -> Fix | None:
-    """Return the fix for a text that is indented by tabs alone; beside spaces nobody knows how wide a tab was meant."""
+    """Return the fix for a text indented by tabs only; mixed with spaces, the intended width of a tab is unknown."""
     indents = [line[: len(line) - len(line.lstrip(" \t"))] for line in text.split("\n")]
     if not any(indents) or " " in "".join(indents):
         return None

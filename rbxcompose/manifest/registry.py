@@ -26,7 +26,7 @@ _SECTIONS: dict[str, Section[Any, Any]] = {}
 def _decorator(
     declaration: Callable[P, Declaration[M]],
 ) -> Callable[P, Callable[[Callable[[Reading[M]], R]], Section[M, R]]]:
-    """Return the decorator that takes what `declaration` takes."""
+    """Return a decorator with the parameters of `declaration`."""
 
     def section(*args: P.args, **keywords: P.kwargs) -> Callable[[Callable[[Reading[M]], R]], Section[M, R]]:
         return lambda read: _declared(declaration(*args, **keywords), read)
@@ -54,10 +54,10 @@ def _declared(declaration: Declaration[M], read: Callable[[Reading[M]], R]) -> S
 
 
 def register(made: Section[Any, Any]) -> None:
-    """Enter a section under its name.
+    """Register a section under its name.
 
     Raises:
-        ValueError: if another one has it.
+        ValueError: if another section has this name.
     """
     other = _SECTIONS.get(made.name)
     if other is not None and other.read.__module__ != made.read.__module__:
@@ -76,7 +76,7 @@ def sections(kind: str = "") -> list[Section[Any, Any]]:
 
 
 def section_named(name: object) -> Section[Any, Any] | None:
-    """Return the section of a name, or None."""
+    """Return the section of this name, or None."""
     _problems()
     return _SECTIONS.get(str(name))
 
@@ -87,7 +87,7 @@ def naming(kind: str) -> Iterator[Section[Any, Any]]:
 
 
 def broken_sections() -> list[Finding]:
-    """Return what to tell of sections of other packages that are left out."""
+    """Return a finding for each section of another package that is left out."""
     return [LEFT_OUT.at(None, told) for told in _problems()]
 
 

@@ -1,4 +1,4 @@
-"""What a section may ask of the renaming of a part that brings it."""
+"""What a section can request when the names of a part are changed for an instance of it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rbxcompose.manifest.tree import TreeNode
 
 @dataclass(frozen=True, slots=True)
 class RenamedTopic:
-    """Another name for a topic of a part, and where it is written."""
+    """The new name of a topic of a part, and where it is written."""
 
     name: str
     span: Span
@@ -24,7 +24,7 @@ class Renames(Protocol):
 
     @property
     def prefix(self) -> str:
-        """Return what comes in front of its names."""
+        """Return the prefix of its names."""
         ...
 
     @property
@@ -33,21 +33,21 @@ class Renames(Protocol):
         ...
 
     def component(self, name: str) -> str:
-        """Return what the name of something that runs becomes; `component.port` keeps its port."""
+        """Return the new name of something that runs; `component.port` keeps its port."""
         ...
 
     def topic(self, topic: str) -> str:
-        """Return what a topic becomes."""
+        """Return the new name of a topic."""
         ...
 
     def written(self, topic: str) -> RenamedTopic:
-        """Return what gives a topic its other name: itself, or the topic that it stands below."""
+        """Return the entry that renames a topic: its own, or that of a topic above it."""
         ...
 
     def topics(self, node: TreeNode, above: str = "") -> TreeNode:
-        """Return a map whose keys are topics (below `above`, if given) with these changed."""
+        """Return a map whose keys are topics (below `above`, if given) with these keys renamed."""
         ...
 
     def texts(self, node: TreeNode, change: Callable[[str], str]) -> TreeNode:
-        """Return a node with every text below it changed, but for those that are filled in later."""
+        """Return a node with every text below it changed, except those that are filled in later."""
         ...

@@ -39,7 +39,7 @@ def plain_value(scalar: ScalarNode) -> PlainValue:
 
 
 def number_trouble(scalar: ScalarNode) -> str:
-    """Return why the number that a scalar writes cannot be taken, in words after "this number"; else nothing."""
+    """Return why the number in a scalar is rejected, worded to follow "this number"; empty if it is not."""
     if scalar.text[:1] not in _MAY_BE_NUMBER or not scalar.plain:
         return ""
     form = _number_form(scalar.text)
@@ -47,7 +47,7 @@ def number_trouble(scalar: ScalarNode) -> str:
 
 
 def _number_form(text: str) -> str:
-    """Return how a text writes a number (a group of `_NUMBER`), or nothing if it writes none."""
+    """Return the form of a number in a text (a group of `_NUMBER`), empty if it is not a number."""
     match = _NUMBER.fullmatch(text)
     return match.lastgroup or "" if match else ""
 
@@ -61,7 +61,7 @@ def _trouble(text: str, form: str) -> str:
 
 
 def describe(value: object) -> str:
-    """Return what a plain value is, in words: "this is text"."""
+    """Return a description of a plain value: "this is text"."""
     match value:
         case None:
             return "this is empty"

@@ -1,4 +1,4 @@
-"""Secrets: text that a manifest names and never holds, `${secret.NAME}`."""
+"""Secrets: text that a manifest refers to but never contains, `${secret.NAME}`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ VARIABLE = "RBX_SECRET_"
 
 
 class NoSecretError(Exception):
-    """Raised when a secret cannot be had; `help` says what to do."""
+    """Raised when a secret is not available; `help` says what to do."""
 
     def __init__(self, message: str, help: str) -> None:
         super().__init__(message)
@@ -28,7 +28,7 @@ class NoSecretError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Secrets:
-    """Where secrets are: the environment (`RBX_SECRET_NAME`), else the files `secrets/NAME` of a project."""
+    """The sources of secrets: the environment (`RBX_SECRET_NAME`), else the files `secrets/NAME` of a project."""
 
     project: Path
     environment: Mapping[str, str]
@@ -37,7 +37,7 @@ class Secrets:
         """Return a secret.
 
         Raises:
-            NoSecretError: if it is not there, or others could read it.
+            NoSecretError: if it does not exist, or others could read it.
         """
         value = self.environment.get(f"{VARIABLE}{name.upper()}")
         return Secret(value if value is not None else self._read(name), name)

@@ -1,7 +1,7 @@
-"""What is known of a section of the manifest, and what is read from it.
+"""What is known about a section of the manifest, and what is read from it.
 
-Composition, renaming of parts, editors, schemas, the reference and the robot's components ask the descriptor, so that
-none of them knows a section by name.
+Composition, renaming of parts, editors, schemas, the reference and the robot's components use this descriptor, so that
+none of them refers to a section by name.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def _entry_type(model: Any, short: Short) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Declaration(Generic[M]):
-    """What a section says of itself; `M` is the model of an entry, or of the whole section if its keys are fixed."""
+    """How a section is declared; `M` is the model of an entry, or of the whole section if its keys are fixed."""
 
     name: str
     model: type[M]
@@ -123,17 +123,17 @@ class Declaration(Generic[M]):
 
     @property
     def is_map(self) -> bool:
-        """Return whether its keys are names that the user gives."""
+        """Return whether its keys are names chosen by the user."""
         return bool(self.names) and not self.at
 
     def types_of(self, entry: TreeNode) -> Iterable[Any]:
-        """Return the types that tell what stands in an entry."""
+        """Return the types that describe an entry."""
         if isinstance(entry, ScalarNode):
             return (self.short_type,)
         return self.models(entry) if self.models else (self.model,)
 
     def has_names_of(self, kind: str) -> bool:
-        """Return whether its keys are names of a kind; what runs is a component as well."""
+        """Return whether its keys are names of a kind; everything that runs is a component, too."""
         return kind == self.names or (kind == COMPONENT and self.runs)
 
     def is_shared(self, path: KeyPath) -> bool:
@@ -146,23 +146,23 @@ class Declaration(Generic[M]):
 
     @property
     def entry_type(self) -> Any:
-        """Return what an entry may be: the model, or the word that stands for it."""
+        """Return the type of an entry: the model, or the word that abbreviates it."""
         model: Any = self.model
         return _entry_type(model, self.short) if self.short and not self.short.only_over else model
 
     @property
     def short_type(self) -> Any:
-        """Return what the word is that stands for an entry."""
+        """Return the type of the word that abbreviates an entry."""
         model: Any = self.model
         return _short_type(model, self.short.key) if self.short else str
 
     @property
     def type(self) -> Any:
-        """Return what stands below its name."""
+        """Return the type of the section's contents."""
         return GenericAlias(dict, (Name, self.entry_type)) if self.is_map else self.model
 
     def with_references(self, node: TreeNode, change: Callable[[str, TreeNode], TreeNode]) -> TreeNode:
-        """Return what stands below its name with `change(kind, value)` in the place of each name of something."""
+        """Return the section's contents with each name of something replaced by `change(kind, value)`."""
         if not self.is_map or not isinstance(node, MappingNode):
             return with_references(node, self.type, change)
         entries = {}
@@ -174,14 +174,14 @@ class Declaration(Generic[M]):
         return replace(node, entries=entries)
 
     def names_in(self, root: MappingNode) -> Iterable[str]:
-        """Return the names that a tree gives in this section."""
+        """Return the names that a tree defines in this section."""
         named = at(root, (self.name, *self.at)) if self.names else None
         return named.entries if isinstance(named, MappingNode) else ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section(Declaration[M], Generic[M, R]):
-    """A section of the manifest; `R` is what is read from it."""
+    """A section of the manifest; `R` is the type of what is read from it."""
 
     doc: str
     """What it is for: shown by editors and the reference."""
@@ -190,7 +190,7 @@ class Section(Declaration[M], Generic[M, R]):
     read: Callable[[Reading[M]], R]
 
     def described(self, contents: Contents) -> Mapping[str, str]:
-        """Return the names of what was read, each with a few words; none of a section that composition reads."""
+        """Return the names that were read, each with a few words; none for a section that composition reads."""
         if not self.is_composed:
             return {}
         read = contents.of(self)
@@ -198,7 +198,7 @@ class Section(Declaration[M], Generic[M, R]):
 
 
 class Contents:
-    """What the sections of a filled tree say: each is read when it is first asked for."""
+    """The contents of the sections of a filled tree: each is read when it is first requested."""
 
     def __init__(
         self, root: MappingNode, file: Path, documents: Documents, sections: Iterable[Section[Any, Any]] = ()
@@ -208,20 +208,20 @@ class Contents:
         self._read: dict[str, object] = {}
 
     def of(self, section: Section[Any, R]) -> R:
-        """Return what a section says; mistakes go into the report of the documents."""
+        """Return the contents of a section; mistakes are added to the report of the documents."""
         if section.name not in self._read:
             self._read[section.name] = section.read(Reading(section, self))
         return cast(R, self._read[section.name])
 
     @cached_property
     def known(self) -> dict[str, Mapping[str, object]]:
-        """Return the names of each kind, also those of entries with mistakes: what refers to them is not wrong."""
+        """Return the names of each kind, including entries with mistakes: references to them are not wrong."""
         kinds = {COMPONENT, *(one.names for one in self._naming)}
         return {kind: _Names(self, [one for one in self._naming if one.has_names_of(kind)]) for kind in kinds}
 
 
 class _Names(Mapping[str, object]):
-    """The names of a kind; what one stands for is read when it is asked for."""
+    """The names of a kind; what a name means is read on request."""
 
     def __init__(self, contents: Contents, sections: Iterable[Section[Any, Any]]) -> None:
         self._contents = contents
@@ -250,12 +250,12 @@ class Reading(Generic[M]):
 
     @property
     def report(self) -> Report:
-        """Return what takes the findings."""
+        """Return the report for the findings."""
         return self.contents.documents.report
 
     @property
     def node(self) -> TreeNode | None:
-        """Return what stands below the section's name; None if there is nothing."""
+        """Return the section's contents; None if there are none."""
         node = self.contents.root.get(self.section.name)
         return None if node is None or is_empty(node) else node
 
@@ -268,7 +268,7 @@ class Reading(Generic[M]):
         return named_entries(self.contents.root, (self.section.name, *self.section.at), self.report)
 
     def valid(self, model: type[T], name: str, node: TreeNode) -> T | None:
-        """Return an entry as `model`, or None after its findings."""
+        """Return an entry as an instance of `model`, None after its findings."""
         path = (self.section.name, *self.section.at, name)
         return validate(model, node, path, self.report, self.contents.known)
 
@@ -278,14 +278,14 @@ class Reading(Generic[M]):
         return {name: read for name, read in found if read is not None}
 
     def whole(self) -> M | None:
-        """Return a section of fixed keys; None if it is missing or has mistakes."""
+        """Return a section with fixed keys; None if it is missing or has mistakes."""
         if self.node is None:
             return None
         return validate(self.section.model, self.node, (self.section.name,), self.report, self.contents.known)
 
 
 def is_empty(node: TreeNode) -> bool:
-    """Return whether there is nothing behind the name of a section."""
+    """Return whether a section has no contents."""
     return isinstance(node, ScalarNode) and node.plain and not node.text
 
 

@@ -1,4 +1,4 @@
-"""What a model takes at a place below it: keys, quantities, names of something."""
+"""What a model accepts at a place below it: keys, quantities, names of something."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rbxcompose.units import Dimension
 
 @cache
 def field_types(model: type[BaseModel]) -> dict[str, Any]:
-    """Return the types of a model's fields by key, with all that they are annotated with."""
+    """Return the types of a model's fields by key, with their annotations."""
     return {
         field.alias or name: Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
         for name, field in model.model_fields.items()
@@ -30,24 +30,24 @@ def keys_at(model: Any, path: KeyPath) -> list[str]:
 
 
 def dimension_at(model: Any, path: KeyPath) -> Dimension | None:
-    """Return what the quantity at `path` below `model` measures, None if it is no quantity."""
+    """Return the dimension of the quantity at `path` below `model`, None if it is not a quantity."""
     marks = (mark for one in _types_at(model, path) for mark in alternatives(one))
     return next((mark.dimension for mark in marks if isinstance(mark, Dimensioned)), None)
 
 
 def kinds_of(hint: Any) -> Iterator[str]:
-    """Yield of what a value of a type is the name itself; those in a list or map are not meant."""
+    """Yield the kinds of things that a value of this type names itself, not through the items of a list or map."""
     return (one.kind for one in alternatives(hint) if isinstance(one, Refers))
 
 
 def kind_of_keys(model: Any, path: KeyPath) -> str:
-    """Return of what the keys of the map at `path` below `model` are names, or nothing."""
+    """Return the kind of things that the keys of the map at `path` below `model` name, or nothing."""
     maps = (shape for one in _types_at(model, path) for shape in alternatives(one) if get_origin(shape) is dict)
     return next((kind for one in maps for kind in kinds_of(get_args(one)[0])), "")
 
 
 def below(hint: Any, key: str | int) -> Iterator[Any]:
-    """Yield the types that may stand under a key or index of a value of a type."""
+    """Yield the types possible below a key or index of a value of this type."""
     for one in alternatives(hint):
         if isinstance(one, type) and issubclass(one, BaseModel):
             if key in field_types(one):
@@ -59,7 +59,7 @@ def below(hint: Any, key: str | int) -> Iterator[Any]:
 
 
 def with_references(node: TreeNode, hint: Any, change: Callable[[str, TreeNode], TreeNode]) -> TreeNode:
-    """Return a node with `change(kind, value)` in the place of each value that is a name of a kind by its type."""
+    """Return a node with `change(kind, value)` in place of each value that, by its type, is a name of a kind."""
     for kind in kinds_of(hint):
         node = change(kind, node)
     match node:

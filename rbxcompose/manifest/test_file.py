@@ -71,7 +71,7 @@ class SentModel(Config):
 
 
 class EventModel(Config):
-    """Something that happens to the robot; events of one instant happen in the order of the text."""
+    """Something that happens to the robot; simultaneous events happen in the order of the text."""
 
     at: Time = Field(ge=0)
     """When, counted from the start of the test."""

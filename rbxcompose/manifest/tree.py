@@ -1,4 +1,4 @@
-"""The located tree: YAML as plain nodes that know their place, before any meaning is given to them."""
+"""The located tree: YAML as plain nodes that know their place, before they are given any meaning."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from rbxcompose.findings import Span
 
-NODE_BYTES = 40  # that a node counts beside its text
+NODE_BYTES = 40  # counted for a node in addition to its text
 BROKEN = object()
 """What `Scalar.filled` holds of a value of which all was said: filling it in has failed, or it was a slip."""
 
@@ -19,9 +19,9 @@ KeyPath = tuple[Key, ...]  # from the root of a file: ("components", "base", "ma
 class ScalarNode:
     """One word, number or text as written.
 
-    `plain` tells whether it stands without quotes, so that YAML 1.2's core types apply. `filled` is the typed value
-    of a scalar that was nothing but `${...}` (a `Quantity`, number, text or flag), else None. `scope` is the instance
-    of a part whose file wrote it (`arm.hand`), so that `${args...}` means that part's arguments; empty in other files.
+    `plain` means that it is not quoted, so that YAML 1.2's core types apply. `filled` is the typed value of a scalar
+    that was nothing but `${...}` (a `Quantity`, number, text or flag), else None. `scope` is the instance of a part
+    whose file contains it (`arm.hand`), so that `${args...}` means that part's arguments; it is empty in other files.
     """
 
     text: str
@@ -72,7 +72,7 @@ TreeNode = ScalarNode | SequenceNode | MappingNode
 
 
 def children(node: TreeNode) -> Iterator[tuple[Key, TreeNode]]:
-    """Yield what stands directly below a node, with its key or index."""
+    """Yield the nodes directly below a node, with their keys or indices."""
     match node:
         case MappingNode(entries=entries):
             for name, entry in entries.items():
@@ -84,7 +84,7 @@ def children(node: TreeNode) -> Iterator[tuple[Key, TreeNode]]:
 
 
 def with_children(node: TreeNode, change: Callable[[Key, TreeNode], TreeNode]) -> TreeNode:
-    """Return a node with what `change` makes of each node directly below it; the same one if nothing changes."""
+    """Return a node with `change` applied to each node directly below it; the same node if nothing changes."""
     changed = {key: new for key, below in children(node) if (new := change(key, below)) is not below}
     match node:
         case MappingNode(entries=entries) if changed:
@@ -96,7 +96,7 @@ def with_children(node: TreeNode, change: Callable[[Key, TreeNode], TreeNode]) -
 
 
 def size(node: TreeNode) -> int:
-    """Return about how large a tree is [bytes]: its texts, and something for each node."""
+    """Return the approximate size of a tree [bytes]: its texts, and a fixed amount for each node."""
     total, waiting = 0, [node]
     while waiting:
         now = waiting.pop()
@@ -106,7 +106,7 @@ def size(node: TreeNode) -> int:
 
 
 def is_larger(node: TreeNode, most: int) -> bool:
-    """Return whether a tree has more than `most` nodes below its root; it is not looked at any further."""
+    """Return whether a tree has more than `most` nodes below its root; counting stops there."""
     count, waiting = 0, [node]
     while waiting and count <= most:
         below = [child for _, child in children(waiting.pop())]
@@ -130,7 +130,7 @@ def at(node: TreeNode, path: KeyPath) -> TreeNode | None:
 
 
 def key_span(node: TreeNode, path: KeyPath) -> Span:
-    """Return the place of the key at `path`; of the nearest place above it, where there is no key."""
+    """Return the place of the key at `path`, or of the nearest place above it if there is no key."""
     for length in range(len(path), 0, -1):
         above = at(node, path[: length - 1])
         if isinstance(above, MappingNode) and str(path[length - 1]) in above.entries:
@@ -141,7 +141,7 @@ def key_span(node: TreeNode, path: KeyPath) -> Span:
 
 
 def value_span(node: TreeNode, path: KeyPath) -> Span:
-    """Return the place of the value at `path`; of the nearest node above it, where there is none."""
+    """Return the place of the value at `path`, or of the nearest node above it if there is none."""
     for length in range(len(path), -1, -1):
         if (found := at(node, path[:length])) is not None:
             return found.span

@@ -1,4 +1,4 @@
-"""The text of a URDF file, read strictly: whether it is XML, and a robot's. What its elements mean is not looked at."""
+"""The text of a URDF file, read strictly: whether it is XML and describes a robot. Its elements are not interpreted."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ Good:
 
 ROOT = "robot"
 XACRO = "xacro:"
-_ENCODINGS = {"utf-8", "us-ascii", "ascii"}  # what text in UTF-8 may call itself
+_ENCODINGS = {"utf-8", "us-ascii", "ascii"}  # names for UTF-8 in a declaration
 _WORDS = {
     expat.errors.XML_ERROR_NO_ELEMENTS: "there is no element in this file",
     expat.errors.XML_ERROR_UNCLOSED_TOKEN: "the file ends before this does",
@@ -69,9 +69,9 @@ _SHOWN = 60  # characters of a name in a message
 
 
 def mistake_in_urdf(text: str, file: str) -> Finding | None:
-    """Return what keeps a text from being the URDF of a robot, the first thing if there are several, else None.
+    """Return the first mistake that keeps a text from being the URDF of a robot, or None.
 
-    `file` is the name by which findings show it.
+    `file` is its name in findings.
     """
     try:
         _Reader(file).read(text)
@@ -81,7 +81,7 @@ def mistake_in_urdf(text: str, file: str) -> Finding | None:
 
 
 class _RefusedError(Exception):
-    """Ends the parser, from within its callbacks too."""
+    """Stops the parser, even from within its callbacks."""
 
     def __init__(self, finding: Finding) -> None:
         super().__init__(finding.message)
@@ -89,7 +89,7 @@ class _RefusedError(Exception):
 
 
 class _Element(NamedTuple):
-    """An element that is not closed yet, and where its tag begins: both count from 1."""
+    """An element that is still open, and where its tag begins: both count from 1."""
 
     name: str
     line: int
@@ -97,7 +97,7 @@ class _Element(NamedTuple):
 
 
 class _Reader:
-    """Follows a parser, which makes no tree: only the elements that are open are kept."""
+    """Drives a parser that builds no tree: only the open elements are kept."""
 
     def __init__(self, file: str) -> None:
         self.file = file
@@ -164,7 +164,7 @@ class _Reader:
         return self._here(f"<{name}")
 
     def _here(self, text: str) -> Span:
-        """Return the place of a text at which the parser is."""
+        """Return the parser's current place in the text."""
         line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
         return Span(self.file, line, column, line, column + len(text))
 

@@ -1,4 +1,4 @@
-"""A located tree against a model: what pydantic objects to, at its place and in plain words."""
+"""Validation of a located tree against a model: pydantic's errors, at their places and in plain words."""
 
 from __future__ import annotations
 
@@ -153,8 +153,8 @@ T = TypeVar("T")
 KEYS = "keys that it takes"
 ENTRY_WORDS: dict[str, str] = {}
 """What an entry of a section is called: each section that is declared enters its own."""
-_MOST_FINDINGS = 100  # of one part: nobody writes more by mistake, and each costs a search for the nearest name
-_ROUNDS = 8  # of repairs; each one goes at least one level deeper into a value
+_MOST_FINDINGS = 100  # of one part: nobody makes more by mistake, and each costs a search for the nearest name
+_ROUNDS = 8  # of repairs; each round goes at least one level deeper into a value
 
 
 def to_plain(node: TreeNode) -> object:
@@ -176,7 +176,7 @@ def _adapter(model: Any) -> TypeAdapter[Any]:
 
 
 def is_valid(model: Any, data: object) -> bool:
-    """Return whether plain data are what `model` takes, without words on why not."""
+    """Return whether `model` accepts plain data, without reasons."""
     try:
         _adapter(model).validate_python(data, strict=True)
     except ValidationError:
@@ -195,9 +195,9 @@ def validate(
 ) -> T | None:
     """Return the node as an instance of `model` (any type that pydantic knows), or None after its findings.
 
-    Nothing is converted: text is no number, and `yes` no flag; only a text field takes a number as it is written.
-    `path` tells where `node` stands in its file, for the wording; `context` is what the model's validators need;
-    `also` are keys that stand beside the model's own, which an unknown key may be a misspelling of.
+    Nothing is converted: text is not a number, and `yes` is not a flag; only a text field accepts a number, as it is
+    written. `path` is the path of `node` in its file, for the wording; `context` is what the model's validators need;
+    `also` are keys allowed beside the model's own, which an unknown key may be a misspelling of.
     """
     data = to_plain(node)
     for _ in range(_ROUNDS):
@@ -217,7 +217,7 @@ def validate(
 def _findings(
     model: Any, node: TreeNode, path: KeyPath, errors: list[ErrorDetails], also: tuple[str, ...]
 ) -> Iterator[Finding]:
-    """Turn pydantic's errors into findings: one for each place, none for what was said before."""
+    """Turn pydantic's errors into findings: one for each place, none for what was reported before."""
     located = [(_locate(node, error), error) for error in errors]
     lacking = {loc for loc, error in located if error["type"] == "missing"}
     said: set[KeyPath] = set()
@@ -225,7 +225,7 @@ def _findings(
         if error["type"] == "extra_forbidden":
             known = [*keys_at(model, loc[:-1]), *(() if len(loc) > 1 else also)]
             finding, meant = _unknown_key(known, node, path, loc, lacking)
-            said |= {loc, (*loc[:-1], meant)}  # what is misspelt is not missing as well
+            said |= {loc, (*loc[:-1], meant)}  # a misspelt key is not missing as well
             yield finding
     for loc, error in located:
         if loc not in said and not is_broken(at(node, loc)):
@@ -234,7 +234,7 @@ def _findings(
 
 
 def _locate(node: TreeNode, error: ErrorDetails) -> KeyPath:
-    """Return the place of an error in the tree; pydantic's own steps, such as members of a union, are left out."""
+    """Return the place of an error in the tree, without pydantic's own steps, such as members of a union."""
     found: KeyPath = ()
     for step in error["loc"]:
         if at(node, (*found, step)) is not None:
@@ -245,7 +245,7 @@ def _locate(node: TreeNode, error: ErrorDetails) -> KeyPath:
 
 
 def where(path: KeyPath) -> str:
-    """Return how a map at `path` is called: "component 'gui'", "'inputs.teleop' of mux 'cmd_vel'"."""
+    """Return the name of a map at `path`: "component 'gui'", "'inputs.teleop' of mux 'cmd_vel'"."""
     match path:
         case ():
             return "this file"
@@ -259,7 +259,7 @@ def where(path: KeyPath) -> str:
 def _unknown_key(
     known: Iterable[str], node: TreeNode, path: KeyPath, loc: KeyPath, lacking: set[KeyPath]
 ) -> tuple[Finding, str]:
-    """Return the finding for an unknown key, and the missing key that it is a misspelling of, if any."""
+    """Return the finding for an unknown key, and the missing key that it misspells, if any."""
     key = str(loc[-1])
     missing = [str(place[-1]) for place in lacking if place[:-1] == loc[:-1]]
     meant = get_close_matches(key, missing, n=1, cutoff=SIMILAR)
@@ -303,16 +303,16 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
             return OUT_OF_RANGE.at(span, f"'{name}' must be {words} {bound}")
         case kind_of_error if kind_of_error in _EXPECTED:
             return WRONG_TYPE.at(span, f"'{name}' must be {_EXPECTED[kind_of_error]}", label=label_of(value))
-    if "valid" in context:  # a validator of ours, which tells what there is
+    if "valid" in context:  # a validator of ours that supplies the valid names
         message = f"'{name}': {error['msg']}"
         return NOT_A_CHOICE.misspelt(span, message, context["name"], context["valid"], context["what"])
-    if "help" in context:  # or brings its own words
+    if "help" in context:  # or its own help
         return NOT_A_CHOICE.at(span, f"'{name}': {error['msg']}", help=str(context["help"]))
     return WRONG_TYPE.at(span, f"'{name}': {error['msg'][:1].lower()}{error['msg'][1:]}", label=label_of(value))
 
 
 def not_a_choice(span: Span, name: str, value: TreeNode | None, choices: list[str]) -> Finding:
-    """Return the finding for a value that is none of the few words that its key takes."""
+    """Return the finding for a value that is not one of the few words that its key accepts."""
     written = str(value.text if value.filled is None else value.filled) if isinstance(value, ScalarNode) else ""
     if len(choices) == 1:
         label = "" if written else label_of(value)
@@ -320,17 +320,17 @@ def not_a_choice(span: Span, name: str, value: TreeNode | None, choices: list[st
         return NOT_A_CHOICE.at(span, f"'{name}' must be '{choices[0]}'", label=label, fix=fix)
     finding = NOT_A_CHOICE.misspelt(span, f"'{name}' must be one of {', '.join(choices)}", written, choices)
     is_near = finding.help.startswith("did you mean")
-    return finding if is_near else replace(finding, help="")  # the message lists all there are
+    return finding if is_near else replace(finding, help="")  # the message lists all of them
 
 
 def _called(path: KeyPath) -> str:
-    """Return how a value is called: by its key, or by its list and number."""
+    """Return the name of a value: its key, or its list and index."""
     *above, last = path or ("this file",)
     return f"{above[-1]}[{last}]" if isinstance(last, int) and above else str(last)
 
 
 def is_broken(node: TreeNode | None) -> bool:
-    """Return whether a value could not be filled in, or is no number that can be taken, which was said."""
+    """Return whether a value could not be filled in or is a rejected number, both of which were reported."""
     return isinstance(node, ScalarNode) and (
         node.filled is BROKEN or (node.filled is None and bool(number_trouble(node)))
     )
@@ -344,15 +344,15 @@ def label_of(node: TreeNode | None) -> str:
 
 
 def unit_finding(error: UnitError, node: TreeNode, name: str) -> Finding:
-    """Return the finding for a value that is not the quantity that it should be."""
-    # What does not even look like a number needs no lesson on numbers.
+    """Return the finding for a value that is not the required quantity."""
+    # If it does not even look like a number, help about numbers is no use.
     is_word = isinstance(node, ScalarNode) and node.filled is None and node.text[:1] not in "+-.0123456789"
     label = label_of(node) if is_word or not error.detail else error.detail
     return WRONG_TYPE.at(node.span, f"'{name}' {error.message}", label=label, help="" if is_word else error.help)
 
 
 def _slip(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: ErrorDetails) -> Finding | None:
-    """Return the finding about a slip, if the model has nothing against what it stands for."""
+    """Return the finding about a slip, if the model accepts what was probably meant."""
     refused_at = loc[:-1] if error["type"] == "missing" else loc
     written = at(node, refused_at)
     if written is None:
@@ -369,7 +369,7 @@ def _with(data: object, path: KeyPath, value: object) -> object:
 
 
 def _takes(model: Any, data: object, loc: KeyPath) -> bool:
-    """Return whether a model has nothing against what stands at `loc`."""
+    """Return whether a model accepts the value at `loc`."""
     try:
         _adapter(model).validate_python(data)
     except ValidationError as error:

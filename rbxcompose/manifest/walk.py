@@ -1,6 +1,6 @@
-"""PyYAML's node tree -> the located tree, with what YAML allows and a manifest does not as findings.
+"""PyYAML's node tree -> the located tree, with findings for what YAML allows and a manifest does not.
 
-The tree is at most `DEPTH` levels deep, aliases included, so that everything behind it may recurse.
+The tree is at most `DEPTH` levels deep, aliases included, so that all later code may recurse.
 """
 
 from __future__ import annotations
@@ -154,22 +154,22 @@ def span_of(node: yaml.Node, file: str) -> Span:
 
 
 class Walk:
-    """One walk over a composed document; `findings` holds what it came upon."""
+    """One walk over a composed document; the findings are in `findings`."""
 
     def __init__(self, text: str, file: str) -> None:
         self.text = text
         self.file = file
         lines = enumerate(text.split("\n"), 1) if "#" in text else ()
         self.commented = {number: line for number, line in lines if " #" in line}
-        self.may_repeat = "&" in text  # without an anchor there is no alias, and nothing to keep in mind
+        self.may_repeat = "&" in text  # without an anchor there are no aliases, so nothing has to be remembered
         self.may_tag = "!" in text
         self.findings: list[Finding] = []
         self._done: dict[int, tuple[TreeNode, int, int]] = {}  # by id: the node, how many nodes it has, how deep it is
-        self._open: set[int] = set()  # ids of the nodes that are being walked, from the root to here
+        self._open: set[int] = set()  # ids of the nodes being walked, from the root to the current one
         self._alias_nodes = 0
 
     def add(self, finding: Finding) -> None:
-        """Keep a finding, unless there are too many to be read."""
+        """Add a finding, unless there are too many to read."""
         if len(self.findings) < _MOST_FINDINGS:
             self.findings.append(finding)
 
@@ -188,7 +188,7 @@ class Walk:
         self._open.add(id(node))
         done = self._read(node)
         self._open.remove(id(node))
-        if self._first_character(node) in ("&", "!"):  # only what has an anchor is visited again
+        if self._first_character(node) in ("&", "!"):  # only a node with an anchor is visited again
             self._done[id(node)] = done
         return done
 
@@ -208,7 +208,7 @@ class Walk:
         return MappingNode({}, span_of(node, self.file)), 1, 1
 
     def _refuse_alias(self, node: yaml.Node, message: str) -> None:
-        if not any(finding.code == ALIAS.code for finding in self.findings):  # one bomb makes thousands of them
+        if not any(finding.code == ALIAS.code for finding in self.findings):  # a single bomb makes thousands of them
             place, anchor = self._alias_places(node)
             self.add(ALIAS.at(place, message, related=[Related(anchor, "what it repeats is marked here")]))
 
@@ -275,7 +275,7 @@ class Walk:
             self.add(HASH.at(place, "this is a comment, not part of the value", help=help_text))
 
     def _check_cut(self, items: list[yaml.Node]) -> None:
-        """Find text with brackets that a comma inside `{}` or `[]` has cut in two."""
+        """Find text with brackets that is cut in two by a comma inside `{}` or `[]`."""
         for item, following in pairwise(items):
             if isinstance(item, yaml.ScalarNode) and not item.style and item.value.count("(") > item.value.count(")"):
                 start, end = span_of(item, self.file), span_of(following, self.file)
@@ -348,7 +348,7 @@ class Walk:
             self.add(TWICE.at(entry.key.span, message, label="the second", related=related))
 
     def _merge(self, merged: dict[str, Entry], value: TreeNode, node: yaml.Node, span: Span) -> None:
-        """Take over the entries of the map or maps that `<<` names; the earlier one wins."""
+        """Add the entries of the map or maps that `<<` names; the earlier one wins."""
         sources = value.items if isinstance(value, SequenceNode) else (value,)
         for source in sources:
             if not isinstance(source, MappingNode):

@@ -1,4 +1,4 @@
-"""What sections become: the components that they ask for."""
+"""The components that sections request."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rbxcompose.manifest.tree import KeyPath
 
 @dataclass(frozen=True, slots=True)
 class WantedComponent:
-    """A component that a section asks for; `path` is where the manifest does so."""
+    """A component that a section requests; `path` is the place in the manifest that does so."""
 
     name: str
     type_name: str
@@ -24,8 +24,8 @@ class WantedComponent:
 
 
 class Wiring(Protocol):
-    """The wires of the components that there are so far."""
+    """The wires of the components known so far."""
 
     def message_of(self, topic: str) -> str:
-        """Return the type of who listens to a topic, else of who publishes below it; empty if nobody does."""
+        """Return the type of a subscriber of a topic, else of a publisher below it; empty if there is none."""
         ...

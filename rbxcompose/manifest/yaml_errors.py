@@ -1,4 +1,4 @@
-"""What the YAML parser objects to, said in plain words with the fix."""
+"""The YAML parser's errors, in plain words and with the fix."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _CLOSES = {"sequence": ("list", "[", "]"), "mapping": ("map", "{", "}")}
 
 
 def explain(error: yaml.YAMLError, text: str, file: str) -> Finding:
-    """Return the one finding for an error of the parser in `text`: that of a slip, or what the parser means."""
+    """Return the one finding for a parser error in `text`: that of a slip, or what the parser means."""
     if not isinstance(error, yaml.MarkedYAMLError):
         return NOT_YAML.at(Span(file, 1, 1, 1, 2), "this file cannot be read as YAML")
     trouble = Trouble(error, text, file)
@@ -117,7 +117,7 @@ def _anchor_twice(trouble: Trouble) -> Finding:
 
 
 def _plainly(message: str, help_text: str = "") -> Callable[[Trouble], Finding]:
-    """Return what answers with the same words wherever it is."""
+    """Return an explainer that gives the same words wherever the error is."""
     return lambda trouble: NOT_YAML.at(trouble.here, message, help=help_text)
 
 

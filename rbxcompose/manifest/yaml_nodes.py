@@ -1,4 +1,4 @@
-"""YAML text -> PyYAML's node tree, by its C parser, with limits that hold while the tree is being made."""
+"""YAML text -> PyYAML's node tree, by its C parser, with limits enforced while the tree is being built."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ serial: "10000000000000000000000000000000000000000000"
 
 
 class _LimitError(Exception):
-    """Raised inside the parser to end it; carries the place and the words."""
+    """Raised inside the parser to stop it; carries the place and the message."""
 
     def __init__(self, mark: Any, message: str) -> None:
         super().__init__(message)
@@ -42,7 +42,7 @@ class _LimitError(Exception):
 
 
 class _LimitedLoader(yaml.CSafeLoader):
-    """Composes without resolving tags, and counts nodes and depth where the C code calls back for each node."""
+    """Composes without resolving tags; counts nodes and depth in the callbacks that the C code makes for each node."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -64,7 +64,7 @@ class _LimitedLoader(yaml.CSafeLoader):
         self.depth -= 1
 
     def resolve(self, kind: Any, value: Any, implicit: Any) -> str:
-        return ""  # a tag that is written does not come through here
+        return ""  # an explicit tag does not come through here
 
 
 def compose(text: str, file: str) -> tuple[yaml.Node | None, Finding | None]:

@@ -1,1 +1,1 @@
-"""The whole robot as one typed value: what the checks look at and the plan is made from."""
+"""The whole robot as one typed value: the subject of the checks and the source of the plan."""

@@ -15,13 +15,13 @@ from rbxcompose.missions.language.asked import Asked
 from rbxcompose.model.charge import batteries, constants
 from rbxcompose.model.robot import Robot, RobotMission
 
-FULL = Bounds(0.0, 1.0)  # what the level of a battery can be
+FULL = Bounds(0.0, 1.0)  # possible levels of a battery
 
 
 def decided(robot: Robot, mission: RobotMission) -> Iterator[tuple[Asked, bool]]:
-    """Yield the conditions about the running robot that always hold, or never do.
+    """Yield the conditions on the running robot that always hold, or never do.
 
-    One that only compares what was written down is left out: it chooses between settings.
+    A condition that only compares written values is left out: it chooses between settings.
     """
     measured = {*robot.values, POSE}
     known = {name: Bounds(value, value) for name, value in constants(mission).items() if isinstance(value, float)}
@@ -43,7 +43,7 @@ def _conditions(robot: Robot, mission: RobotMission) -> Iterator[tuple[Asked, No
 
 
 def blamed(robot: Robot, mission: RobotMission, asked: Asked) -> tuple[Span, list[Related]]:
-    """Return the place that makes a condition what it is: the one input that it reads, else the condition itself."""
+    """Return the place that decides a condition: the one input that it reads, else the condition itself."""
     inputs = {name.name for name in asked.expression.names} & mission.program.inputs.keys()
     if len(inputs) != 1:
         return asked.scalar.span, []

@@ -1,6 +1,6 @@
 """From the manifest to the robot: sections become components, ports become ends of wires, actions become skills.
 
-What does not fit together is left out here; the checks say it.
+Parts that do not fit together are left out here; the checks report them.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type
 
 MISSION = "mission"
-ALWAYS = ("transforms", "diagnostics")  # what every robot runs
+ALWAYS = ("transforms", "diagnostics")  # the components of every robot
 
 
 def build_robot(
     manifest: RobotManifest, *, environment: Mapping[str, str], report: Report, sources: dict[str, str]
 ) -> Robot:
-    """Return the whole robot; what is wrong with its mission files goes into `report`."""
+    """Return the whole robot; errors in its mission files go into `report`."""
     written = written_components(manifest)
     components = {**written, **own_components(manifest, written)}
     values, topics, services = (
@@ -50,7 +50,7 @@ def build_robot(
 
 
 def written_components(manifest: RobotManifest) -> dict[str, RobotComponent]:
-    """Return the components that the sections ask for, wired: first those that users name, then what sections bring."""
+    """Return the wired components that the sections request: first those named by users, then those of sections."""
     wires = _Wires(manifest.bus.namespace or "")
     given = _given_topics(manifest.contents)
     for section in sorted(sections(ROBOT), key=lambda one: not one.names):
@@ -70,13 +70,13 @@ def _given_topics(contents: Contents) -> dict[str, dict[str, str]]:
 
 @dataclass(frozen=True, slots=True)
 class _Wires:
-    """The wires of the components that there are so far."""
+    """The wires of the components known so far."""
 
     namespace: str
     components: dict[str, RobotComponent] = field(default_factory=dict)
 
     def message_of(self, topic: str) -> str:
-        """Return the type of who listens to a topic, else of who publishes below it; empty if nobody does."""
+        """Return the type of a subscriber of a topic, else of a publisher below it; empty if there is none."""
         name = resolve(topic, self.namespace)
         ends = [end for component in self.components.values() for end in component.ends]
         sources = [end for end in ends if isinstance(end.port, Out) and end.topic.startswith(f"{name}/")]
@@ -84,7 +84,7 @@ class _Wires:
 
 
 def own_components(manifest: RobotManifest, written: Mapping[str, RobotComponent]) -> dict[str, RobotComponent]:
-    """Return the components that every robot runs, but for the one that runs missions."""
+    """Return the components that every robot runs, except the one that runs missions."""
     names = [*written, *ALWAYS, *([MISSION] if manifest.missions else [])]
     analyzers = {name: one.model_dump(exclude_none=True) for name, one in manifest.diagnostics.analyzers.items()}
     return {
@@ -112,12 +112,12 @@ def mission_component(robot: Robot) -> RobotComponent:
 
 
 def _own(manifest: RobotManifest, type_name: str, config: Mapping[str, object]) -> RobotComponent:
-    """Return a component that is named like its type and stands where the manifest has the section of that name."""
+    """Return a component named after its type, placed at the manifest section of that name."""
     return _component(manifest, WantedComponent(type_name, type_name, config, (type_name,)), {})
 
 
 def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[str, str]) -> RobotComponent:
-    """Return a component that is wanted as a component; `given` are topics of its ports that others give."""
+    """Return the component that was requested; `given` are topics that others assign to its ports."""
     cls, options = component_type(wanted.type_name), wanted.options
     config = wanted.config if isinstance(wanted.config, Config) else cls.config_type()(**wanted.config)
     ends = ends_of(wanted.name, cls, config, manifest.bus.namespace or "", {**options.connect, **given})
@@ -140,7 +140,7 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
 
 
 def values_of(manifest: RobotManifest, components: Mapping[str, RobotComponent]) -> dict[str, ValueSource]:
-    """Return the values whose source is there."""
+    """Return the values whose source exists."""
     ends = [end for component in components.values() for end in component.ends]
     namespace, groups = manifest.bus.namespace or "", tuple(manifest.diagnostics.analyzers)
     found = {name: value_of(entry, components, ends, namespace, groups) for name, entry in manifest.values.items()}

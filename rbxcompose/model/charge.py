@@ -28,7 +28,7 @@ class ChargeInterrupt:
 
 
 def constants(mission: RobotMission) -> Constants:
-    """Return what the `$names` of a mission stand for on this robot, where that never changes."""
+    """Return the values of those `$names` of a mission that never change on this robot."""
     return constants_of(mission.program, mission.inputs)
 
 
@@ -53,13 +53,13 @@ def calls(robot: Robot, mission: RobotMission) -> Iterator[ChargeInterrupt]:
 
 
 def charger_of(robot: Robot, skill: str) -> tuple[RobotComponent, Charges] | None:
-    """Return the component that a skill charges at, if it is such a skill."""
+    """Return the component at which a skill charges, None if it does not charge."""
     found = (one for one in robot.declared(Charges) if _is_served(robot, skill, one[0], one[1].goals))
     return next(found, None)
 
 
 def navigator_of(robot: Robot, skill: str) -> tuple[RobotComponent, Navigates] | None:
-    """Return the component that drives to places as this skill, if it is such a skill."""
+    """Return the component that drives to places as this skill, None if it does not drive."""
     found = (one for one in robot.declared(Navigates) if _is_served(robot, skill, one[0], one[1].goals))
     return next(found, None)
 
@@ -70,14 +70,14 @@ def _is_served(robot: Robot, skill: str, component: RobotComponent, port: str) -
 
 
 def top_speed(robot: Robot, driver: RobotComponent, navigates: Navigates) -> float:
-    """Return how fast the robot drives to a place at most [m/s], infinite if nobody says."""
+    """Return the highest speed at which the robot drives to a place [m/s], infinite if no limit is known."""
     limits = [navigates.max_speed, *(one.max_speed for one in driver.declared(CommandsMotion))]
     limits += [one.drives.max_speed for one in MessageFlow(robot).drives() if one.driver is driver]
     return min((limit.value for limit in limits if limit), default=math.inf)
 
 
 def ways_of(robot: Robot, mission: RobotMission) -> Ways | None:
-    """Return an empty account of the mission's ways; None if it drives by several skills."""
+    """Return an empty record of the mission's ways; None if it drives with several skills."""
     used = {node.skill for node in mission.program.nodes if node.skill}
     found = [(skill, *one) for skill in sorted(used) if (one := navigator_of(robot, skill))]
     if not found:

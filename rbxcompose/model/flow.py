@@ -12,7 +12,7 @@ from rbxcompose.model.wires import PortEnd
 from rbxcompose.sdk.capabilities import CommandsMotion, Drives, Forwards
 from rbxcompose.sdk.ports import In
 
-OTHER_TYPE = "take another type for one of them"  # the remedy where no setting can be changed
+OTHER_TYPE = "take another type for one of them"  # the remedy if no setting can be changed
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +27,12 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class MessageFlow:
-    """Which messages of a robot reach whom."""
+    """Which messages of a robot reach which component."""
 
     robot: Robot
 
     def sources(self, end: PortEnd, passed: tuple[PortEnd, ...] = ()) -> Iterator[PortEnd]:
-        """Yield the outputs whose messages reach an input; of a mux, those that it may let through."""
+        """Yield the outputs whose messages reach an input; for a mux, those it may let through."""
         for writer in self.robot.writers.get(end.topic, ()):
             if writer in passed or writer.type_name != end.type_name:
                 continue
@@ -43,18 +43,18 @@ class MessageFlow:
                 yield from self.sources(one, (*passed, writer))
 
     def _let_through(self, output: PortEnd) -> list[PortEnd] | None:
-        """Return the inputs that a mux lets through to an output; None if it is no output of a mux."""
+        """Return the inputs that a mux lets through to an output; None if it is not an output of a mux."""
         component = self.robot.components[output.instance]
         muxed = [one.inputs for one in component.declared(Forwards) if one.output == output.name]
         return [end for end in component.ends if any(end.name in names for names in muxed)] if muxed else None
 
     def fed_by(self, component: RobotComponent, port: str) -> Iterator[PortEnd]:
-        """Yield the outputs whose messages reach an input of a component, through muxes."""
+        """Yield the outputs whose messages reach an input of a component, directly or through muxes."""
         end = component.end(port)
         yield from self.sources(end) if end else ()
 
     def drives(self) -> Iterator[Drive]:
-        """Yield who commands which base, also through muxes."""
+        """Yield which component commands which base, directly or through muxes."""
         for base, drives in self.robot.declared(Drives):
             for source in self.fed_by(base, drives.commands):
                 driver = self.robot.components[source.instance]
@@ -64,21 +64,21 @@ class MessageFlow:
 
 
 def period_of(component: RobotComponent) -> float | None:
-    """Return the time between two messages of a component [s], if it sends at its own rate only."""
+    """Return the time between two messages of a component [s], None if it does not send at its own rate only."""
     listens = any(isinstance(end.port, In) for end in component.ends)
     return None if listens or component.cls.rate <= 0 else 1 / component.cls.rate
 
 
 def setting(component: RobotComponent, name: str) -> float | None:
-    """Return a number of a component's configuration, in SI; None if its type has none of this name."""
+    """Return a number from a component's configuration, in SI; None if its type has no such setting."""
     value = getattr(component.config, name, None)
     return value if isinstance(value, float) else None
 
 
 def setting_span(robot: Robot, *settings: tuple[RobotComponent, str]) -> Span:
-    """Return the place of the first of these settings that is written down, else that of the first one's component.
+    """Return the place of the first of these settings that is written, else that of the first one's component.
 
-    A setting is the name of a field of the configuration; without one the value is that of the component's type.
+    A setting is the name of a field of the configuration; without one, the value comes from the component's type.
     """
     for component, name in settings:
         if is_written(robot, component, name):

@@ -16,7 +16,7 @@ from rbxcompose.model.robot import RobotMission
 
 @dataclass(frozen=True, slots=True)
 class ReadMissions:
-    """The missions that could be read, and the names of those that others cannot `use`: unread, or in a circle."""
+    """The missions that could be read, and the names of those that others cannot `use`: unread, or in a cycle."""
 
     read: Mapping[str, RobotMission] = field(default_factory=dict)
     unread: frozenset[str] = frozenset()
@@ -31,7 +31,7 @@ def read_missions(
 ) -> ReadMissions:
     """Read the robot's mission files; one with mistakes is kept as far as it could be read.
 
-    `skills` are the names of all skills that there are.
+    `skills` are the names of all existing skills.
     """
     found: dict[str, RobotMission] = {}
     for name, entry in manifest.missions.items():

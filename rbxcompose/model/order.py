@@ -1,4 +1,4 @@
-"""Start order: what starts after what, and whether that can be kept."""
+"""Start order: what starts after what, and whether that can be satisfied."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ After = Mapping[str, Sequence[str]]  # name -> the names that start before it
 
 
 def cycle_of(after: After) -> list[str]:
-    """Return names each of which waits for the next one, the last for the first; empty if there is no such circle."""
+    """Return names each of which waits for the next, the last for the first; empty if there is no such cycle."""
     try:
         TopologicalSorter(after).prepare()
     except CycleError as error:
-        circle: list[str] = error.args[1][:0:-1]  # the sorter tells who comes first, and the first one twice
+        circle: list[str] = error.args[1][:0:-1]  # the sorter lists predecessors first, and repeats the first
         first = circle.index(min(circle))
         return circle[first:] + circle[:first]
     return []
 
 
 def start_order(after: After) -> list[str]:
-    """Return all names so that each comes after those that it waits for, else in the order given.
+    """Return all names so that each comes after those it waits for, otherwise in the given order.
 
-    There must be no circle.
+    There must be no cycle.
     """
     ordered: dict[str, None] = {}
 

@@ -28,7 +28,7 @@ K = TypeVar("K", bound=Capability)
 
 @dataclass(frozen=True, slots=True)
 class RobotComponent:
-    """Everything that runs under one name in `ps`; `path` is where the manifest asks for it, empty if nowhere."""
+    """Everything that runs under one name in `ps`; `path` is where the manifest requests it, empty if nowhere."""
 
     name: str
     type_name: str
@@ -39,7 +39,7 @@ class RobotComponent:
     ends: tuple[PortEnd, ...]
     path: KeyPath = ()
     restart: Restart = DEFAULT
-    log: Level = Level.OK  # the least of what goes to the log
+    log: Level = Level.OK  # the lowest level that is logged
     capabilities: tuple[Capability, ...] = ()
 
     def end(self, port: str) -> PortEnd | None:
@@ -62,20 +62,20 @@ class RobotMission:
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """What the checks look at; components stand in the order of the manifest."""
+    """The subject of the checks; components are in the order of the manifest."""
 
     manifest: RobotManifest
     components: Mapping[str, RobotComponent]
     values: Mapping[str, ValueSource]
     skills: Mapping[str, SkillSource]
     missions: Mapping[str, RobotMission]
-    unread: frozenset[str] = frozenset()  # missions that no other can use: not read, or in a circle
-    topics: Mapping[str, TopicSource] = field(default_factory=dict)  # on which missions may publish
+    unread: frozenset[str] = frozenset()  # missions that no other can use: unread, or in a cycle
+    topics: Mapping[str, TopicSource] = field(default_factory=dict)  # that missions may publish on
     services: Mapping[str, str] = field(default_factory=dict)  # that missions may call, with their ROS types
 
     @cached_property
     def names(self) -> RobotNames:
-        """Return what the robot gives to its missions."""
+        """Return the names that the robot gives to its missions."""
         return RobotNames(
             values={name: self.values[name].type if name in self.values else UNKNOWN for name in self.manifest.values},
             places=self.manifest.places,
@@ -90,17 +90,17 @@ class Robot:
 
     @cached_property
     def written(self) -> frozenset[str]:
-        """Return the names of all components that sections of the manifest ask for, also of those with mistakes."""
+        """Return the names of all components that sections of the manifest request, including those with mistakes."""
         return frozenset(name for one in naming(COMPONENT) for name in one.names_in(self.manifest.root))
 
     @cached_property
     def writers(self) -> Mapping[str, list[PortEnd]]:
-        """Return who publishes, by topic."""
+        """Return the publishers by topic."""
         return _by_topic(end for end in self.ends if isinstance(end.port, Out))
 
     @cached_property
     def readers(self) -> Mapping[str, list[PortEnd]]:
-        """Return who subscribes, by topic."""
+        """Return the subscribers by topic."""
         return _by_topic(end for end in self.ends if isinstance(end.port, In))
 
     @property
@@ -131,7 +131,7 @@ class Robot:
         return key_span(self.manifest.root, self.components[name].path)
 
     def entry_span(self, name: str) -> Span:
-        """Return the place of the robot's own entry that brings a component: its own, or what includes it."""
+        """Return the place of the robot's entry that brings a component: its own, or the one that includes it."""
         brought = (one.span for one in self.manifest.parts.values() if name in one.components)
         return next(brought, None) or self.component_span(name)
 

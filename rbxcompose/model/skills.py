@@ -1,4 +1,4 @@
-"""What missions may ask of the robot: skills, topics to publish on, services to call."""
+"""What missions can use of the robot: skills, topics to publish on, services to call."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _topics(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
 
 
 def _orders(components: Mapping[str, RobotComponent], end: PortEnd, port: ServesTopic[Any]) -> Orders:
-    """Return who carries orders out, and where the ports stand that belong to them."""
+    """Return the components that carry out orders, and the topics of the ports for their ends and halts."""
     servers = [one for one in _ends(components) if isinstance(one.port, ServesTopic) and one.topic == end.topic]
     own = components[end.instance].ends
     return Orders(
@@ -90,12 +90,12 @@ def _beside(own: Iterable[PortEnd], port: In[Any] | Out[Any]) -> OrderTopic:
 
 
 def python_skills(names: Iterable[str]) -> list[SkillSource]:
-    """Return the skills in Python of these names, as far as they exist and can be used."""
+    """Return the skills in Python with these names, if they exist and can be used."""
     found = []
     for name in sorted(set(names) & set(skill_names())):
         try:
             found.append(SkillSource(as_skill(skill_type(name)), "", "", SkillWay.PYTHON))
-        except BrokenPluginError:  # a mission that uses it is told that nobody provides it
+        except BrokenPluginError:  # a mission that uses it gets a finding that nobody provides it
             continue
     return found
 
@@ -137,7 +137,7 @@ def _ends(components: Mapping[str, RobotComponent]) -> Iterable[PortEnd]:
 
 
 def _written(topic: str, manifest: RobotManifest) -> tuple[str, ...]:
-    """Return how missions may write a topic: absolute, or relative to the robot's namespace."""
+    """Return the ways to write a topic in missions: absolute, or relative to the robot's namespace."""
     namespace = (manifest.bus.namespace or "").strip("/")
     before = f"/{namespace}/" if namespace else "/"
     return (topic, topic.removeprefix(before)) if topic.startswith(before) else (topic,)

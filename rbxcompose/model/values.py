@@ -1,4 +1,4 @@
-"""Values: which field of which message a `$name` of the missions is, and what it measures."""
+"""Values: the field of a message that a `$name` of the missions refers to, and what it measures."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rbxcompose.sdk.ports import In, Out
 from rbxcompose.sections.values import ValueModel
 from rbxcompose.units import UNITS
 
-# The message that carries data from outside, where nobody in the robot says which it is.
+# The message for data from outside whose type nothing in the robot declares.
 STANDARD = {"text": "std_msgs/msg/String", "flag": "std_msgs/msg/Bool", "count": "std_msgs/msg/Int32"}
 NUMBER = "std_msgs/msg/Float32"
 DIAGNOSTICS = "diagnostics"  # the component whose groups have levels
@@ -30,9 +30,9 @@ def value_of(
     namespace: str,
     groups: Collection[str] = (),
 ) -> ValueSource | None:
-    """Return what a value is, or None if its source is not there (a check says so).
+    """Return what a value refers to, None if its source does not exist (a check reports that).
 
-    `groups` are those of the diagnostics, whose levels are values as well.
+    `groups` are the diagnostics groups, whose levels are values, too.
     """
     if entry.port is not None:
         component, _, port = entry.port.partition(".")
@@ -54,7 +54,7 @@ def _of_port(end: PortEnd, unit: str | None) -> ValueSource | None:
         return None
     fields = tuple(registry.message(end.type_name).FIELDS)
     if len(fields) != 1:
-        return None  # a whole message is no value
+        return None  # a whole message is not a value
     return _value(end.topic, end.type_name, fields[0], unit or port.unit, None)
 
 

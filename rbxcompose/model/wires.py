@@ -1,4 +1,4 @@
-"""Ends of wires: which topic, service or action each port of a component is connected to."""
+"""Ends of wires: the topic, service or action that each port of a component is connected to."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rbxcompose.sdk.ports import In, Out, Port
 
 @dataclass(frozen=True, slots=True)
 class PortEnd:
-    """A port of an instance and the absolute ROS name that it stands at; empty for a look-up."""
+    """A port of an instance, and its absolute ROS name; empty for a look-up."""
 
     instance: str
     name: str
@@ -36,7 +36,7 @@ def resolve(topic: str, namespace: str) -> str:
 def ends_of(
     instance: str, cls: type[Component[Any]], config: Config, namespace: str, connect: Mapping[str, str]
 ) -> tuple[PortEnd, ...]:
-    """Return the ends of an instance; `connect` gives ports another topic than their type does."""
+    """Return the ends of an instance; `connect` gives ports a topic other than that of their type."""
     return tuple(
         PortEnd(instance, name, port, resolve(connect.get(name, port.topic), namespace))
         for name, port in sorted(cls.ports(config).items())
@@ -44,10 +44,10 @@ def ends_of(
 
 
 def writers(ends: Iterable[PortEnd], topic: str) -> list[PortEnd]:
-    """Return who publishes on a topic."""
+    """Return the publishers of a topic."""
     return [end for end in ends if isinstance(end.port, Out) and end.topic == topic]
 
 
 def readers(ends: Iterable[PortEnd], topic: str) -> list[PortEnd]:
-    """Return who subscribes to a topic."""
+    """Return the subscribers of a topic."""
     return [end for end in ends if isinstance(end.port, In) and end.topic == topic]

@@ -1,4 +1,4 @@
-"""Arrays of numbers in messages: read-only numpy arrays of one dimension.
+"""Arrays of numbers in messages: read-only one-dimensional numpy arrays.
 
 numpy is imported when the first such array is made, since most messages have none.
 """
@@ -32,7 +32,7 @@ def holds_numbers(type_: FieldType) -> bool:
 
 
 class ArrayMessage(Message):
-    """A message with arrays of numbers: it takes any sequence for them and keeps a read-only array.
+    """A message with arrays of numbers: it accepts any sequence for them and keeps a read-only array.
 
     Raises:
         ValueError: if an array does not have the length that its type states.
@@ -69,7 +69,7 @@ def _read_only(values: Any, dtype: str) -> NDArray[Any]:
     import numpy as np
 
     if isinstance(values, np.ndarray) and not values.flags.writeable and values.ndim == 1 and values.dtype == dtype:
-        return values  # whoever made it cannot change it either
+        return values  # not even its creator can change it
     array = np.array(values, dtype).reshape(-1)
     array.flags.writeable = False
     return array

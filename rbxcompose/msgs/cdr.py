@@ -1,8 +1,8 @@
 """CDR: messages as the bytes that ROS 2 sends, little-endian (XCDR1).
 
-Each number is aligned to its own size, counted from behind the four bytes of the header. The layout of a class is
-worked out once, at its first use: neighbouring numbers, also those of nested messages, become a single `struct`.
-Decoding believes nothing: it checks each count against the bytes that are there before it makes room.
+Each number is aligned to its own size, counted from the end of the four-byte header. The layout of a class is
+worked out once, at its first use: neighbouring numbers, including those of nested messages, become a single `struct`.
+Decoding trusts nothing: it checks each count against the available bytes before it allocates memory.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from rbxcompose.msgs.definitions import OCTETS, FieldShape, FieldType, attribute
 from rbxcompose.msgs.types import Message, declared
 
 HEADER = b"\x00\x01\x00\x00"  # little-endian CDR, no options
-MOST_ELEMENTS = 1_000_000  # in a sequence of strings or messages: in memory they are far larger than on the wire
-MOST_TRAILING = 3  # bytes that some writers add to fill the last word
+MOST_ELEMENTS = 1_000_000  # in a sequence of strings or messages, which take far more room in memory than on the wire
+MOST_TRAILING = 3  # padding bytes that some writers add to fill the last word
 
 _CODES = {
     "bool": "?",
@@ -42,11 +42,11 @@ M = TypeVar("M", bound=Message)
 
 
 class CdrError(ValueError):
-    """Raised when bytes are not the message they should be, or when a message holds what cannot be written."""
+    """Raised when bytes are not the expected message, or when a message has a value that cannot be written."""
 
 
 class CdrLengthError(CdrError):
-    """Raised when there are fewer or more bytes than the message takes."""
+    """Raised when there are fewer or more bytes than the message needs."""
 
 
 def encode(message: Message) -> bytes:
@@ -64,14 +64,14 @@ def encode(message: Message) -> bytes:
 
 
 def decode(message: type[M], payload: bytes | bytearray | memoryview) -> M:
-    """Return the message of that class that `payload` holds.
+    """Return the message of class `message` in `payload`.
 
     Raises:
         CdrError: if the payload is anything else, too short or too long.
     """
     data = bytes(payload)
     layout = _layout(message)
-    # What is nothing but numbers, as most of what comes often, takes two thirds of the time without the steps below.
+    # Messages of only numbers, as most frequent ones are, take two thirds of the time without the steps below.
     if layout.fixed is not None and len(data) == len(HEADER) + layout.fixed.size and data[:2] == HEADER[:2]:
         made: M = layout.build(layout.fixed.unpack_from(data, len(HEADER)))
         return made
@@ -90,9 +90,9 @@ def decode(message: type[M], payload: bytes | bytearray | memoryview) -> M:
 
 
 class _Codec(Protocol):
-    """Writes one value, and reads it to the end of a list."""
+    """Writes one value, and reads one, appending it to a list."""
 
-    least: int  # fewest bytes that a value takes
+    least: int  # minimum bytes of a value
 
     def write(self, value: Any, out: bytearray) -> None: ...
 
@@ -100,13 +100,13 @@ class _Codec(Protocol):
 
 
 class _Numbers:
-    """A row of single numbers, given and read as so many values: a `struct` for each alignment of its start."""
+    """A run of single numbers, each a value of its own: a `struct` for each alignment of its start."""
 
     def __init__(self, types: tuple[str, ...]) -> None:
         codes = [_CODES[type_] for type_ in types]
         self.least = sum(map(struct.calcsize, codes))
         self._structs = [struct.Struct(_aligned(codes, phase)) for phase in range(8)]
-        self.first = self._structs[0]  # where nothing stands before
+        self.first = self._structs[0]  # for a run at the start of the message
 
     def write(self, value: Any, out: bytearray) -> None:
         out += self._structs[(len(out) - len(HEADER)) & 7].pack(*value)
@@ -118,7 +118,7 @@ class _Numbers:
 
 
 class _Nothing:
-    """A message without fields: one byte that means nothing."""
+    """A message without fields: one byte without meaning."""
 
     least = 1
 
@@ -132,7 +132,7 @@ class _Nothing:
 
 
 class _Text:
-    """A string: its length with the final zero byte, then UTF-8."""
+    """A string: its length including the final zero byte, then UTF-8."""
 
     least = 4
 
@@ -158,11 +158,11 @@ class _Text:
 
 
 class _Many:
-    """What arrays and sequences share: a count where it is not fixed, checked both ways."""
+    """Base of arrays and sequences: a count unless it is fixed, checked when writing and reading."""
 
     def __init__(self, type_: FieldType, size: int = 1) -> None:
         self._type = type_
-        self._size = size  # fewest bytes of an element
+        self._size = size  # minimum bytes of an element
         self.least = type_.length * size if type_.shape is FieldShape.ARRAY else 4
 
     def _write_count(self, count: int, out: bytearray) -> None:
@@ -264,23 +264,23 @@ class _Elements(_Many):
 
 
 class _Layout:
-    """The codec of a class: steps over all values in it, nested ones included, and how to build it from them."""
+    """The codec of a class: steps over all its values, including nested ones, and how to build it from them."""
 
     def __init__(self, message: type[Message]) -> None:
         self._steps: list[tuple[Callable[[Any], Any], _Codec]] = []
-        self._numbers: list[tuple[str, str]] = []  # path and type of numbers that have no step yet
-        self._count = 0  # of values
-        self._names: dict[str, Any] = {}  # of what the written-out function uses
+        self._numbers: list[tuple[str, str]] = []  # path and type of the numbers without a step so far
+        self._count = 0  # number of values
+        self._names: dict[str, Any] = {}  # names that the generated function uses
         self._lines: list[str] = []
         made = self._add(message, "")
         self._end_numbers()
-        # Written out once, this takes a third of the time of walking over the classes for each message.
+        # A generated function takes a third of the time of walking over the classes for each message.
         body = "\n    ".join([*self._lines, f"return {made}"])
         exec(f"def build(v):\n    {body}", self._names)  # noqa: S102
         self.build: Callable[[Sequence[Any]], Any] = self._names["build"]
         self.least = sum(codec.least for _, codec in self._steps)
         only = self._steps[0][1] if len(self._steps) == 1 else None
-        self.fixed = only.first if isinstance(only, _Numbers) else None  # of a message that is nothing but numbers
+        self.fixed = only.first if isinstance(only, _Numbers) else None  # None unless the message has only numbers
 
     def write(self, value: Any, out: bytearray) -> None:
         for get, codec in self._steps:
@@ -303,14 +303,14 @@ class _Layout:
         return self._add_making(message, arguments)
 
     def _add_making(self, message: type[Message], arguments: list[str]) -> str:
-        """Add the lines that make one message and return the name that it has there."""
+        """Add the lines that make one message and return its name in them."""
         number = len(self._lines)
         made, maker = f"m{number}", f"c{number}"
         if issubclass(message, ArrayMessage):
             self._names[maker] = message
             self._lines.append(f"{made} = {maker}({', '.join(arguments)})")
             return made
-        # The setters of the slots, since the `__init__` of a frozen class takes twice as long.
+        # Use the setters of the slots, since the `__init__` of a frozen class takes twice as long.
         self._names[maker] = partial(object.__new__, message)
         self._lines.append(f"{made} = {maker}()")
         for at, (name, value) in enumerate(zip(message.FIELDS, arguments, strict=True)):
@@ -369,7 +369,7 @@ def _codec(type_: FieldType) -> _Codec:
 
 
 def _aligned(codes: list[str], phase: int) -> str:
-    """Return the format of these numbers for a start that is `phase` bytes behind a multiple of eight."""
+    """Return the format of these numbers for a start `phase` bytes after a multiple of eight."""
     format_, at = "<", phase
     for code in codes:
         size = struct.calcsize(code)

@@ -1,7 +1,7 @@
-"""Interface definitions: the ROS 2 text of a message, service or action as data, with the parts that ROS derives.
+"""Interface definitions: the ROS 2 text of a message, service or action as data, plus the parts that ROS derives.
 
-A service is made of two structures and an action of three, separated by `---`. ROS adds to them what goes over the
-wire beside them (the services and the message of an action, the event of a service); `parts` returns all of it.
+A service consists of two structures and an action of three, separated by `---`. ROS adds what else goes over the wire
+(the services and the feedback message of an action, the event of a service); `parts` returns all of it.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class FieldType:
     base: str
     shape: FieldShape = FieldShape.SINGLE
     length: int = 0  # of an array or bounded sequence
-    text_limit: int = 0  # most bytes of a string, 0: any number
+    text_limit: int = 0  # maximum bytes of a string, 0: any number
 
     @property
     def is_message(self) -> bool:
@@ -77,7 +77,7 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class FieldDefinition:
-    """A field of a structure; without a default of its own it starts at zero, empty or false."""
+    """A field of a structure; without a default of its own, it is zero, empty or false."""
 
     name: str
     type: FieldType
@@ -87,7 +87,7 @@ class FieldDefinition:
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """What CDR writes at once: a message, or one part of a service or an action."""
+    """A unit that CDR writes: a message, or one part of a service or an action."""
 
     name: str  # such as "geometry_msgs/msg/Twist" or "std_srvs/srv/SetBool_Request"
     fields: tuple[FieldDefinition, ...] = ()
@@ -96,7 +96,7 @@ class Structure:
 
 
 def attribute(field: str) -> str:
-    """Return the Python name of a field: the same, with an underscore after a keyword."""
+    """Return the Python name of a field: the same, with an underscore appended to a keyword."""
     return f"{field}_" if keyword.iskeyword(field) else field
 
 
@@ -196,7 +196,7 @@ def _value(type_: FieldType, text: str) -> Value:
 
 
 def parts(name: str, written: tuple[Structure, ...]) -> dict[str, Structure]:
-    """Return by name all structures of an interface: those that were `written`, and those that ROS derives."""
+    """Return all structures of an interface by name: the `written` ones, and those that ROS derives."""
     kind = name.split("/")[1]
     derived = {"msg": _no_more, "srv": _service, "action": _action}[kind](name)
     return {structure.name: structure for structure in (*written, *derived)}
@@ -245,11 +245,11 @@ def _of(structure: str, **types: str) -> Structure:
 
 
 def interface_names(kind: str, root: Path = INTERFACES) -> list[str]:
-    """Return the sorted names of all interfaces of a kind that have a text below `root`."""
+    """Return the sorted names of all interfaces of a kind whose text lies below `root`."""
     return sorted(f"{path.parts[-3]}/{kind}/{path.stem}" for path in root.glob(f"*/{kind}/*.{kind}"))
 
 
 def read(name: str, root: Path = INTERFACES) -> tuple[Structure, ...]:
-    """Read the structures that are written in the text of an interface."""
+    """Read the structures written in the text of an interface."""
     package, kind, bare = name.split("/")
     return parse(name, (root / package / kind / f"{bare}.{kind}").read_text(encoding="utf-8"))

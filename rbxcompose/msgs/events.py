@@ -1,4 +1,4 @@
-"""Events of services: the message in which ROS 2 tells of a request or a reply, on `SERVICE/_service_event`."""
+"""Events of services: the message in which ROS 2 reports a request or a reply, on `SERVICE/_service_event`."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from rbxcompose.msgs.hashes import type_hash
 from rbxcompose.msgs.service_msgs import ServiceEventInfo
 from rbxcompose.msgs.types import Fields, Message, Service
 
-TOPIC = "_service_event"  # ends the topic of a service's events
+TOPIC = "_service_event"  # suffix of the topic of a service's events
 
 
 def event_of(service: type[Service[Any, Any]]) -> type[Any]:
-    """Return the message with the fields `info`, `request` and `response`; of the last two, one holds one message."""
+    """Return the type with the fields `info`, `request` and `response`; one of the last two holds one message."""
     named: Any = service  # for mypy, classes of a generic are not hashable
     return _event_of(named)
 
@@ -46,7 +46,7 @@ def _event_of(service: Any) -> type[Any]:
 
 
 def _describe(name: str, fields: Fields, found: dict[str, Structure]) -> None:
-    """Enter a message and all that it is made of."""
+    """Add a message and all messages inside it to `found`."""
     found[name] = Structure(name, tuple(FieldDefinition(each, parse_type(text)) for each, text in fields.items()))
     for each in found[name].fields:
         if each.type.is_message and each.type.base not in found:

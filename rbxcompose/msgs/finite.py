@@ -1,4 +1,4 @@
-"""Whether all numbers of a message are finite, as those of a command must be."""
+"""Check that all numbers of a message are finite, as those of a command must be."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class NotFiniteError(ValueError):
 
 
 def is_finite(message: Message) -> bool:
-    """Return whether `message` holds neither NaN nor an infinity, however deep."""
+    """Return whether `message` contains neither NaN nor an infinity, at any depth."""
     tests = _tests.get(type(message))
     if tests is None:
         tests = _tests[type(message)] = _tests_of(type(message))
@@ -42,7 +42,7 @@ _tests: dict[type[Message], Tests] = {}
 
 
 def _tests_of(message: type[Message]) -> Tests:
-    """Return the values that must be looked at, and how; single numbers, also of nested messages, at once."""
+    """Return the values to check and their tests; all single numbers, even of nested messages, share one test."""
     singles: list[str] = []
     others: list[tuple[Get, Test]] = []
     _collect(message, "", singles, others)

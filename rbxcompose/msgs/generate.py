@@ -1,4 +1,4 @@
-"""Write the Python modules of all interfaces below `interfaces/`: `python -m rbxcompose.msgs.generate`."""
+"""Write the Python modules of all interfaces in `interfaces/`: `python -m rbxcompose.msgs.generate`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ARRAYS = "rbxcompose.msgs.arrays"
 
 
 def all_structures(root: Path = INTERFACES) -> dict[str, Structure]:
-    """Return by name every structure that the texts below `root` define."""
+    """Return every structure that the texts below `root` define, by name."""
     names = [name for kind in KINDS for name in interface_names(kind, root)]
     return {part: structure for name in names for part, structure in parts(name, read(name, root)).items()}
 
@@ -43,7 +43,7 @@ def modules(structures: Mapping[str, Structure]) -> dict[str, str]:
 
 
 class _Module:
-    """Writes the module of one package and keeps account of what it must import."""
+    """Writes the module of one package and tracks its imports."""
 
     def __init__(self, package: str, structures: Mapping[str, Structure]) -> None:
         self.package = package
@@ -56,7 +56,7 @@ class _Module:
         return "\n\n\n".join(["\n".join(self._head()), *classes]) + "\n"
 
     def _in_order(self) -> list[str]:
-        """Return the interfaces of the package so that each message comes after those it holds."""
+        """Return the interfaces of the package in an order in which each message follows those inside it."""
         names = sorted(
             name for name in self.structures if name.startswith(f"{self.package}/") and "_" not in _bare(name)
         )
@@ -88,7 +88,7 @@ class _Module:
     def _import_lines(self, *modules: str) -> Iterator[str]:
         for module in modules:
             if module in self.imports:
-                # Constants, then classes, then functions: as imports are sorted everywhere.
+                # Constants, then classes, then functions, as imports are sorted elsewhere.
                 names = sorted(self.imports[module], key=lambda name: (not name.isupper(), name[0].islower(), name))
                 yield f"from {module} import {', '.join(names)}"
 
@@ -183,7 +183,7 @@ class _Module:
         return f"tuple[{one}, ...]", f"({default},) * {type_.length}"
 
     def _python_single(self, type_: FieldType) -> tuple[str, str]:
-        """Return the annotation of one value and what is zero for it: of a message, what makes it."""
+        """Return the annotation of one value and its zero; for a message, a factory."""
         match type_.base:
             case "string":
                 return "str", '""'
@@ -196,7 +196,7 @@ class _Module:
         if package != self.package:
             self.packages.add(package)
             return f"{package}.{path}", f"{package}.{path}"
-        # A part of an action is used while the action's own class is still being made.
+        # A part of an action is used while the action's own class is still being created.
         return path, f"lambda: {path}()" if "." in path else path
 
     def _made_by(self, factory: str) -> str:
@@ -208,7 +208,7 @@ def _bare(name: str) -> str:
 
 
 def _python_path(name: str) -> str:
-    """Return where a structure is found in its module: `SetBool.Request` for `std_srvs/srv/SetBool_Request`."""
+    """Return the path of a structure in its module: `SetBool.Request` for `std_srvs/srv/SetBool_Request`."""
     return _bare(name).replace("_", ".")
 
 

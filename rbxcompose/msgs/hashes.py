@@ -1,4 +1,4 @@
-"""Type hashes: the RIHS01 value by which ROS 2 tells whether two sides mean the same by a name (REP 2016).
+"""Type hashes: the RIHS01 value that ROS 2 compares to check that two sides agree on a type (REP 2016).
 
 It is the SHA-256 of a JSON text that lists the fields of a structure and of all structures inside it.
 """
@@ -39,7 +39,7 @@ def type_hash(name: str, structures: Mapping[str, Structure]) -> str:
     """Return the hash of the structure `name`, `RIHS01_` and 64 hexadecimal digits.
 
     Raises:
-        KeyError: if `structures` lacks it or one that it holds.
+        KeyError: if `structures` lacks it or one inside it.
     """
     described = {used: _describe(structures[used]) for used in sorted(_uses(name, structures))}
     own = described.pop(name)

@@ -1,4 +1,4 @@
-"""Pure core: the text of an interface with those of all messages that it is made of, as ROS 2 and MCAP join them."""
+"""Pure core: the text of an interface with those of all messages inside it, joined as in ROS 2 and MCAP."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ _SEPARATOR = "=" * 80
 
 
 def parts(name: str, types_of: Callable[[str], Iterable[FieldType]]) -> list[str]:
-    """Return the names of the messages that an interface is made of, each once, what holds them first.
+    """Return the names of all messages inside an interface, each once, containers first.
 
-    `types_of` gives the types of the fields of an interface by its name.
+    `types_of` maps the name of an interface to the types of its fields.
     """
     found: dict[str, None] = {}
     left = [name]
@@ -25,7 +25,7 @@ def parts(name: str, types_of: Callable[[str], Iterable[FieldType]]) -> list[str
 
 
 def joined(name: str, made_of: Iterable[str], text_of: Callable[[str], str]) -> str:
-    """Return the text of an interface and, each below a line of `=`, those of the messages that it is made of."""
+    """Return the text of an interface and those of all messages inside it, each below a line of `=`."""
     texts = [f"{_SEPARATOR}\nMSG: {short(one)}\n{text_of(one)}" for one in made_of]
     return "".join([text_of(name), *texts])
 

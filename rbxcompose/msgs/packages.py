@@ -1,4 +1,4 @@
-"""Interface texts as others want them: one with all that it is made of, or a package for a ROS 2 workspace."""
+"""Interface texts for export: one with all messages inside it, or a package for a ROS 2 workspace."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ament_package()
 
 
 def all_names() -> list[str]:
-    """Return the names of all interfaces that have a text, sorted."""
+    """Return the sorted names of all interfaces that have a text."""
     return sorted(name for kind in KINDS for name in interface_names(kind))
 
 
@@ -48,17 +48,17 @@ def text_of(name: str) -> str:
 
 
 def parts_of(name: str) -> list[str]:
-    """Return the names of the messages that an interface is made of, each once, what holds them first."""
+    """Return the names of all messages inside an interface, each once, containers first."""
     return parts(name, lambda one: [field.type for structure in read(one) for field in structure.fields])
 
 
 def whole_text(name: str) -> str:
-    """Return the text of an interface and, each below a line of `=`, those of the messages that it is made of."""
+    """Return the text of an interface and those of all messages inside it, each below a line of `=`."""
     return joined(name, parts_of(name), text_of)
 
 
 def package_files(package: str, version: str, licence: str) -> dict[str, str]:
-    """Return the files of a ROS 2 package by their paths below its folder, with all interfaces of `package`."""
+    """Return the files of a ROS 2 package with all interfaces of `package`, by their paths below its folder."""
     names = [name for name in all_names() if name.startswith(f"{package}/")]
     texts = {name.partition("/")[2] + "." + name.split("/")[1]: text_of(name) for name in names}
     used = {part.split("/")[0] for name in names for part in parts_of(name)} - {package}

@@ -1,6 +1,6 @@
 """Messages as plain data (maps, lists, numbers, texts, flags), and back with every mistake as a finding.
 
-Bytes are lists of numbers here. What is left out keeps its default.
+Bytes are lists of numbers here. Omitted fields keep their defaults.
 """
 
 from __future__ import annotations
@@ -47,33 +47,33 @@ _RANGES = {
     **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
 }
 _FLOAT32 = struct.Struct("<f")
-_DIGITS = range(6, 9)  # significant ones, of which a float32 never needs more than nine
+_DIGITS = range(6, 9)  # significant digits; a float32 never needs more than nine
 
 
 class TextPlaces(Protocol):
-    """Where in a text the parts of plain data stand."""
+    """The positions of plain data in its text."""
 
     def key(self, path: KeyPath) -> Span | None:
-        """Return the place of a key."""
+        """Return the position of a key."""
         ...
 
     def value(self, path: KeyPath) -> Span | None:
-        """Return the place of a value."""
+        """Return the position of a value."""
         ...
 
 
 class NoPlaces:
-    """The places of data that have no text."""
+    """The positions of data without a text."""
 
     def key(self, path: KeyPath) -> None:
-        """Return no place."""
+        """Return no position."""
 
     def value(self, path: KeyPath) -> None:
-        """Return no place."""
+        """Return no position."""
 
 
 def to_plain(message: Message) -> dict[str, Any]:
-    """Return a message as plain data; a `float32` is the shortest number that stands for it."""
+    """Return a message as plain data; a `float32` becomes the shortest number that reads back as the same."""
     return {
         name: _plain(parse_type(text), getattr(message, attribute(name))) for name, text in type(message).FIELDS.items()
     }
@@ -99,13 +99,13 @@ def _shortest(value: float) -> float:
 def _is_same(short: float, value: float) -> bool:
     try:
         return _FLOAT32.pack(short) == _FLOAT32.pack(value)
-    except OverflowError:  # rounded up, beyond the largest one
+    except OverflowError:  # rounded up beyond the largest float32
         return False
 
 
 @dataclass(slots=True)
 class _Reading(Generic[M]):
-    """One reading of plain data: where it stands, and the mistakes so far."""
+    """One reading of plain data: its positions, and the mistakes so far."""
 
     places: TextPlaces
     findings: list[Finding] = field(default_factory=list)
@@ -184,7 +184,7 @@ class _Reading(Generic[M]):
 
 
 def from_plain(message: type[M], data: object, places: TextPlaces | None = None) -> tuple[M | None, list[Finding]]:
-    """Return the message that plain data stand for, or None and what is wrong with them."""
+    """Return the message that plain data represents, or None and what is wrong with the data."""
     reading: _Reading[M] = _Reading(places or NoPlaces())
     made = reading.message(message, data, ())
     return (None if reading.findings else made), reading.findings

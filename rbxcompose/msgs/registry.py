@@ -1,6 +1,6 @@
-"""Find messages, services and actions by their ROS names; a package is imported when it is first asked for.
+"""Find messages, services and actions by their ROS names; a package is imported at its first lookup.
 
-Classes of other packages are found too, once they have been imported.
+Classes of other packages are found, too, once they have been imported.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def message(name: str) -> type[Message]:
     """Return the message `geometry_msgs/msg/Twist`, also written `geometry_msgs/Twist`; parts of services are messages.
 
     Raises:
-        KeyError: lists the names that there are.
+        KeyError: lists the existing names.
     """
     return _find(name, "msg", Message)
 
@@ -29,7 +29,7 @@ def service(name: str) -> type[Service[Any, Any]]:
     """Return the service `std_srvs/srv/SetBool`, also written `std_srvs/SetBool`.
 
     Raises:
-        KeyError: lists the names that there are.
+        KeyError: lists the existing names.
     """
     return _find(name, "srv", Service)
 
@@ -38,19 +38,19 @@ def action(name: str) -> type[Action[Any, Any, Any]]:
     """Return the action `nav2_msgs/action/NavigateToPose`, also written `nav2_msgs/NavigateToPose`.
 
     Raises:
-        KeyError: lists the names that there are.
+        KeyError: lists the existing names.
     """
     return _find(name, "action", Action)
 
 
 def names(kind: str) -> list[str]:
-    """Return the sorted full names of all that is `msg`, `srv` or `action`."""
+    """Return the sorted full names of all interfaces of one kind: `msg`, `srv` or `action`."""
     imported = (name for name in declared if name.split("/")[1] == kind and "_" not in name.split("/")[2])
     return sorted({*_shipped(kind), *imported})
 
 
 def full_name(name: str, kind: str) -> str:
-    """Return `geometry_msgs/msg/Twist` for `geometry_msgs/Twist`; other names as they are."""
+    """Return `geometry_msgs/msg/Twist` for `geometry_msgs/Twist`; other names unchanged."""
     match name.split("/"):
         case [package, bare]:
             return f"{package}/{kind}/{bare}"

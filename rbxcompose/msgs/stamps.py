@@ -14,16 +14,16 @@ def to_time(nanoseconds: int) -> Time:
 
 
 def to_nanoseconds(time: Time) -> int:
-    """Return a stamp of a message in [ns]."""
+    """Return a stamp from a message in [ns]."""
     return time.sec * NANOSECONDS + time.nanosec
 
 
 def to_duration(seconds: float) -> Duration:
-    """Return a length of time [s] as a message."""
+    """Return a duration [s] as a message."""
     sec, nanosec = divmod(round(seconds * NANOSECONDS), NANOSECONDS)
     return Duration(sec=sec, nanosec=nanosec)
 
 
 def to_seconds(duration: Duration) -> float:
-    """Return a length of time in a message in [s]."""
+    """Return a duration from a message in [s]."""
     return duration.sec + duration.nanosec / NANOSECONDS

@@ -1,4 +1,4 @@
-"""What all generated classes share, and how services and actions are typed.
+"""Base classes of all generated classes, and the typing of services and actions.
 
 A function for any service reads `def call(service: type[Service[Q, R]], request: Q) -> R`, and a type checker then
 knows that `call(SetBool, SetBool.Request(data=True))` returns a `SetBool.Response`.
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 
-Fields = Mapping[str, str]  # ROS name of each field -> ROS type, in the order of the wire
+Fields = Mapping[str, str]  # ROS name of each field -> ROS type, in wire order
 
 declared: dict[str, type[Any]] = {}  # every class that has been imported, by its `TYPE`
 
@@ -42,14 +42,14 @@ FeedbackT = TypeVar("FeedbackT", bound=Message)
 
 
 class Service(Interface, Generic[RequestT, ResponseT]):
-    """A service: only a name for its two messages, never made itself."""
+    """A service: only a name for its two messages, never instantiated."""
 
     Request: type[RequestT]
     Response: type[ResponseT]
 
 
 class Action(Interface, Generic[GoalT, ResultT, FeedbackT]):
-    """An action: a name for its three messages and for what ROS derives from them, never made itself.
+    """An action: a name for its three messages and what ROS derives from them, never instantiated.
 
     `SendGoal.Request` has `goal_id` and `goal`, its `Response` `accepted` and `stamp`; `GetResult.Request` has
     `goal_id`, its `Response` `status` (a value of `GoalStatus`) and `result`; `FeedbackMessage` has `goal_id` and

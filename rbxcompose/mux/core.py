@@ -1,6 +1,6 @@
-"""Which of several sources of commands is let through: the live, unlocked one of the largest priority.
+"""Selects which of several command sources is let through: the live, unlocked one with the highest priority.
 
-The mux forwards, it never repeats: whoever listens keeps a deadline of its own, and a repeated command would add a
+The mux forwards, it never repeats: each subscriber keeps a deadline of its own, and a repeated command would add a
 second one to it. All times are robot time [s] at which something reached the mux; stamps inside messages do not count.
 """
 
@@ -16,7 +16,7 @@ M = TypeVar("M")
 
 @dataclass(frozen=True, slots=True)
 class MuxSource:
-    """Something that is heard of again and again: silent for more than `timeout` [s] it counts as gone."""
+    """A source that is expected to send repeatedly: after more than `timeout` [s] of silence it counts as gone."""
 
     priority: int
     timeout: float
@@ -25,8 +25,8 @@ class MuxSource:
 class MuxCore(Generic[M]):
     """Lets one input through, with the latched lock `stop` above all of them.
 
-    `inputs` carry messages. `locks` carry heartbeats: one that is silent locks every input of a priority below its own.
-    `zero` is the message for standing still. `stopped=True` is for a mux that was stopped when its process died.
+    `inputs` carry messages. `locks` carry heartbeats: a silent one locks every input with a priority below its own.
+    `zero` is the message that commands rest. `stopped=True` is for a mux that was stopped when its process died.
     """
 
     def __init__(
@@ -45,17 +45,17 @@ class MuxCore(Generic[M]):
         self._stopped = stopped
         self._closed = False
         self._held = False
-        # Last moment at which a source is live. Who was talking before a restart is unknown, so then all count as live.
+        # Last moment at which a source is live. Who was sending before a restart is unknown, so all count as live then.
         self._input_until = dict.fromkeys(self._inputs, math.inf if stopped else -math.inf)
         self._lock_until = dict.fromkeys(self._locks, -math.inf)
         self._neutral: set[str] = set()  # inputs whose last message was zero
         self._waiting: set[str] = set()  # inputs that must come to rest once before they count again
         self._active: str | None = None
-        self._owes_zero = False  # something was let through, and no zero of our own has followed
+        self._owes_zero = False  # something was let through, and has not been followed by a zero of our own
         self._now = -math.inf
 
     def take_over(self, old: MuxCore[M]) -> None:
-        """Know when the inputs and locks of the same names were heard last, and which must come to rest once."""
+        """Copy when inputs and locks of the same names were last received, and which must come to rest once."""
         self._input_until |= {name: until for name, until in old._input_until.items() if name in self._inputs}
         self._lock_until |= {name: until for name, until in old._lock_until.items() if name in self._locks}
         self._neutral = old._neutral & self._inputs.keys()
@@ -63,7 +63,7 @@ class MuxCore(Generic[M]):
 
     @property
     def active(self) -> str | None:
-        """The input that is let through, as of the last call; None if there is none."""
+        """The input let through as of the last call; None if there is none."""
         return self._active
 
     @property
@@ -72,7 +72,7 @@ class MuxCore(Generic[M]):
         return self._stopped
 
     def receive(self, name: str, message: M, now: float) -> M | None:
-        """Take a message of input `name`; return it if it must be forwarded, else None."""
+        """Receive a message of input `name`; return it if it must be forwarded, else None."""
         was_silent = now > self._input_until[name]
         self._neutral.discard(name)
         if self._is_zero(message):
@@ -87,12 +87,12 @@ class MuxCore(Generic[M]):
         return message
 
     def heartbeat(self, lock: str, now: float) -> None:
-        """Take a sign of life of `lock`: it holds nothing back until it has been silent for its timeout."""
+        """Receive a heartbeat of `lock`: it blocks nothing until it has been silent for its timeout."""
         self._lock_until[lock] = now + self._locks[lock].timeout
         self._settle(now)
 
     def tick(self, now: float) -> M | None:
-        """Return a zero, once, when what was let through has ended and nothing else lives."""
+        """Return a zero, once, when the input that was let through has ended and no other is live."""
         self._settle(now)
         if self._active is not None or not self._owes_zero:
             return None
@@ -100,7 +100,7 @@ class MuxCore(Generic[M]):
         return self._zero
 
     def next_deadline(self) -> float | None:
-        """Return when `tick` must be called if nothing is heard before [s]; None if never.
+        """Return when `tick` must be called if nothing is received before [s]; None if never.
 
         It is the first moment after a timeout: exactly at its timeout a source still counts as live.
         """
@@ -112,16 +112,16 @@ class MuxCore(Generic[M]):
         return min((math.nextafter(end, math.inf) for end in ends if self._now <= end < math.inf), default=None)
 
     def stop(self, now: float) -> M:
-        """Latch the lock `stop`; return the zero to send at once."""
+        """Latch the lock `stop`; return the zero to send immediately."""
         self._stopped = True
         self._settle(now)
         self._owes_zero = False
         return self._zero
 
     def release(self, now: float) -> None:
-        """Open the lock `stop`. It moves nothing: an input that still wants to move must come to rest once.
+        """Open the lock `stop`. This moves nothing: an input that still commands motion must come to rest once.
 
-        That is to have sent zero as its last message, or to be silent for its timeout.
+        To do that, its last message must be zero, or it must be silent for its timeout.
         """
         if self._stopped:
             self._stopped = False
@@ -132,16 +132,16 @@ class MuxCore(Generic[M]):
         self._settle(now)
 
     def hold(self, now: float) -> M:
-        """Let nothing through until `resume`; return the zero to send at once."""
+        """Let nothing through until `resume`; return the zero to send immediately."""
         self._held = True
         self._settle(now)
         self._owes_zero = False
         return self._zero
 
     def resume(self, now: float) -> None:
-        """Let messages through again that come from now on: what was heard before counts as silent.
+        """Let new messages through again: inputs and locks received before count as silent.
 
-        An input that must come to rest once still must.
+        An input that had to come to rest once still has to.
         """
         self._held = False
         self._input_until.update((name, -math.inf) for name in self._inputs if name not in self._waiting)
@@ -149,16 +149,16 @@ class MuxCore(Generic[M]):
         self._settle(now)
 
     def close(self, now: float) -> M:
-        """Go down: return one last zero, after which neither `receive` nor `tick` lets anything out."""
+        """Shut down: return one last zero, after which neither `receive` nor `tick` returns a message."""
         self._closed = True
         self._settle(now)
         self._owes_zero = False
         return self._zero
 
     def locked_out(self, now: float) -> list[str]:
-        """Return the inputs that a lock holds back for want of a heartbeat; none where nothing may pass for a while.
+        """Return the inputs locked for lack of a heartbeat; none while the mux is stopped or held.
 
-        Going down mends no lock, so that a mux which is closed tells them still.
+        Shutting down does not cure a lock, so a closed mux still reports them.
         """
         if self._stopped or self._held:
             return []
@@ -166,12 +166,12 @@ class MuxCore(Generic[M]):
         return [name for name, one in self._inputs.items() if one.priority < floor]
 
     def refused(self, now: float) -> list[str]:
-        """Return those that are locked out and speak nevertheless."""
+        """Return the inputs that are locked but still sending."""
         locked = [] if self._closed else self.locked_out(now)
         return [name for name in locked if self._is_live(name, now) and name not in self._waiting]
 
     def why(self, now: float) -> str:
-        """Say in one sentence for people what holds the output at `now`."""
+        """Return a sentence for people on what controls the output at `now`."""
         if self._closed:
             return "closed: the robot is going down"
         if self._stopped:
@@ -213,7 +213,7 @@ class MuxCore(Generic[M]):
         return self._stopped or self._closed or self._held
 
     def _floor(self, now: float) -> float:
-        """Return the least priority that passes."""
+        """Return the lowest priority that passes."""
         return max((self._locks[name].priority for name in self._silent_locks(now)), default=-math.inf)
 
     def _is_live(self, name: str, now: float) -> bool:

@@ -1,1 +1,1 @@
-"""Pure cores that drive a base to where it is wanted."""
+"""Pure cores that drive a base to a goal."""

@@ -1,6 +1,6 @@
 """Drive a base that turns on the spot to a pose: turn to it, drive, turn to its heading.
 
-Speeds follow a braking profile, so that the base can stop at the goal from whatever it is told to do.
+Speeds follow a braking profile, so that the base can stop at the goal from any commanded speed.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from rbxcompose.geometry import AT_REST, Pose2, Velocity2, wrap_angle
 ALIGNED = math.radians(6)  # bearing error below which the base starts to drive [rad]
 ASTRAY = math.radians(45)  # bearing error above which it stops and turns on the spot [rad]
 CORRECTION = 2.0  # turn rate per bearing error while driving [1/s]
-AIM = 0.5  # part of a tolerance at which the base is told to rest; the other part is for coming to rest
+AIM = 0.5  # part of a tolerance at which the base is commanded to rest; the remainder is for coming to rest
 RESTING = Velocity2(0.05, math.radians(5))  # below this the base counts as at rest [m/s, rad/s]
 PROGRESS = 0.02  # moving this far counts as progress [m]
 PROGRESS_TURN = math.radians(2)  # and so does turning this far [rad]
@@ -49,16 +49,16 @@ class GoToCore:
         self._near = False
         self._aligned = False
         self._last: Pose2 | None = None
-        self._mark: Pose2 | None = None  # where progress was last seen
-        self._idle = 0.0  # for how long none has been seen [s]
+        self._mark: Pose2 | None = None  # where progress was last observed
+        self._idle = 0.0  # time without progress [s]
 
     @property
     def stuck(self) -> bool:
-        """Return whether the base has not come away from where it is for `stuck_after`."""
+        """Return whether the base has made no progress for `stuck_after`."""
         return self._idle > self.settings.stuck_after
 
     def start(self, goal: Pose2) -> None:
-        """Take `goal`, in place of an earlier one."""
+        """Start to drive to `goal`; it replaces an earlier one."""
         self._goal = goal
         self._near = self._aligned = False
         self._mark = None
@@ -89,7 +89,7 @@ class GoToCore:
         return self._turn(error, dt), False
 
     def _is_near(self, resting: bool) -> bool:
-        # A base that moves is driven well into the tolerance; once it is there, or rests, only leaving it counts.
+        # A moving base is driven well into the tolerance; once it is there, or rests, only leaving it counts.
         aim = 1.0 if self._near or resting else AIM
         self._near = self.distance <= self.settings.distance_tolerance * aim
         return self._near
@@ -117,7 +117,7 @@ class GoToCore:
 
 
 def _braking_speed(left: float, most: float, deceleration: float, dt: float) -> float:
-    """Return the speed from which one can stop within `left`, and which uses up no more than half of it in one `dt`."""
+    """Return the speed that allows a stop within `left`, and covers at most half of it in one `dt`."""
     return min(most, math.sqrt(2 * deceleration * left), left / (2 * dt))
 
 

@@ -1,6 +1,6 @@
-"""The fields of a configuration as parameters of ROS 2: what they hold, what they are for, and a change of them.
+"""The fields of a configuration as parameters of ROS 2: their values, their descriptions, and changes to them.
 
-Numbers are SI. Who sets one may also send text with a unit (`30 s`), as it would stand in a manifest.
+Numbers are SI. A client may also send text with a unit (`30 s`), as in a manifest.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ class ParameterField:
 
     @property
     def dimension(self) -> Dimension | None:
-        """Return what it measures, None if it is no quantity."""
+        """Return its dimension, None if it is not a quantity."""
         return dimension_of(self.field) if self.field else None
 
     @property
     def descriptor(self) -> ParameterDescriptor:
-        """Return what it is for and what it takes."""
+        """Return its description and the values that it accepts."""
         numbers, integers = self._ranges()
         return ParameterDescriptor(
             name=self.name,
@@ -103,14 +103,14 @@ class ParameterField:
 
 
 def _si_unit(dimension: Dimension | None) -> str:
-    """Return the unit in which a parameter counts; ratios go from 0 to 1."""
+    """Return the unit of a parameter's values; ratios go from 0 to 1."""
     if dimension == RATIO:
         return "0 to 1"
     return next((name for name, unit in UNITS.items() if unit.dimension == dimension and unit.to_si(1.0) == 1.0), "")
 
 
 def settings(config: Config) -> dict[str, ParameterField]:
-    """Return all parameters by name; what is no plain value, such as a secret, is none."""
+    """Return all parameters by name; fields without a plain value, such as a secret, are omitted."""
     found: dict[str, ParameterField] = {}
     for name, field in type(config).model_fields.items():
         for one in _settings_of(name, getattr(config, name), field):
@@ -137,7 +137,7 @@ def values_of(known: Mapping[str, ParameterField], names: Iterable[str]) -> tupl
 
 
 def listed(known: Iterable[str], prefixes: Sequence[str], depth: int) -> ListParametersResult:
-    """Return the names below one of `prefixes` (none: all) by at most `depth` words (0: any number)."""
+    """Return the names below one of `prefixes` (none: all), at most `depth` words deep (0: any depth)."""
 
     def is_wanted(name: str, prefix: str) -> bool:
         if prefix and name != prefix and not name.startswith(prefix + SEPARATOR):
@@ -154,7 +154,7 @@ def changed(config: Config, parameters: Sequence[Parameter]) -> Config:
     """Return the configuration with all of `parameters` set.
 
     Raises:
-        UnsettableError: if one of them is unknown, is read-only or takes no such value, or if together they do not fit.
+        UnsettableError: if one of them is unknown, is read-only or refuses the value, or if they do not fit together.
     """
     known = settings(config)
     wanted = {one.name: _wanted(known, one) for one in parameters}
@@ -183,7 +183,7 @@ def _wanted(known: Mapping[str, ParameterField], parameter: Parameter) -> object
 
 
 def _with_unit(value: object, dimension: Dimension | None) -> object:
-    """Return SI numbers as quantities: a bare number would not be taken for an angle."""
+    """Return SI numbers as quantities: a bare number would not be accepted for an angle."""
     match value:
         case _ if dimension is None:
             return value
@@ -209,14 +209,14 @@ def _reason(error: ErrorDetails) -> str:
 
 
 def differences(old: Config, new: Config) -> tuple[Parameter, ...]:
-    """Return the parameters that are others in `new`, with their new values."""
+    """Return the parameters that differ in `new`, with their new values."""
     before = settings(old)
     others = (one for one in settings(new).values() if one.name not in before or before[one.name].value != one.value)
     return tuple(Parameter(name=one.name, value=to_message(one.value) or ParameterValue()) for one in others)
 
 
 def dimension_of(field: FieldInfo) -> Dimension | None:
-    """Return what a field's values measure, also within `... | None` and lists; None if they are no quantities."""
+    """Return the dimension of a field's values, also within `... | None` and lists; None if they are not quantities."""
     marks = (*field.metadata, *_marks_within(field.annotation))
     return next((mark.dimension for mark in marks if isinstance(mark, Dimensioned)), None)
 

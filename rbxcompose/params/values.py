@@ -25,7 +25,7 @@ _ARRAYS = {
 
 
 def to_message(value: object) -> ParameterValue | None:
-    """Return a value as a message, None if it is of no type that a parameter has."""
+    """Return a value as a message, None if no parameter can have its type."""
     number = parameter_type(value)
     if number is None:
         return None
@@ -74,7 +74,7 @@ def _array_type(values: Sequence[object]) -> int | None:
 
 
 def from_message(message: ParameterValue) -> object:
-    """Return the value that a message holds, lists as tuples; None if it is not set."""
+    """Return the value in a message, lists as tuples; None if it is not set."""
     if name := _SINGLE.get(message.type):
         return getattr(message, name)
     if name := _ARRAYS.get(message.type):

@@ -1,1 +1,1 @@
-"""Recordings: topics of a robot in MCAP files, written so that a crash loses half a second, and read with distrust."""
+"""Recordings: topics in MCAP files, written so that a crash loses at most half a second, and read defensively."""

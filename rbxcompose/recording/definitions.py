@@ -1,4 +1,4 @@
-"""The text of a message type with all types that it uses, as `ros2msg` schemas of MCAP have it."""
+"""The text of a message type with all types that it uses, in the format of MCAP's `ros2msg` schemas."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rbxcompose.msgs.joined import joined, parts, short
 def definition_of(name: str) -> str:
     """Return the text of a type (`nav_msgs/msg/Odometry`), then those of the types in it, each below a line of `=`.
 
-    It is empty for a type of which we have no definition.
+    It is empty for a type without a known definition.
     """
     try:
         return joined(name, parts(name, _types), _text)
@@ -27,7 +27,7 @@ def _text(name: str) -> str:
     written = INTERFACES / package / kind / f"{bare}.{kind}"
     if kind == "msg" and written.is_file():
         return written.read_text(encoding="utf-8")
-    # A part of an action, or a type of somebody else's package: what counts is in the fields.
+    # A part of an action, or a type of another package: its fields are what counts.
     return "".join(f"{_short_type(type_)} {field}\n" for field, type_ in registry.message(name).FIELDS.items())
 
 

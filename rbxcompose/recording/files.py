@@ -1,6 +1,6 @@
-"""Files of recordings. One that is being written has `.part` behind its name and is locked by its writer.
+"""Files of recordings. A file being written has `.part` appended to its name and is locked by its writer.
 
-So a part that is not locked is one that was never finished; it is recovered and then gets its name.
+So an unlocked part was never finished; it is recovered and then gets its name.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _NEW = ".new"
 
 @dataclass(frozen=True, slots=True)
 class Recovered:
-    """What became of an unfinished file: its name now and the number of its messages, or why it stayed as it was."""
+    """The outcome for an unfinished file: its new name and number of messages, or why it was left unchanged."""
 
     path: Path
     messages: int = 0
@@ -32,7 +32,7 @@ class Recovered:
 
 
 def part_of(path: Path) -> Path:
-    """Return the name that a file has until it is finished."""
+    """Return the name of a file until it is finished."""
     return path.with_name(path.name + PART)
 
 
@@ -40,7 +40,7 @@ def create(path: Path) -> IO[bytes]:
     """Create the part of a new file and lock it.
 
     Raises:
-        FileExistsError: if the file or its part is there already.
+        FileExistsError: if the file or its part already exists.
         OSError: if it cannot be created.
     """
     if path.exists():
@@ -51,7 +51,7 @@ def create(path: Path) -> IO[bytes]:
 
 
 def write_problem(path: Path) -> str:
-    """Return why `create` would fail, or nothing: to be told before a run begins."""
+    """Return why `create` would fail, or nothing; to be reported before a run begins."""
     name = plain(str(path))
     if path.exists() or part_of(path).exists():
         return f"'{name}' already exists"
@@ -61,7 +61,7 @@ def write_problem(path: Path) -> str:
 
 
 def complete(path: Path, file: IO[bytes]) -> None:
-    """Give a finished file its name, so that it is there as a whole or not at all, even if the power fails."""
+    """Give a finished file its name, so that it exists completely or not at all, even after a power failure."""
     os.fsync(file.fileno())
     os.rename(part_of(path), path)
     file.close()
@@ -69,7 +69,7 @@ def complete(path: Path, file: IO[bytes]) -> None:
 
 
 def recover_all(folder: Path) -> Iterator[Recovered]:
-    """Recover what lies unfinished in a folder and is not being written by anybody."""
+    """Recover the unfinished files in a folder that nobody is writing."""
     for part in sorted(folder.glob(f"*{ENDING}{PART}")):
         path = part.with_name(part.name.removesuffix(PART))
         try:
@@ -81,7 +81,7 @@ def recover_all(folder: Path) -> Iterator[Recovered]:
 
 
 def _is_ours(file: IO[bytes], part: Path) -> bool:
-    """Lock a part; it is not ours if its writer still has it, or has finished it meanwhile."""
+    """Lock a part and return whether it is ours: not if its writer still has it, or has finished it meanwhile."""
     try:
         fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -93,7 +93,7 @@ def _recover(file: IO[bytes], part: Path, path: Path) -> int:
     if path.exists():
         raise FileExistsError(f"{path} already exists")
     new = part.with_name(part.name + _NEW)
-    new.unlink(missing_ok=True)  # of a recovery that was interrupted
+    new.unlink(missing_ok=True)  # left by an interrupted recovery
     with new.open("xb") as whole:
         try:
             messages = recover(file, whole)
@@ -101,7 +101,7 @@ def _recover(file: IO[bytes], part: Path, path: Path) -> int:
             new.unlink()
             raise
         os.fsync(whole.fileno())
-    os.rename(new, part)  # from here on the part is whole, and recovering it once more would change nothing
+    os.rename(new, part)  # now the part is complete, and recovering it again would change nothing
     os.rename(part, path)
     sync_folder(path.parent)
     return messages

@@ -14,5 +14,5 @@ class Recorded:
     topic: RecordedTopic
     log_time: int
     publish_time: int
-    sequence: int  # counted by its publisher; 0 if it did not
+    sequence: int  # counted by its publisher; 0 if not counted
     payload: bytes

@@ -1,4 +1,4 @@
-"""Reads recordings, also broken ones and those of strangers: all that is whole comes out, then why it ended."""
+"""Read recordings, even damaged or untrusted ones: return all intact content, then why it ended."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from rbxcompose.printable import plain
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.topics import HASH, NODE, RecordedTopic, qos_of_metadata
 
-LARGEST = 64 * 1024 * 1024  # bytes of a record, and of a chunk once it is unpacked
+LARGEST = 64 * 1024 * 1024  # bytes of a record, and of an unpacked chunk
 _MAGIC = b"\x89MCAP0\r\n"
 
-# Besides their own, the readers of MCAP and of its compressions raise these for bytes that make no sense.
+# Besides their own errors, the readers of MCAP and of its compressions raise these for invalid bytes.
 _BROKEN = (McapError, ValueError, struct.error, OverflowError, RuntimeError, EOFError, zstandard.ZstdError)
 
 
@@ -29,15 +29,15 @@ class NotARecordingError(ValueError):
 
 
 class RecordingReader:
-    """Reads one file once, from its beginning. `damage` tells afterwards why it ended early, if it did."""
+    """Reads one file once, from its beginning. Afterwards, `damage` says why it ended early, if it did."""
 
     @property
     def topics(self) -> Collection[RecordedTopic]:
-        """Return the topics, as far as the file was read; also those without messages."""
+        """Return the topics in the part read so far, including those without messages."""
         return self._channels.values()
 
     def __init__(self, file: IO[bytes]) -> None:
-        """Look at the first bytes.
+        """Check the first bytes.
 
         Raises:
             NotARecordingError: if it is another kind of file.
@@ -47,14 +47,14 @@ class RecordingReader:
             raise NotARecordingError("it does not start like an MCAP file")
         file.seek(0)
         self.damage = ""
-        self.attachments: dict[str, bytes] = {}  # by name, as far as the file was read
+        self.attachments: dict[str, bytes] = {}  # by name, in the part read so far
         self._file = file
         self._reader = StreamReader(file, emit_chunks=True, record_size_limit=LARGEST)
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, RecordedTopic] = {}
 
     def messages(self) -> Iterator[Recorded]:
-        """Yield the messages in the order of the file, until it ends or makes no sense."""
+        """Yield the messages in the order of the file, until it ends or becomes invalid."""
         try:
             for record in self._reader.records:
                 if isinstance(record, Chunk):
@@ -62,7 +62,7 @@ class RecordingReader:
                 else:
                     yield from self._messages_of([record])
         except _BROKEN as error:
-            # What is cut off gives many kinds of error: numbers that are short, chunks that do not unpack.
+            # A truncated file gives many kinds of error: numbers that are too short, chunks that do not unpack.
             is_cut = not self._file.read(1)
             self.damage = "it ends in the middle" if is_cut else f"a part makes no sense ({plain(str(error), 100)})"
 
@@ -99,7 +99,7 @@ class RecordingReader:
 
 
 def _unpacked(chunk: Chunk) -> Chunk:
-    """Unpack a chunk, but never into more than `LARGEST` bytes, whatever it claims."""
+    """Unpack a chunk, but never to more than `LARGEST` bytes, whatever size it claims."""
     if chunk.compression == "zstd":
         size = zstandard.get_frame_parameters(chunk.data).content_size
         if size != zstandard.CONTENTSIZE_UNKNOWN and size > LARGEST:

@@ -1,4 +1,4 @@
-"""A recording in progress: closed chunks twice a second, and a new file when one is full. Time [s] is an argument."""
+"""A recording in progress: chunks close twice a second, and a full file begins a new one. Time [s] is an argument."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.topics import RecordedTopic
 from rbxcompose.recording.writer import RecordingWriter
 
-FLUSH, SYNC = 0.5, 5.0  # [s] what a killed recorder, and a computer without power, may lose
+FLUSH, SYNC = 0.5, 5.0  # [s] maximum loss of a killed recorder, and after a power failure
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Split:
 class Recorder:
     """Writes messages to `path`, or to `NAME_0.mcap`, `NAME_1.mcap`... if it is split.
 
-    All of it raises `OSError` if a file cannot be created or written.
+    All methods raise `OSError` if a file cannot be created or written.
     """
 
     def __init__(self, path: Path, now: float, split: Split | None = None) -> None:
@@ -51,11 +51,11 @@ class Recorder:
         self._writer.attach(name, data)
 
     def declare(self, topic: RecordedTopic) -> None:
-        """Make a topic known, also if it will have no messages."""
+        """Declare a topic, even if it will have no messages."""
         self._writer.declare(topic)
 
     def keep(self, now: float) -> None:
-        """Do what is due: to be called several times a second."""
+        """Do what is due; call it several times a second."""
         if now - self._flushed >= FLUSH:
             self._writer.flush()
             self._flushed = now
@@ -68,13 +68,13 @@ class Recorder:
             self._open(now)
 
     def finish(self) -> None:
-        """End the file, which then has its index and its name."""
+        """Finish the file, which then gets its index and its name."""
         self._writer.finish()
         complete(self.paths[-1], self._file)
 
     def abandon(self) -> None:
-        """Leave the file as it is; what was written is recovered later."""
-        with contextlib.suppress(OSError):  # closing tries to write the rest once more, which is what has failed
+        """Leave the file as it is; its contents are recovered later."""
+        with contextlib.suppress(OSError):  # closing retries the write that has failed
             self._file.close()
 
     def _open(self, now: float) -> None:

@@ -1,4 +1,4 @@
-"""Recovers unfinished recordings: all intact content goes into a new file, which then has its index."""
+"""Recover unfinished recordings: copy all intact content into a new file, which then has its index."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rbxcompose.recording.writer import RecordingWriter
 
 
 def recover(broken: IO[bytes], whole: IO[bytes]) -> int:
-    """Copy every message of `broken` up to where it ends or makes no sense; return how many.
+    """Copy every message of `broken` until it ends or becomes invalid; return their number.
 
     Raises:
         NotARecordingError: if `broken` is another kind of file.

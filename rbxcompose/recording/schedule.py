@@ -1,4 +1,4 @@
-"""When each message of a recording is due in a replay. Time is counted from the start of the replay [s]."""
+"""The schedule of a replay: when each message of a recording is due, from the start of the replay [s]."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def playlist(
 ) -> Iterator[tuple[float, Recorded]]:
     """Yield each message with the time at which it is due, in the order of the recording.
 
-    `start` [s of the recording] leaves out what was before, but for the last message of each latched topic, which is
-    due at once. A message whose time lies before that of the one before it is due together with that one.
+    `start` [s of the recording] skips earlier messages, except for the last one of each latched topic, which is due
+    immediately. A message with an earlier time than the one before it is due together with that one.
     """
     first: int | None = None
     latched: dict[RecordedTopic, Recorded] = {}

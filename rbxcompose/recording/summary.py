@@ -1,4 +1,4 @@
-"""What is in a recording: topics, counts, from when to when."""
+"""The contents of a recording: topics, counts, and the time span."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class RecordingSummary:
 
 
 def summary_of(messages: Iterable[Recorded]) -> RecordingSummary:
-    """Look through a recording."""
+    """Read a recording and summarise it."""
     summary = RecordingSummary()
     for message in messages:
         if not summary.counts:

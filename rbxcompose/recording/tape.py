@@ -1,7 +1,7 @@
-"""A tape: all that happens on the bus of one process on a stepped clock, in its order, exactly enough to do it again.
+"""A tape: all that happens on the bus of one process on a stepped clock, in order and exactly enough to repeat it.
 
-Besides the topics of the robot it holds, as ROS 2 records them, the events of services, and on two topics of its own
-the orders that the host was given and the instants whose time [s] cannot be told from nanoseconds.
+Besides the topics of the robot, it holds the events of services, as ROS 2 records them, and on two topics of its own
+the orders that the host received and the instants whose time [s] cannot be computed from nanoseconds.
 """
 
 from __future__ import annotations
@@ -35,23 +35,23 @@ from rbxcompose.recording.definitions import definition_of
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.topics import RecordedTopic, topic_of
 
-PLAN = "plan.json"  # name of the attachment that tells how the robot was composed
+PLAN = "plan.json"  # name of the attachment with the plan of the robot
 ORDERS = "/rbxcompose/orders"
 INSTANTS = "/rbxcompose/instants"
 
 
 class Tape:
-    """Hands what happens to `write`, and topics as soon as they have a publisher to `declare`."""
+    """Passes events to `write`, and topics to `declare` as soon as they have a publisher."""
 
     def __init__(
         self, clock: Clock, declare: Callable[[RecordedTopic], None], write: Callable[[Recorded], None]
     ) -> None:
         self._clock, self._declare, self._write = clock, declare, write
-        self._instant = 0.0  # [s], the last one that was told
+        self._instant = 0.0  # [s], the last instant
         self._topics: dict[bytes, RecordedTopic] = {}  # by the GID of the publisher
 
     def around(self, transport: Transport) -> Transport:
-        """Return a transport that does what this one does, and is recorded."""
+        """Return a transport that behaves like this one and is recorded."""
         return _Taped(self, transport)
 
     def witness(self, call: WitnessedCall) -> None:
@@ -65,11 +65,11 @@ class Tape:
         self._say(f"{call.name}/{TOPIC}", message, node=call.node, sequence=call.sequence)
 
     def order(self, verb: str, *words: object) -> None:
-        """Record what the host was told to do."""
+        """Record an order to the host."""
         self._say(ORDERS, String(data=json.dumps([verb, *words])))
 
     def announced(self, token: str) -> None:
-        """Learn of a publisher."""
+        """Register a publisher."""
         endpoint = parse_token(token)
         topic = topic_of(endpoint) if isinstance(endpoint, EndpointToken) else None
         if isinstance(endpoint, EndpointToken) and topic is not None:
@@ -96,7 +96,7 @@ class Tape:
 
 
 class _Taped:
-    """A transport that tells a tape what leaves the process, also without a subscriber outside."""
+    """A transport that records on a tape what leaves the process, even without a subscriber outside."""
 
     def __init__(self, tape: Tape, inner: Transport) -> None:
         self._tape, self._inner = tape, inner
@@ -106,7 +106,7 @@ class _Taped:
         self._inner.wake(owner, callback)
 
     def publisher(self, key: str, qos: Qos) -> RemotePublisher:
-        if key.startswith(ADMIN):  # what somebody looks at is no part of what the robot does
+        if key.startswith(ADMIN):  # what tools look at is not part of the robot's behaviour
             return self._inner.publisher(key, qos)
         return _TapedPublisher(self._tape, self._inner.publisher(key, qos))
 

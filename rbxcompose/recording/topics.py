@@ -1,4 +1,4 @@
-"""What a recording knows of a topic, where that comes from on the bus, and which topics are chosen."""
+"""Topics in a recording: what it stores about them, how the bus provides that, and their selection."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _DDS_TYPE = re.compile(r"(\w+)::(msg|srv|action)::dds_::(\w+)_", re.ASCII)
 _TYPE = re.compile(r"\w+/(msg|srv|action)/\w+", re.ASCII)
 _HASH = re.compile(r"\w{1,100}", re.ASCII)
 _QOS = re.compile(r"(?P<reliability>\d?):(?P<durability>\d?):(?P<history>\d?),(?P<depth>\d{0,9}):.*")
-_FOREVER = "{sec: 9223372036, nsec: 854775807}"  # how ROS writes that there is no limit
+_FOREVER = "{sec: 9223372036, nsec: 854775807}"  # how ROS writes "no limit"
 _IS_LATCHED = re.compile(r"^[ \t-]*+durability: *+(1|transient_local)[ \t\r]*+$", re.MULTILINE)
 
 
@@ -30,14 +30,14 @@ class RecordedTopic:
 
     name: str  # with its leading slash
     type: str  # `geometry_msgs/msg/Twist`
-    hash: str  # of the type, as the keys of the bus have it
+    hash: str  # of the type, as in the keys of the bus
     qos: Qos = Qos.STATE
-    definition: str = ""  # text of the type and all that it is made of; empty if we have none
+    definition: str = ""  # text of the type and of all types inside it; empty if unknown
     encoding: str = CDR
-    node: str = ""  # who publishes; empty if that was not recorded
+    node: str = ""  # the publisher; empty if not recorded
 
     def metadata(self) -> dict[str, str]:
-        """Return what a channel tells beside name and type: hash and quality of service, for ROS and for us."""
+        """Return the metadata of a channel besides name and type: hash and quality of service, for ROS and for us."""
         qos = ros_qos(self.qos)
         profile = (
             f"- history: {2 if qos.keeps_all else 1}\n  depth: {qos.depth}\n"
@@ -50,7 +50,7 @@ class RecordedTopic:
 
 
 def qos_of_metadata(metadata: Mapping[str, str]) -> Qos:
-    """Return the class of a recorded topic; recordings of others tell at most whether it is latched."""
+    """Return the class of a recorded topic; recordings by other tools say at most whether it is latched."""
     written = metadata.get(CLASS, "")
     if written in set(Qos):
         return Qos(written)
@@ -58,7 +58,7 @@ def qos_of_metadata(metadata: Mapping[str, str]) -> Qos:
 
 
 def by_name(counts: Mapping[RecordedTopic, int]) -> dict[RecordedTopic, int]:
-    """Return the numbers of messages with those of all publishers of a topic together."""
+    """Return the numbers of messages, summed over all publishers of a topic."""
     found: dict[RecordedTopic, int] = {}
     for topic, count in counts.items():
         whole = replace(topic, node="")
@@ -67,23 +67,23 @@ def by_name(counts: Mapping[RecordedTopic, int]) -> dict[RecordedTopic, int]:
 
 
 def is_replayable(topic: RecordedTopic) -> bool:
-    """Return whether a recorded topic can be published: its names must be fit for the bus, which has only CDR."""
+    """Return whether a recorded topic can be published: its names must be valid on the bus, which carries only CDR."""
     is_named = _TYPE.fullmatch(topic.type) and _HASH.fullmatch(topic.hash) and not name_problem(topic.name)
     return bool(is_named) and topic.encoding == CDR
 
 
 def topic_of(token: EndpointToken) -> RecordedTopic | None:
-    """Return the topic of a publisher, without a definition; None for other endpoints and for names that are none."""
+    """Return the topic of a publisher, without a definition; None for other endpoints and for invalid names."""
     found = _DDS_TYPE.fullmatch(token.dds_type)
     if token.kind is not EntityKind.PUBLISHER or not found or name_problem(token.name):
         return None
-    if not _HASH.fullmatch(token.type_hash):  # it becomes part of a key
+    if not _HASH.fullmatch(token.type_hash):  # the hash becomes part of a key
         return None
     return RecordedTopic(token.name, "/".join(found.groups()), token.type_hash, qos_of_token(token.qos))
 
 
 def qos_of_token(text: str) -> Qos:
-    """Return the class that comes nearest to the quality of service of a token."""
+    """Return the class nearest to the quality of service of a token."""
     found = _QOS.fullmatch(text)
     if not found:
         return Qos.STATE
@@ -98,16 +98,16 @@ def qos_of_token(text: str) -> Qos:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Which topics are wanted: by name (`odom`, `/camera/*`) and by class; nothing given means all."""
+    """A selection of topics: by name (`odom`, `/camera/*`) and by class; an empty one means all."""
 
     patterns: Sequence[str] = ()
     classes: Sequence[Qos] = ()
 
     def takes(self, topic: RecordedTopic) -> bool:
-        """Return whether a topic is wanted."""
+        """Return whether a topic is selected."""
         return self.names(topic) and (not self.classes or topic.qos in self.classes)
 
     def names(self, topic: RecordedTopic) -> bool:
-        """Return whether a topic has one of the names that are wanted."""
+        """Return whether a topic has one of the selected names."""
         name = topic.name.lstrip("/")
         return not self.patterns or any(fnmatchcase(name, pattern.lstrip("/")) for pattern in self.patterns)

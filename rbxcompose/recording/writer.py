@@ -1,4 +1,4 @@
-"""Writes recordings: MCAP with CDR payloads, in chunks that are small and closed often, so that crashes lose little."""
+"""Write recordings: MCAP with CDR payloads, in small chunks that are closed often, so that crashes lose little."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MASK = 0xFFFF_FFFF  # a sequence number of MCAP has 32 bits
 
 
 class RecordingWriter:
-    """Writes one file. Errors of the file are passed on as `OSError`."""
+    """Writes one file. File errors are raised as `OSError`."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self.counts: Counter[RecordedTopic] = Counter()
@@ -30,15 +30,15 @@ class RecordingWriter:
 
     @property
     def size(self) -> int:
-        """Return how many bytes were written; those of the open chunk come on top."""
+        """Return how many bytes were written, without those of the open chunk."""
         return self._file.tell()
 
     def attach(self, name: str, data: bytes) -> None:
-        """Add a file of JSON, which readers find by its name."""
+        """Attach a JSON file, which readers find by its name."""
         self._writer.add_attachment(0, 0, name, "application/json", data)
 
     def declare(self, topic: RecordedTopic) -> None:
-        """Make a topic known, also if it will have no messages."""
+        """Declare a topic, even if it will have no messages."""
         if topic not in self._channels:
             self._channels[topic] = self._register(topic)
 
@@ -56,11 +56,11 @@ class RecordingWriter:
         self.counts[topic] += 1
 
     def flush(self) -> None:
-        """Close the open chunk and give everything to the operating system."""
+        """Close the open chunk and pass everything to the operating system."""
         self._writer.flush()  # type: ignore[no-untyped-call]
 
     def finish(self) -> None:
-        """Write the index, after which nothing can be added."""
+        """Write the index; afterwards nothing can be added."""
         self._writer.finish()  # type: ignore[no-untyped-call]
         self._file.flush()
 

@@ -1,4 +1,4 @@
-"""Findings as workflow commands of GitHub, which shows each next to its line of the change."""
+"""Findings as GitHub workflow commands; GitHub shows each next to its line of the change."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _place(span: Span | None) -> dict[str, str]:
     if span is None or span.file.startswith(COMMAND_LINE):
         return {}
     place = {"file": plain(span.file), "line": str(span.line)}
-    if span.end_line > span.line:  # columns have a meaning within one line only
+    if span.end_line > span.line:  # columns are meaningful within one line only
         return {**place, "endLine": str(span.end_line)}
     return {**place, "col": str(span.column), "endColumn": str(span.end_column)}
 

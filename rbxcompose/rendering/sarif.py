@@ -14,7 +14,7 @@ from rbxcompose.formats import output_format
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 ROOT = "%SRCROOT%"
-_BRACES = str.maketrans({"{": "{{", "}": "}}"})  # single ones are placeholders in a message
+_BRACES = str.maketrans({"{": "{{", "}": "}}"})  # single braces are placeholders in a message
 
 Data = dict[str, object]
 
@@ -55,7 +55,7 @@ def _message(*lines: str) -> Data:
 
 
 def _result(finding: Finding, codes: list[str], sources: Sources, main: str | None) -> Data:
-    """Return a finding; one that is about no file stands at the file that was asked for, `main`."""
+    """Return a finding; one without a file is placed at the file that was compiled, `main`."""
     span, note = finding.span, ""
     if span is not None and span.file.startswith(COMMAND_LINE):
         span, note = None, f"at {span}"

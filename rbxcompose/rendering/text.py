@@ -1,4 +1,4 @@
-"""Findings as a person reads them: the words, the place, the line with a caret, what to do."""
+"""Findings for people: the message, the place, the line with a caret, what to do."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from rbxcompose.formats import output_format
 from rbxcompose.printable import columns, plain
 
 MOST_SHOWN = 20
-_LINE_CELLS = 160  # of a source line; of a longer one only what surrounds the caret is shown
+_LINE_CELLS = 160  # of a source line; of a longer one only the surroundings of the caret are shown
 _BEFORE_CARET = 60
 _WORDS = 400  # characters of a message, label or help
-_MOST_PLACES = 8  # beside a finding's own
+_MOST_PLACES = 8  # in addition to a finding's own
 _RESET = "\x1b[0m"
 _COLOURS = {"error": "\x1b[1;31m", "warning": "\x1b[1;33m", "gutter": "\x1b[1;34m", "bold": "\x1b[1m"}
 
@@ -43,7 +43,7 @@ def render_text(report: Report, sources: Sources, colour: bool = False) -> str:
 
 
 def summary(findings: list[Finding], fixes: int) -> str:
-    """Return how many there are of each severity, and how many fixes: "3 errors, 1 warning"."""
+    """Return the number of findings of each severity, and of fixes: "3 errors, 1 warning"."""
     counts = {severity: sum(finding.severity is severity for finding in findings) for severity in Severity}
     counted = ", ".join(f"{count} {severity}{'' if count == 1 else 's'}" for severity, count in counts.items() if count)
     if not fixes:

@@ -1,1 +1,1 @@
-"""A recorded run again: one component gets its recorded inputs, its outputs are compared with those of then."""
+"""Repeat a recorded run: give one component its recorded inputs and compare its outputs with the recorded ones."""

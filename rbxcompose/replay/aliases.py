@@ -1,7 +1,7 @@
 """Names that differ in each run: those of a component's clients, and of the goals that it sends.
 
-They follow from the place of an end among all of its process. A component that runs alone gets others, which stand for
-the recorded ones from the moment at which both were seen in the same request.
+They depend on the position of an end among all ends of its process. A component that runs alone gets others, which are
+mapped to the recorded ones as soon as both were seen in the same request.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from rbxcompose.recording.message import Recorded
 
 
 class Aliases:
-    """Pairs of names of 16 bytes: as recorded, and as they are now."""
+    """Pairs of 16-byte names: the recorded one and the present one."""
 
     def __init__(self) -> None:
         self._pairs: dict[bytes, bytes] = {}  # recorded -> now
 
     def learn(self, recorded: Recorded, now: Recorded) -> None:
-        """See the same event of a service twice."""
+        """Learn pairs from the same service event, as recorded and as it is now."""
         cls = registry.message(now.topic.type)
         before: Any = decode(cls, recorded.payload)
         after: Any = decode(cls, now.payload)
@@ -32,13 +32,13 @@ class Aliases:
                     self._add(old.goal_id.uuid, new.goal_id.uuid)
 
     def inwards(self, payload: bytes) -> bytes:
-        """Return recorded bytes with the names of now."""
+        """Return recorded bytes with the present names."""
         for recorded, now in self._pairs.items():
             payload = payload.replace(recorded, now)
         return payload
 
     def outwards(self, payload: bytes) -> bytes:
-        """Return bytes of now with the recorded names."""
+        """Return present bytes with the recorded names."""
         for recorded, now in self._pairs.items():
             payload = payload.replace(now, recorded)
         return payload

@@ -1,4 +1,4 @@
-"""Compares what a component sends with what it sent when it was recorded, up to the first difference."""
+"""Compare what a component sends with what it sent in the recording, up to the first difference."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NOTHING = "nothing"
 
 @dataclass(frozen=True, slots=True)
 class RunDifference:
-    """The first thing that was not as recorded: robot time [s], topic, field (empty: the message as a whole)."""
+    """The first difference from the recording: robot time [s], topic, field (empty: the message as a whole)."""
 
     time: float
     topic: str
@@ -30,27 +30,27 @@ class RunDifference:
 
 
 class RunComparison:
-    """Takes both sides as they come."""
+    """Compares both sides as they arrive."""
 
     def __init__(self, aliases: Aliases) -> None:
-        self.equal = 0  # messages
+        self.equal = 0  # number of equal messages
         self.difference: RunDifference | None = None
         self._aliases = aliases
         self._recorded: deque[Recorded] = deque()
         self._now: deque[Recorded] = deque()
 
     def expect(self, record: Recorded) -> None:
-        """Take what was sent when it was recorded."""
+        """Take a message of the recording."""
         self._recorded.append(record)
         self._compare()
 
     def sent(self, record: Recorded) -> None:
-        """Take what was sent now."""
+        """Take a message sent now."""
         self._now.append(record)
         self._compare()
 
     def end(self, cut_at: float) -> None:
-        """Hear that nothing more comes: what is left has no counterpart, unless the recording ends there [ns]."""
+        """Finish: what is left has no counterpart, unless the recording ends there [ns]."""
         if self.difference is not None:
             return
         if self._recorded and (record := self._recorded[0]).log_time < cut_at:
@@ -92,13 +92,13 @@ def _in_a_field(record: Recorded, payload: bytes) -> RunDifference:
             _leaves(to_plain(decode(cls, record.payload))), _leaves(to_plain(decode(cls, payload))), strict=False
         )
         field, before, after = next((one, a, b) for (one, a), (other, b) in pairs if (one, a) != (other, b))
-    except (KeyError, CdrError, StopIteration):  # a type that is not installed, bytes that no field tells of
+    except (KeyError, CdrError, StopIteration):  # a type that is not installed, or bytes that belong to no field
         return _whole(record, f"{len(record.payload)} bytes", f"{len(payload)} other bytes")
     return RunDifference(record.log_time / NANOSECONDS, record.topic.name, field, f"{before}", f"{after}")
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield each value that is no map or list with its path, and the length of each list."""
+    """Yield each value except maps and lists with its path, and the length of each list."""
     if isinstance(value, Mapping):
         for key, each in value.items():
             yield from _leaves(each, f"{path}.{key}" if path else str(key))

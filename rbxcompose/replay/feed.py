@@ -1,7 +1,7 @@
-"""Feeds a component with what was recorded: each input at its instant, after what came before it there.
+"""Feed a component with a recording: each input at its instant, after what preceded it there.
 
-The order of a stepped run is by time, then owner, then sequence. So a message comes again as an event of who sent it;
-and where the component itself has spoken in between, or the host was given an order, it comes after all of that.
+A stepped run is ordered by time, then owner, then sequence. So a message is replayed as an event of its sender; if
+the component itself sent something in between, or the host received an order, it comes after all of that.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LAST = "\U0010ffff"  # an owner whose events come after those of all others
 
 
 class ReplayFeed:
-    """Goes through the records of a run, once; those of the component itself go to `expect`."""
+    """Goes through the records of a run once; those of the component itself go to `expect`."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class ReplayFeed:
         self._instant = (0, 0.0)  # [ns], [s]
         self._count = 0
         self._next: Recorded | None = None
-        self._last = 0  # [ns], of what was read last
+        self._last = 0  # [ns], of the record read last
         self._is_whole = False
 
     def begin(self, scheduler: Scheduler, host: Host) -> None:
@@ -60,16 +60,16 @@ class ReplayFeed:
         self._schedule(is_after_own=True)
 
     def is_past(self, time: float) -> bool:
-        """Return whether a time [s] lies behind all that was recorded."""
+        """Return whether a time [s] is after everything that was recorded."""
         return self._next is None and round(time * NANOSECONDS) > self._last
 
     @property
     def cut_at(self) -> float:
-        """Return the time [ns] from which on the recording may lack something, since it has no orderly end."""
+        """Return the time [ns] after which the recording may lack something, since it has no orderly end."""
         return math.inf if self._is_whole else self._last
 
     def _following(self) -> Recorded | None:
-        """Return the next record that is not about time."""
+        """Return the next record that is not an instant."""
         for record in self._records:
             self._last = record.log_time
             if record.topic.name != INSTANTS:
@@ -82,7 +82,7 @@ class ReplayFeed:
         return exact if stamp == record.log_time else record.log_time / NANOSECONDS
 
     def _schedule(self, *, is_after_own: bool = False) -> None:
-        """Continue to the next input, over what is none, and have it come at its time."""
+        """Skip to the next input, and schedule it at its time."""
         while self._next is not None and not self._is_input(self._next):
             if self._next.topic.node == self._name:
                 self._expect(self._next)
@@ -93,7 +93,7 @@ class ReplayFeed:
             self._scheduler.at(self._time(self._next), owner, self._feed)
 
     def _feed(self) -> None:
-        """Let all arrive that its sender has sent at once."""
+        """Deliver all inputs that the sender sent in one go."""
         first = self._next
         is_after_own = False
         while self._next is not None and first is not None and _belong_together(first, self._next):
@@ -127,7 +127,7 @@ class ReplayFeed:
             self._stage.publish(self._key(record), payload, Attachment(self._count, record.publish_time, sender))
 
     def _order(self, verb: str, *words: Any) -> None:
-        """Give the host an order again, as far as it is about this component."""
+        """Repeat an order to the host, as far as it concerns this component."""
         match verb:
             case "shutdown":
                 self._is_whole = True
@@ -146,16 +146,16 @@ class ReplayFeed:
             return
         try:
             request = self._host.request(instance, data)
-        except Refused as refusal:  # another version recorded it
+        except Refused as refusal:  # recorded by another version
             self._host.log(instance, Level.ERROR, f"a recorded command cannot be given again: {refusal}")
             return
         try:
             self._host.ask(instance, request)
         except Refused:
-            return  # as it was when it was recorded
+            return  # refused as in the recording
 
     def _called(self, service: Known, payload: bytes) -> None:
-        """Let a request arrive at its server, or a reply at who has asked."""
+        """Deliver a request to its server, or a reply to its client."""
         key, interface = service
         event = decode(event_of(interface), payload)
         info: ServiceEventInfo = event.info
@@ -170,7 +170,7 @@ class ReplayFeed:
 
 
 def _belong_together(first: Recorded, record: Recorded) -> bool:
-    """Return whether two records were made in one go."""
+    """Return whether two records were sent in one go."""
     return (record.topic.node, record.log_time) == (first.topic.node, first.log_time) and (
         (record.topic.name == ORDERS) == (first.topic.name == ORDERS)
     )

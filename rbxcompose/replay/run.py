@@ -27,7 +27,7 @@ FRAMES = ("/tf", "/tf_static")
 
 @dataclass(frozen=True, slots=True)
 class Rerun:
-    """What came of it: the number of messages that were as recorded, the first that was not, what went wrong."""
+    """The result: the number of messages that were as recorded, the first that was not, and what went wrong."""
 
     equal: int
     difference: RunDifference | None
@@ -35,7 +35,7 @@ class Rerun:
 
 
 def missing_topics(plan: Plan, instance: Instance, topics: Iterable[RecordedTopic]) -> list[str]:
-    """Return the inputs of a component that the robot publishes and that the recording does not have."""
+    """Return the inputs of a component that the robot publishes but the recording lacks."""
     recorded = {topic.name for topic in topics}
     published = {wire.topic for one in plan.instances for wire in one.wires if wire.kind == "out"}
     wanted: set[str] = set()
@@ -52,7 +52,7 @@ def rerun(
 ) -> Rerun:
     """Give a component its recorded inputs at their instants and compare its outputs.
 
-    It ends at the first difference, unless there is a `keep`, which gets all outputs.
+    It stops at the first difference, unless there is a `keep`, which receives all outputs.
     """
     alone = plan.in_one_process()
     only = next(one for one in alone.instances if one.name == instance.name)

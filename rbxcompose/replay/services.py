@@ -1,4 +1,4 @@
-"""The services of one component, those that it serves and calls: their keys, and the topics of their events."""
+"""The services that one component serves and calls: their keys, and the topics of their events."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Known = tuple[str, type[Service[Any, Any]]]  # key on the bus, type
 
 
 class ReplayedServices:
-    """What the events of a recording are to one component."""
+    """Maps the service events of a recording to the services of one component."""
 
     def __init__(self, plan: Plan, instance: Instance) -> None:
         wire = WIRE_PROFILES[plan.bus.wire]
@@ -30,17 +30,17 @@ class ReplayedServices:
         }
 
     def find(self, topic: str) -> Known | None:
-        """Return the service whose events are on this topic, if it is one of the component's."""
+        """Return the component's service whose events are on this topic, if any."""
         return self._known.get(topic)
 
     def is_served(self, pattern: str) -> bool:
-        """Return whether a pattern of tokens is that of the servers of a service that the robot has."""
+        """Return whether a token pattern matches the servers of a service that the robot has."""
         is_server = f"/{EntityKind.SERVER}/" in pattern
         return is_server and any(f"/{mangle(name)}/" in pattern for name in self._served)
 
 
 def _ends(instance: Instance, *kinds: type[Any]) -> Iterator[Known]:
-    """Yield name and type of each service that ports of these kinds are made of."""
+    """Yield the name and type of each service behind ports of these kinds."""
     for name, port in component_type(instance.type).ports(instance.config).items():
         interface: Any = port.interface
         if not isinstance(port, kinds):

@@ -1,4 +1,4 @@
-"""The substitute for the rest of the robot: a transport that plays a recording, and a bus over it."""
+"""A substitute for the rest of the robot: a transport that plays a recording, and a bus over it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ M = TypeVar("M", bound=Message)
 
 @dataclass(frozen=True, slots=True)
 class Fed:
-    """Recorded bytes on their way in; as a request, it is answered to nobody: a witness has heard the reply."""
+    """Recorded bytes on their way in; the reply to a request goes to nobody, since a witness records it."""
 
     payload: bytes
     attachment: bytes
@@ -39,23 +39,23 @@ class ReplayStage(NoTransport):
     """A transport whose other side is a recording. Keys are those of topics and services."""
 
     scheduler: Scheduler
-    served: Callable[[str], bool]  # tells whether a key of a token pattern has a server in the robot
+    served: Callable[[str], bool]  # returns whether a token pattern has a server in the robot
     session: str = "0"
     subscribers: dict[str, list[Callable[[Arrival], None]]] = field(default_factory=dict)
     servers: dict[str, Callable[[Question], None]] = field(default_factory=dict)
     waiting: dict[tuple[str, bytes, int], Callable[[TransportReply], None]] = field(default_factory=dict)
 
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
-        """Have the callback run at this instant."""
+        """Let the scheduler run the callback at this instant."""
         self.scheduler.post(owner, callback)
 
     def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> NoTransport:
-        """Receive what was recorded."""
+        """Receive the recorded messages."""
         self.subscribers.setdefault(key, []).append(arrived)
         return self
 
     def serve(self, key: str, asked: Callable[[Question], None]) -> NoTransport:
-        """Receive the requests that were recorded."""
+        """Receive the recorded requests."""
         self.servers[key] = asked
         return self
 
@@ -69,25 +69,25 @@ class ReplayStage(NoTransport):
         of_all: bool = True,
         within: float = LONGEST_WAIT,
     ) -> NoTransport:
-        """Wait for the reply that was recorded."""
+        """Wait for the recorded reply."""
         source = decode_attachment(attachment)
         self.waiting[key, source.gid, source.sequence] = answered
         return self
 
     def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> NoTransport:
-        """See a server where the robot has one."""
+        """Report a server where the robot has one."""
         if self.served(pattern):
             changed(pattern.replace("*", "recorded"), True)
         return self
 
     def publish(self, key: str, payload: bytes, source: Attachment) -> None:
-        """Let a recorded message arrive."""
+        """Deliver a recorded message."""
         for arrived in self.subscribers.get(key, ()):
             arrived(Fed(payload, source.encode()))
 
 
 class StageBus(Bus):
-    """The bus of one component. What its host says of it reaches nobody: the recording has what the whole host said."""
+    """The bus of one component. Its host's own messages go nowhere: the recording has those of the whole host."""
 
     def __init__(
         self, scheduler: Scheduler, clock: Clock, plan: Plan, owner: str, stage: ReplayStage, tape: Tape
@@ -107,7 +107,7 @@ class StageBus(Bus):
         self._aside = Bus(scheduler, clock, wire=wire, log=lambda owner, text: None)
 
     def publisher(self, owner: str, topic: str, message: type[M], qos: Qos) -> Publisher[M]:
-        """Declare a publisher of the component; one of somebody else reaches nobody."""
+        """Declare a publisher of the component; messages of any other owner go nowhere."""
         if owner != self._owner:
             return self._aside.publisher(owner, topic, message, qos)
         return super().publisher(owner, topic, message, qos)

@@ -17,7 +17,7 @@ from rbxcompose.sdk.registry import component_type
 
 TYPE_HELP = "What runs: the name of a component type."
 TYPE = "type"
-COMPONENT = "component_"  # begins the name of the definition of a type
+COMPONENT = "component_"  # prefix of the definition of a type
 _EXAMPLE = "Example:"
 
 
@@ -52,7 +52,7 @@ def _entry(names: list[str], options: Schema) -> Schema:
 
 
 def _component(name: str, config: Schema, options: Mapping[str, Any]) -> Schema:
-    """Return the schema of a type: its own settings, and the names of what every entry may have."""
+    """Return the schema of a type: its own settings, plus the keys that every entry may have."""
     return {
         "description": about_type(name),
         "type": "object",
@@ -64,7 +64,7 @@ def _component(name: str, config: Schema, options: Mapping[str, Any]) -> Schema:
 
 
 def about_type(name: str) -> str:
-    """Return what a component type is: its docstring up to the example, as one paragraph."""
+    """Return the description of a component type: its docstring up to the example, as one paragraph."""
     text = inspect.getdoc(component_type(name)) or ""
     return " ".join(text.partition(_EXAMPLE)[0].split())
 

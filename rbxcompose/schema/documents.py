@@ -33,12 +33,12 @@ _WIDTH = 120  # of a line in a file
 
 @cache
 def installed_schema(kind: str) -> Schema:
-    """Return the schema of a kind of manifest with all component types that are installed; not to be changed."""
+    """Return the schema of a kind of manifest with all installed component types; it must not be modified."""
     return MAKERS[kind](registry.usable_names())
 
 
 def as_text(schema: Schema) -> str:
-    """Return a schema as the text of its file: what fits stands on one line, so that changes are short."""
+    """Return a schema as the text of its file: anything that fits on one line does, so that diffs are short."""
     return _text(schema, 0) + "\n"
 
 
@@ -57,7 +57,7 @@ def _text(value: Any, depth: int) -> str:
 
 
 def files() -> dict[str, str]:
-    """Return file name -> text of all schemas, with the component types that ship with the package."""
+    """Return the file name and text of each schema, with the component types that ship with the package."""
     shipped = sorted(registry.PLUGINS.shipped)
     return {f"{kind.lower()}.schema.json": as_text(make(shipped)) for kind, make in MAKERS.items()}
 

@@ -1,4 +1,4 @@
-"""What may be at a place of a manifest, read from its JSON Schema and the text around the place."""
+"""What can be at a place of a manifest, read from its JSON Schema and the text around the place."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rbxcompose.schema.scalars import DIMENSION, Schema
 from rbxcompose.schema.settle import referred
 from rbxcompose.units import DIMENSIONS, Dimension
 
-_DEEPEST = 12  # references and choices inside each other
+_DEEPEST = 12  # nested references and choices
 
 
 class Guide:
@@ -25,11 +25,11 @@ class Guide:
         self.types = types
 
     def keys(self, path: KeyPath) -> dict[str, Schema]:
-        """Return what the map at `path` may have, by key; names that the user gives are not among them."""
+        """Return the schemas of the keys that the map at `path` may have, without names chosen by the user."""
         shapes = [one for one in self._shapes(path) if "properties" in one]
         closed = [one for one in shapes if one.get("additionalProperties") is False]
         names = dict.fromkeys(name for one in closed or shapes for name in one["properties"])
-        # What is only allowed here, `true`, is described beside it.
+        # A key that is only allowed here (`true`) is described in another schema.
         told = {
             name: schema
             for one in [*shapes, *closed]
@@ -39,18 +39,18 @@ class Guide:
         return {name: self._whole(told[name]) for name in names}
 
     def _whole(self, schema: Schema) -> Schema:
-        """Return a schema with what holds beside it; what it says itself comes first."""
+        """Return a schema merged with those it refers to; its own statements take precedence."""
         whole: Schema = {}
         for one in self._opened(schema, None, ()):
             whole = {**one, **whole}
         return whole
 
     def describe(self, path: KeyPath) -> str:
-        """Return what the value at `path` is for."""
+        """Return the purpose of the value at `path`."""
         return next((one["description"] for one in self._last(path) if one.get("description")), "")
 
     def value(self, path: KeyPath) -> GuidedValue:
-        """Return what may stand at `path`."""
+        """Return what can be at `path`."""
         return GuidedValue([*self._shapes(path)])
 
     def _shapes(self, path: KeyPath) -> Iterator[Schema]:
@@ -59,7 +59,7 @@ class Guide:
             yield from self._opened(schema, node, path)
 
     def _last(self, path: KeyPath) -> list[Schema]:
-        """Return the schemas of the place itself, before references and choices in them are opened."""
+        """Return the schemas of the place itself, before their references and choices are resolved."""
         found = [self.schema]
         for length, key in enumerate(path):
             above = path[:length]
@@ -69,11 +69,11 @@ class Guide:
         return found
 
     def _meant(self, schema: Schema) -> Schema:
-        """Return the key of a definition for which a schema stands, or the schema itself."""
+        """Return the key of a definition that a schema refers to, or the schema itself."""
         return referred(schema, self.schema) if "/properties/" in schema.get("$ref", "") else schema
 
     def _opened(self, schema: Schema, node: TreeNode | None, path: KeyPath, depth: int = 0) -> Iterator[Schema]:
-        """Yield a schema, and all that it stands for or that holds beside it."""
+        """Yield a schema, and all those it refers to or combines."""
         if depth > _DEEPEST:
             return
         yield schema
@@ -116,7 +116,7 @@ def _below(schema: Schema, key: str | int) -> Iterator[Schema]:
 
 
 class GuidedValue:
-    """What may stand at one place."""
+    """What can be at one place."""
 
     def __init__(self, shapes: list[Schema]) -> None:
         self.shapes = shapes
@@ -126,18 +126,18 @@ class GuidedValue:
 
     @property
     def dimension(self) -> Dimension | None:
-        """Return what a quantity here measures."""
+        """Return the dimension of a quantity here."""
         name = self._first(DIMENSION)
         return DIMENSIONS[name] if name else None
 
     @property
     def names(self) -> str:
-        """Return of what the name of something stands here: `place`; else nothing."""
+        """Return the kind of thing whose name is expected here, such as `place`; empty if none is."""
         return str(self._first("x-names") or "")
 
     @property
     def default(self) -> object:
-        """Return what holds if nothing is written."""
+        """Return the default."""
         return self._first("default")
 
     @property
@@ -148,7 +148,7 @@ class GuidedValue:
 
     @property
     def words(self) -> dict[str, str]:
-        """Return the words that may stand here, each with what it means."""
+        """Return the words possible here, each with its meaning."""
         found: dict[str, str] = {}
         for one in self.shapes:
             about = one.get("enumDescriptions") or [""] * len(one.get("enum", ()))

@@ -1,4 +1,4 @@
-"""Schema of a mission's file: nodes by kind, modifiers, the skills of the component types that are known."""
+"""Schema of a mission file: nodes by kind, modifiers, and the skills of the known component types."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from rbxcompose.schema.settle import schemas_of
 from rbxcompose.sdk.ports import ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
 
-KIND = "kind_"  # begins the name of the definition of a kind of node
+KIND = "kind_"  # prefix of the definition of a kind of node
 ANY_NODE = "What is done: a skill, a kind of node with its settings, or a list of nodes, which is a sequence."
 NODE_NAME: Schema = {
     **ITEM_NAME,
@@ -88,7 +88,7 @@ def mission_schema(types: Iterable[str]) -> Schema:
     }
     made = {key: {**properties[key], "description": _ABOUT[key]} for key in KEYS if key in properties}
     schema = document("Mission", MissionFile, made, definitions | _nodes(types))
-    # Which of the two bodies is missing is told by `check`: editors name neither well where a choice fails.
+    # `check` reports which of the two bodies is missing: editors name neither well when a choice fails.
     return {**schema, "anyOf": [{"required": ["do"]}, {"required": ["machine"]}]}
 
 
@@ -129,13 +129,13 @@ def _nodes(types: Iterable[str]) -> dict[str, Schema]:
     chosen: list[Schema] = [
         {"if": {"required": [name]}, "then": {"$ref": f"{DEFINITIONS}{KIND}{name}"}} for name in closed
     ]
-    # What may be chosen stands apart, so that editors do not propose a second step beside the one that is there.
+    # What can be chosen is kept apart, so that editors do not propose a second step beside an existing one.
     is_open = {"not": {"anyOf": [one["if"] for one in chosen]}}
     chosen.append({"if": is_open, "then": {"properties": {**words, **known}}})
     word: Schema = {"type": "string", "minLength": 1, "examples": list(known)}
     steps: Schema = {"type": "array", "minItems": 1, "items": NODE}
     mapping = {"type": "object", "minProperties": 1, "properties": anywhere, "allOf": chosen}
-    # One schema with several types, not a choice of schemas: editors then tell the mistake of the type that is there.
+    # One schema with several types, not a choice: editors then report the mistake for the type that is there.
     node = {**word, **steps, **mapping, "type": ["string", "array", "object"], "description": ANY_NODE}
     listed = {**steps, "description": "Nodes, one after the other."}
     shared = {"node": node, "steps": listed, "deeds": _deeds(), "machine": _machine(), "state": _state(anywhere)}
@@ -143,12 +143,12 @@ def _nodes(types: Iterable[str]) -> dict[str, Schema]:
 
 
 def _key_of(definition: str, key: str) -> Schema:
-    """Return a reference to what stands for a key in a definition."""
+    """Return a reference to the schema of a key in a definition."""
     return {"$ref": f"{DEFINITIONS}{definition}/properties/{key}"}
 
 
 def _deeds() -> Schema:
-    """Return the schema of what a hook does."""
+    """Return the schema of the actions of a hook."""
     keys = {key: _key_of(f"{KIND}{word}", key) for word in DEEDS for key in kind_schema(kinds()[word])[0]}
     return {"type": "object", "minProperties": 1, "properties": keys, "additionalProperties": False}
 
@@ -173,7 +173,7 @@ def _machine() -> Schema:
 
 
 def _state(anywhere: dict[str, Schema]) -> Schema:
-    """Return the schema of a state: its body, its transitions, and what any node may have."""
+    """Return the schema of a state: its body, its transitions, and the keys that any node may have."""
     to = {"type": ["string", "object"], "minLength": 1, "minProperties": 1, "additionalProperties": ITEM_NAME}
     own: dict[str, Schema] = {"do": NODE, "machine": MACHINE, "next": to}
     described = {key: {**schema, "description": _STATE[key]} for key, schema in own.items()}
@@ -183,7 +183,7 @@ def _state(anywhere: dict[str, Schema]) -> Schema:
 
 
 def _skill(skill: Skill, about: str) -> Schema:
-    """Return the schema of what stands behind the name of a skill: its main argument, or a map of several."""
+    """Return the schema of the value of a skill: its main argument, or a map of several."""
     arguments = {
         name: {**argument_schema(wanted), "description": f"Argument of `{skill.name}`: {wanted.phrase}."}
         for name, wanted in skill.arguments.items()
@@ -197,7 +197,7 @@ def _skill(skill: Skill, about: str) -> Schema:
 
 
 def skills_of(types: Iterable[str]) -> dict[str, tuple[Skill, str]]:
-    """Return the skills that components of these types offer, each with what it does."""
+    """Return the skills that components of these types offer, each with a description."""
     found = {}
     for name in sorted(types):
         cls = component_type(name)

@@ -1,4 +1,4 @@
-"""What the keys of a mission node take: runs the code that reads a kind on a reader that records what it reads."""
+"""The keys of a mission node: runs the code that reads a kind with a reader that records what it reads."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ITEM_NAME: Schema = {"type": "string", "pattern": "^[a-z][a-z0-9_]*$", "maxLengt
 MACHINE: Schema = {"$ref": f"{DEFINITIONS}machine"}
 DEEDS: Schema = {"$ref": f"{DEFINITIONS}deeds"}
 ANYTHING: Schema = {"type": ["string", "number", "boolean", "object", "array"]}
-MAPS: dict[str, Schema] = {  # by the key that takes the map
+MAPS: dict[str, Schema] = {  # by the key whose value is the map
     "machine": MACHINE,
     "outcomes": {"type": "object", "minProperties": 1, "propertyNames": ITEM_NAME, "additionalProperties": EXPRESSION},
     "with": {"type": "object", "minProperties": 1, "propertyNames": ITEM_NAME, "additionalProperties": ANYTHING},
@@ -38,7 +38,7 @@ MAPS: dict[str, Schema] = {  # by the key that takes the map
 
 
 class Asking(NodeReader):
-    """A reader that has every key, and keeps for each the schema of what it is asked for."""
+    """A reader that has every key, and records the schema of each value requested from it."""
 
     def __init__(self, key: str) -> None:
         word = ScalarNode(key, MappingNode().span)
@@ -47,7 +47,7 @@ class Asking(NodeReader):
         self.optional: set[str] = set()
 
     def has(self, key: str) -> bool:
-        """Say yes, so that everything is asked for."""
+        """Return True, so that every key is requested."""
         self.optional.add(key)
         return True
 
@@ -152,7 +152,7 @@ class Asking(NodeReader):
 
 
 def kind_schema(kind: StepType) -> tuple[dict[str, Schema], list[str]]:
-    """Return the schemas of the keys of a kind, described, and those that must be there."""
+    """Return the described schemas of the keys of a kind, and its required keys."""
     asking = Asking(kind.name)
     kind.read(asking)
     about = {kind.name: first_line(kind.__doc__), **kind.options}
@@ -170,7 +170,7 @@ def modifier_schemas() -> dict[str, Schema]:
 
 
 def modifier_schema(key: str, cls: type[Modifier]) -> dict[str, Schema]:
-    """Return the schemas of the keys that a modifier reads, described."""
+    """Return the described schemas of the keys that a modifier reads."""
     asking = Asking(key)
     cls.read(asking, key)
     about = {key: first_line(cls.__doc__), **cls.keys}

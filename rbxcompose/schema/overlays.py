@@ -1,4 +1,4 @@
-"""From the schema of a robot's sections to that of an overlay: every key may be left out, and may be taken out."""
+"""From the schema of a robot's sections to that of an overlay: every key may be omitted or removed."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from rbxcompose.schema.components import COMPONENT
 from rbxcompose.schema.scalars import DEFINITIONS, Schema
 from rbxcompose.sections.components import components
 
-OVER = "overlay_"  # begins the name of a definition that is another one in an overlay
+OVER = "overlay_"  # prefix of a definition that differs in an overlay
 REMOVED = "removed"
 _REMOVED: Schema = {"enum": [None, ""], "description": "With the tag `!remove`: removes it from the layers below."}
 _NOT_NEEDED = ("required", "minProperties", "minItems", "default")
-_NOTES = ("description", "x-names", "x-dimension")  # what editors look for at the key itself
+_NOTES = ("description", "x-names", "x-dimension")  # what editors expect at the key itself
 
 
 def laid_over(
     sections: Mapping[str, Schema], definitions: Mapping[str, Schema]
 ) -> tuple[dict[str, Schema], dict[str, Schema]]:
-    """Return the sections as an overlay may have them, and all definitions, those among them that overlays need."""
+    """Return the sections as allowed in an overlay, and all definitions, including those that only overlays need."""
     over = _Overlay(definitions)
     schemas = {name: over.of(one) for name, one in sections.items()}
     for section in all_sections():
@@ -38,7 +38,7 @@ def laid_over(
 
 
 def _told(section: Schema, definitions: Mapping[str, Schema]) -> Schema:
-    """Return the section `components` with what the keys of an entry mean that does not repeat its type."""
+    """Return the section `components` with descriptions of the keys of an entry that does not repeat its type."""
     about: dict[str, list[str]] = {}
     for name in (one for one in definitions if one.startswith(COMPONENT)):
         for key, schema in definitions[name]["properties"].items():
@@ -52,7 +52,7 @@ def _told(section: Schema, definitions: Mapping[str, Schema]) -> Schema:
 
 
 def or_removed(schema: Schema) -> Schema:
-    """Return the schema of something that an overlay may also take out."""
+    """Return the schema of something that an overlay may also remove."""
     notes = {key: schema[key] for key in _NOTES if key in schema}
     rest = {key: value for key, value in schema.items() if key not in notes}
     choices = rest["anyOf"] if rest.keys() == {"anyOf"} else rest["allOf"] if rest.keys() == {"allOf"} else [rest]
@@ -60,7 +60,7 @@ def or_removed(schema: Schema) -> Schema:
 
 
 class _Overlay:
-    """Turns schemas into those of an overlay; definitions that are the same there are shared with the robot's."""
+    """Turns schemas into those of an overlay; definitions that do not differ are shared with the robot's."""
 
     def __init__(self, definitions: Mapping[str, Schema]) -> None:
         self.changed: set[str] = set()
@@ -73,7 +73,7 @@ class _Overlay:
         return self.of(schema) != schema
 
     def of(self, schema: Schema) -> Schema:
-        """Return a schema as an overlay has it."""
+        """Return the form of a schema in an overlay."""
         made: dict[str, Any] = {}
         for key, value in schema.items():
             match key:

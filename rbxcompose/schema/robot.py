@@ -1,4 +1,4 @@
-"""Schemas of what consists of sections: robots, the parts that they include, and their overlays."""
+"""Schemas of the files that consist of sections: robots, the parts they include, and their overlays."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from rbxcompose.schema.settle import opened, schemas_of
 from rbxcompose.sections.components import components
 from rbxcompose.sections.profiles import profiles
 
-MADE_OTHERWISE = (components, profiles)  # of more than one model
+MADE_OTHERWISE = (components, profiles)  # made from more than one model
 
-CHANGES = "changes"  # the definition of what may be laid over the sections of a file
+CHANGES = "changes"  # the definition of the changes that the sections of a file accept
 NAMES: Schema = {"pattern": "^[a-z][a-z0-9_]*$", "maxLength": 60}
 
 
@@ -66,7 +66,7 @@ def overlay_schema(types: Iterable[str]) -> Schema:
 
 
 def _changes(made: Sections, kind: str) -> tuple[Schema, dict[str, Schema]]:
-    """Return what may be laid over the sections of a file, and all definitions, that one among them."""
+    """Return the schema of changes to the sections of a file, and all definitions, including that one."""
     overlay, definitions = laid_over(made.schemas, made.definitions)
     changes = {"properties": described(overlay, kind)}
     return changes, {**definitions, CHANGES: changes}
@@ -81,9 +81,9 @@ def document(
     *,
     may_change: bool = False,
 ) -> Schema:
-    """Return the schema of a file of some kind: its header, then its own keys, of which `always` have one schema.
+    """Return the schema of one kind of file: its header, then its own keys; `always` holds keys with a fixed schema.
 
-    A file that includes parts writes of an entry only what it changes, if it `may_change` what they bring.
+    A file with `include` writes only changes to an entry, if it `may_change` what its parts bring.
     """
     made = {
         "$schema": "http://json-schema.org/draft-07/schema#",
@@ -103,7 +103,7 @@ def document(
 
 
 def header(kind: str) -> dict[str, Schema]:
-    """Return the keys that every manifest begins with."""
+    """Return the keys at the start of every manifest."""
     (made,) = schemas_of({"header": ManifestHeader})[1].values()
     return {
         **{name: dict(one) for name, one in made["properties"].items()},
@@ -113,18 +113,18 @@ def header(kind: str) -> dict[str, Schema]:
 
 
 def described(schemas: Mapping[str, Schema], kind: str) -> dict[str, Schema]:
-    """Return the sections that a kind of manifest has, in their order, with what they are for."""
+    """Return the sections of a kind of manifest, in their order, with their descriptions."""
     made = [one for one in all_sections(kind) if one.name in schemas]
     return {one.name: {**schemas[one.name], "description": one.doc} for one in made}
 
 
 def or_empty(schema: Schema) -> Schema:
-    """Return the schema of a section, which may have nothing below its name."""
+    """Return the schema of a section, which may be empty."""
     return {**schema, "type": ["object", "null"]} if schema.get("type") == "object" else schema
 
 
 def reached(schema: Schema, definitions: Mapping[str, Schema]) -> dict[str, Schema]:
-    """Return the definitions that a schema refers to, also by way of others, in alphabetical order."""
+    """Return the definitions that a schema refers to, directly or indirectly, in alphabetical order."""
     found: dict[str, Schema] = {}
     waiting = set(_references(schema))
     while waiting:

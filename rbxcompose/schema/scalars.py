@@ -11,10 +11,10 @@ from rbxcompose.units import DIMENSIONS, NUMBER_TEXT, UNITS, Dimension, bare_num
 Schema = dict[str, Any]
 
 DEFINITIONS = "#/definitions/"
-DIMENSION = "x-dimension"  # a keyword of ours: what a value measures
-FILLED = r"\$\{"  # text with this in it gets its value when the files are put together
+DIMENSION = "x-dimension"  # a keyword of ours: the dimension of a value
+FILLED = r"\$\{"  # text that contains this gets its value when the files are composed
 FILL: Schema = {"type": "string", "pattern": FILLED}
-COMPUTED = r"[$(*/+]|\s-\s"  # text with this in it is computed while the robot runs
+COMPUTED = r"[$(*/+]|\s-\s"  # text that contains this is evaluated while the robot runs
 _PLAIN = {"integer": "a whole number", "number": "a number", "boolean": "true or false"}
 _NOTES = ("description", "default", "examples", "x-names")
 
@@ -63,7 +63,7 @@ def _quantity(dimension: Dimension, otherwise: str) -> Schema:
 
 
 def _complaint(message: str) -> Schema:
-    """Return what editors say of a value of another type or form."""
+    """Return the message that editors show for a value of another type or form."""
     return {"errorMessage": message, "patternErrorMessage": message}
 
 
@@ -74,7 +74,7 @@ def _number_with_unit(dimension: Dimension) -> str:
 
 
 def or_filled(schema: Schema) -> Schema:
-    """Return the schema of what `schema` takes, or of a `${...}` that stands for it."""
+    """Return a schema that accepts what `schema` does, or a `${...}` in its place."""
     notes = {key: schema[key] for key in _NOTES if key in schema}
     rest = {key: value for key, value in schema.items() if key not in _NOTES}
     types = rest.get("type")
@@ -83,7 +83,7 @@ def or_filled(schema: Schema) -> Schema:
     if types == "string":
         if "pattern" in rest:
             return {**rest, "pattern": f"({rest['pattern']})|{FILLED}", **notes}
-        return {**rest, "type": ["string", "number", "boolean"], **notes}  # a text takes its scalar as written
+        return {**rest, "type": ["string", "number", "boolean"], **notes}  # a text accepts its scalar as written
     if types not in _PLAIN:
         return schema
     return {**rest, "type": [types, "string"], "pattern": FILLED, **_complaint(f"must be {_PLAIN[types]}"), **notes}

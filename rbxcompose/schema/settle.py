@@ -15,7 +15,7 @@ _NOTHING: tuple[Any, ...] = (None, {}, [], "")
 
 
 def schemas_of(types: Mapping[str, Any]) -> tuple[dict[str, Schema], dict[str, Schema]]:
-    """Return the schema of each type by its key, and the definitions that they share."""
+    """Return the schema of each type by its key, and their shared definitions."""
     adapters = [(key, _SIDE, TypeAdapter(type_)) for key, type_ in types.items()]
     raw, shared = TypeAdapter.json_schemas(adapters, ref_template=DEFINITIONS + "{model}")
     definitions = {name: settled(one) for name, one in shared.get("$defs", {}).items()}
@@ -28,7 +28,7 @@ def opened(schema: Schema, definitions: Mapping[str, Schema]) -> Schema:
 
 
 def referred(schema: Schema, document: Schema) -> Schema:
-    """Return what a schema refers to in its document, with the notes beside the reference, or the schema itself."""
+    """Return the target of a schema's reference in its document, with the notes beside it, or the schema itself."""
     found: Any = document if "$ref" in schema else schema
     for key in schema.get("$ref", "").split("/")[1:]:
         found = found[key]
@@ -36,7 +36,7 @@ def referred(schema: Schema, document: Schema) -> Schema:
 
 
 def settled(raw: Schema) -> Schema:
-    """Return one of pydantic's schemas as that of a manifest."""
+    """Return the manifest form of one of pydantic's schemas."""
     raw = {key: value for key, value in raw.items() if key != "title"}
     if raw.get("default", 0) in _NOTHING:
         del raw["default"]
@@ -44,7 +44,7 @@ def settled(raw: Schema) -> Schema:
         return _quantity(raw)
     if "anyOf" in raw:
         return _any_of(raw)
-    if "$ref" in raw:  # editors see what stands beside it, validators need not
+    if "$ref" in raw:  # editors see what is beside it, validators need not
         return raw
     match raw.get("type"):
         case "object" if "properties" in raw:
@@ -67,7 +67,7 @@ def _quantity(raw: Schema) -> Schema:
 
 
 def _any_of(raw: Schema) -> Schema:
-    """Return a choice between schemas; one that may be empty is a single schema with one more type."""
+    """Return a choice between schemas; an optional one becomes a single schema with one more type."""
     members = [settled(one) for one in raw["anyOf"] if one != {"type": "null"}]
     rest = {key: value for key, value in raw.items() if key != "anyOf"}
     is_optional = len(members) < len(raw["anyOf"])
@@ -81,7 +81,7 @@ def _listed(types: str | list[str]) -> list[str]:
 
 
 def _map(raw: Schema) -> Schema:
-    """Return a map from names: the pattern of the names applies to the keys, so that a wrong one is told as such."""
+    """Return a map by name: the pattern applies to the keys, so that a wrong name is reported as one."""
     made = {key: value for key, value in raw.items() if key != "patternProperties"}
     for pattern, entry in raw.get("patternProperties", {}).items():
         made["additionalProperties"] = entry

@@ -1,4 +1,4 @@
-"""Schema of the file of a test: its sections are models, its steps are names of the mission."""
+"""Schema of a test file: its sections are models, its steps are names in the mission."""
 
 from __future__ import annotations
 

@@ -31,21 +31,21 @@ class Body(Config):
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What describes the robot's body: a URDF file and its text, which has been read without mistakes."""
+    """The description of the robot's body: a URDF file and its text, which was read without mistakes."""
 
     path: Path
     text: str
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
-    """Yield what publishes the description."""
+    """Yield the component that publishes the description."""
     if found := contents.of(body):
         yield WantedComponent(DESCRIPTION, DESCRIPTION, {"urdf": found.text}, ("body", "urdf"))
 
 
 @section("body", Body, order=30, brings=(DESCRIPTION,), components=_components)
 def body(reading: Reading[Body]) -> Description | None:
-    """What the robot looks like and how it moves: its URDF, which is published for viewers and other programs.
+    """What the robot looks like and how it moves: its URDF file, published for viewers and other programs.
 
     Example:
         body:

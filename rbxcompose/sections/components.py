@@ -71,7 +71,7 @@ def _models(node: TreeNode) -> Iterator[type[Config]]:
 
 
 def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
-    """Return a component with `connect:` for each port whose own topic gets another name."""
+    """Return a component with `connect:` for each port whose own topic is renamed."""
     written = at(node, ("connect",))
     if not isinstance(node, MappingNode) or (written is not None and not isinstance(written, MappingNode)):
         return node
@@ -147,12 +147,12 @@ def component_class(node: TreeNode) -> type[Component[Any]] | None:
         return None
     try:
         return registry.component_type(written.text)
-    except BrokenPluginError:  # told where the section is read
+    except BrokenPluginError:  # reported where the section is read
         return None
 
 
 def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> ComponentEntry | None:
-    """Return one component; None if it has no known type, without a `config` if there are mistakes in that."""
+    """Return one component; None if its type is missing or unknown, without a `config` if that has mistakes."""
     report = reading.report
     node, path = entry.value, ("components", name)
     if is_broken(node):
@@ -161,7 +161,7 @@ def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> C
         message = f"component '{name}' must be a map with a 'type:' and its configuration"
         report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
         return None
-    # A missing key is shown at the component's name, not at whatever its first key is.
+    # A missing key is reported at the component's name, not at whatever its first key happens to be.
     options_node = replace(_part(node, OPTIONS), span=entry.key.span)
     options = validate(ComponentOptions, options_node, path, report) or ComponentOptions()
     type_name = _type_name(name, entry, node, report)

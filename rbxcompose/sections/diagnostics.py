@@ -1,4 +1,4 @@
-"""The section `diagnostics`: groups of the states of components."""
+"""The section `diagnostics`: groups of component statuses."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class DiagnosticsModel(Config):
 
 
 def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
-    """Return an analyzer with patterns that match what the part's components and muxes are called outside."""
+    """Return an analyzer whose patterns match the outside names of the part's components and muxes."""
     if not isinstance(node, MappingNode):
         return node
     changed = {
@@ -49,7 +49,7 @@ def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
 
 
 def _patterns(renames: Renames, node: TreeNode) -> TreeNode:
-    """Return a list of names and patterns; one that also matches muxes of the part names them beside it."""
+    """Return a list of names and patterns; a pattern that also matches muxes of the part is followed by their names."""
     if not isinstance(node, SequenceNode):
         return node
     items: list[TreeNode] = []
@@ -60,7 +60,7 @@ def _patterns(renames: Renames, node: TreeNode) -> TreeNode:
 
 
 def _pattern(renames: Renames, pattern: str) -> list[str]:
-    """Return the patterns for what one matches in the part: that with the prefix, and names without it."""
+    """Return the patterns that replace one of a part: one with the prefix, and the names that have no prefix."""
     matched = {name: renames.component(name) for name in sorted(renames.running) if fnmatchcase(name, pattern)}
     others = [changed for name, changed in matched.items() if changed != f"{renames.prefix}{name}"]
     return others if len(others) == len(matched) else [f"{renames.prefix}{pattern}", *others]

@@ -1,4 +1,4 @@
-"""The section `muxes`: which source may command."""
+"""The section `muxes`: which source controls an output."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rbxcompose.sections.components import ComponentEntry, components
 
 MUX = "mux"
 _BELOW_TOPIC = ("inputs", "locks")  # keys whose keys are topics below that of the mux
-_TWIST = "geometry_msgs/msg/Twist"  # what a mux forwards whose type nothing tells
+_TWIST = "geometry_msgs/msg/Twist"  # the type that a mux forwards if nothing declares one
 
 
 class MuxInput(Config):
@@ -54,7 +54,7 @@ class MuxModel(Config):
 
 
 def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
-    """Return a mux whose inputs and locks follow its topics."""
+    """Return a mux whose inputs and locks follow its renamed topics."""
     if not isinstance(node, MappingNode):
         return node
     changed = {
@@ -105,7 +105,7 @@ def _connects(contents: Contents) -> dict[str, dict[str, str]]:
 
 
 def _outputs(entry: ComponentEntry, topic: str, port: str) -> list[str]:
-    """Return the output that a mux takes: the one that is named, else the one on the mux's topic, else the only one."""
+    """Return the output that a mux takes: the named one, else the one on the mux's topic, else the only one."""
     if entry.config is None:
         return []
     ports = component_type(entry.type).ports(entry.config)

@@ -1,4 +1,4 @@
-"""The section `needs`: what must be there outside of a part."""
+"""The section `needs`: what must exist outside a part."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rbxcompose.manifest.section import PART, Reading, SetScope
 
 
 class Needs(Config):
-    """What must be there outside of a part."""
+    """What must exist outside a part."""
 
     ports: dict[TopicName, InterfaceName] = {}
     """Topics with their types, such as `cmd_vel: geometry_msgs/Twist`."""

@@ -1,4 +1,4 @@
-"""The section `places`: poses with names."""
+"""The section `places`: named poses."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def places(reading: Reading[PlaceModel]) -> dict[str, Place]:
     """
     found = {}
     for name, entry in reading.named():
-        # One with mistakes stands in the origin, so that what names it is not wrong as well.
+        # A place with mistakes becomes the origin, so that references to it are not wrong as well.
         read = reading.valid(PlaceModel, name, entry.value) or PlaceModel(x=0.0, y=0.0)
         found[name] = Place(name, read.x, read.y, read.heading)
     return found

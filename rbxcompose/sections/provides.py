@@ -1,4 +1,4 @@
-"""The section `provides`: what a part gives to the rest of the robot."""
+"""The section `provides`: what a part offers to the rest of the robot."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rbxcompose.manifest.section import PART, Reading, SetScope
 
 
 class Provides(Config):
-    """What a part gives to the rest of the robot, by the names that its file has for it."""
+    """What a part offers to the rest of the robot, under the names in its file."""
 
     ports: dict[TopicName, InterfaceName] = {}
     """Topics with their types."""
@@ -21,5 +21,5 @@ class Provides(Config):
 
 @section("provides", Provides, order=140, files=(PART,), scope=SetScope.NOTHING, is_composed=False)
 def provides(reading: Reading[Provides]) -> Provides:
-    """What the part gives to the rest of the robot, under the part's own names; `check` verifies it."""
+    """What the part offers to the rest of the robot, under the part's own names; `check` verifies it."""
     return reading.whole() or Provides()

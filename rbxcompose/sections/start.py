@@ -26,6 +26,6 @@ def start(reading: Reading[str]) -> str | None:
     name = validate(str, reading.node, ("start",), reading.report)
     if name is None:
         return None
-    # A mission with mistakes is none that is missing.
+    # A mission with mistakes is not a missing one.
     is_broken = name in missions.names_in(reading.contents.root) and name not in reading.contents.of(missions)
     return None if is_broken else name

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 from rbxcompose.levels import Level
 
-NOTHING_LEFT = 1e-9  # below this the sum of many small steps is rounding, not charge
+NOTHING_LEFT = 1e-9  # anything less is rounding from many small steps, not charge
 
 
 @dataclass(frozen=True, slots=True)
 class BatterySettings:
-    """How fast the battery drains and when it complains; levels are ratios from 0 to 1."""
+    """How fast the battery drains and when it warns; levels are ratios from 0 to 1."""
 
     runtime: float
     """Time from full to empty [s], above zero."""
@@ -26,11 +26,11 @@ class BatteryCore:
 
     def __init__(self, settings: BatterySettings, level: float = 1.0) -> None:
         self._settings = settings
-        self._start, self._drained = level, 0.0  # a ratio, and for how long it has drained since then [s]
+        self._start, self._drained = level, 0.0  # a ratio, and how long it has drained since then [s]
 
     @property
     def settings(self) -> BatterySettings:
-        """How it drains and complains."""
+        """How it drains and warns."""
         return self._settings
 
     @settings.setter
@@ -40,14 +40,14 @@ class BatteryCore:
 
     @property
     def level(self) -> float:
-        """Charge as a ratio from 0 to 1, from the whole time at once: steps would add up what each rounds off."""
+        """Charge as a ratio from 0 to 1, computed from the total time: steps would accumulate rounding errors."""
         runtime = self._settings.runtime
         left = (self._start * runtime - self._drained) / runtime
         return left if left > NOTHING_LEFT else 0.0
 
     @property
     def status(self) -> tuple[Level, str]:
-        """Level of the diagnostics and what to tell people."""
+        """Diagnostic level and a message for people."""
         if self.level < self.settings.error:
             return Level.ERROR, "Low battery"
         if self.level < self.settings.warn:
@@ -55,7 +55,7 @@ class BatteryCore:
         return Level.OK, "Battery OK"
 
     def set(self, level: float) -> str:
-        """Set the charge; return why not if `level` is no ratio from 0 to 1, else nothing."""
+        """Set the charge; return the reason if `level` is not a ratio from 0 to 1, else nothing."""
         if not 0.0 <= level <= 1.0:
             return f"a battery level is between 0 % and 100 %, not at {level * 100:g} %"
         self._start, self._drained = level, 0.0

@@ -1,4 +1,4 @@
-"""Twin of a chore: the base moves to and fro a little for as long as the chore takes."""
+"""Twin of a chore: the base moves back and forth a little for as long as the chore takes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rbxcompose.geometry import AT_REST, Velocity2
 
-NOTHING_LEFT = 1e-9  # [s] below this the sum of many small steps is rounding, not work
+NOTHING_LEFT = 1e-9  # [s]; anything less is rounding from many small steps, not work
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class ChoreSettings:
 
 
 class ChoreCore:
-    """Work that takes a time, in strokes; each starts its own count."""
+    """Work of a given duration, in strokes; each chore starts its own count."""
 
     def __init__(self, settings: ChoreSettings) -> None:
         self.settings = settings
@@ -39,7 +39,7 @@ class ChoreCore:
         return self.left <= NOTHING_LEFT
 
     def step(self, dt: float) -> Velocity2:
-        """Work for `dt` [s]; return the velocity of the base for it."""
+        """Work for `dt` [s]; return the velocity of the base meanwhile."""
         if self.is_done:
             return AT_REST
         stroke = int((self.done + NOTHING_LEFT) / self.settings.stroke)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from rbxcompose.geometry import AT_REST, Pose2, Velocity2
 
 ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast
-ROUNDING = 1e-12  # a difference of velocities this small is none [m/s, rad/s]
+ROUNDING = 1e-12  # a smaller difference of velocities counts as none [m/s, rad/s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,19 +31,19 @@ class DiffDriveSettings:
 
 
 class DiffDriveCore:
-    """Moves along exact arcs; while both velocities change at once, with their means until one has arrived.
+    """Moves along exact arcs; while both velocities change, with their means until one has reached its target.
 
-    So heading and distance driven never depend on how time is divided into steps, and the position does not either
-    except, slightly, while speed and turn rate change together. `settings` may be replaced while driving.
+    So heading and distance driven never depend on how time is divided into steps, and neither does the position, except
+    slightly while speed and turn rate change together. `settings` may be replaced while driving.
     """
 
     def __init__(self, settings: DiffDriveSettings, pose: Pose2 | None = None) -> None:
         self.settings = settings
         self.pose = pose or Pose2()
         self.velocity = AT_REST
-        self.distance = 0.0  # driven so far [m], backwards counts too
-        self.dropped = 0  # commands that were no numbers or absurd
-        self.clamped = 0  # commands that were cut to a limit
+        self.distance = 0.0  # distance driven so far [m]; driving backwards counts, too
+        self.dropped = 0  # commands that were not finite, or absurd
+        self.clamped = 0  # commands that were clamped to a limit
         self._target = AT_REST
         self._target_until = -math.inf
         self._braking = False
@@ -54,7 +54,7 @@ class DiffDriveCore:
         return self.velocity == AT_REST
 
     def command(self, velocity: Velocity2, now: float) -> None:
-        """Take the velocity to reach; it holds for `command_timeout`. While braking it is ignored."""
+        """Accept the velocity to reach; it holds for `command_timeout`. While braking it is ignored."""
         speed, turn_rate = self.settings.max_speed, self.settings.max_turn_rate
         excess = max(abs(velocity.linear) / speed, abs(velocity.angular) / turn_rate)
         if not velocity.is_finite or excess > ABSURD:
@@ -101,7 +101,7 @@ class DiffDriveCore:
             elapsed = until
 
     def _corners(self, target: Velocity2, duration: float) -> list[float]:
-        """Return the moments up to `duration` between which both velocities are straight lines of one sign [s]."""
+        """Return the moments up to `duration` between which both velocities are linear and keep their signs [s]."""
         now, limits = self.velocity, self.settings
         corners = (
             abs(now.linear) / limits.acceleration,
@@ -116,6 +116,6 @@ def _clamp(value: float, limit: float) -> float:
 
 
 def _towards(value: float, target: float, most: float) -> float:
-    """Return `value` moved towards `target` by `most` or less."""
+    """Return `value` moved towards `target` by at most `most`."""
     change = target - value
     return target if abs(change) <= most + ROUNDING else value + math.copysign(most, change)

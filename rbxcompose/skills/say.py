@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rbxcompose.sdk import Activity, skill
 
-PER_WORD = 0.4  # [s] of unhurried speech
+PER_WORD = 0.4  # [s] per word of unhurried speech
 
 
 @skill("say", claims="voice", pausable=True)
@@ -28,5 +28,5 @@ class Say(Activity):
         return True if self.left <= 1e-9 else None
 
     def resume(self, now: float) -> None:
-        """Leave the pause out."""
+        """Do not count the pause."""
         self.now = now

@@ -1,4 +1,4 @@
-"""What tests of robots and plug-ins need: virtual time, a bus within the process, findings of a text, golden files."""
+"""Tools for tests of robots and plug-ins: virtual time, an in-process bus, findings of a text, golden files."""
 
 from rbxcompose.testing.bench import Bench, instance
 from rbxcompose.testing.clocks import clock_uses

@@ -1,4 +1,4 @@
-"""A bench for components: virtual time, a bus within the process, nothing that waits."""
+"""A bench for components: virtual time, an in-process bus, no waiting."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def instance(
 
 
 class Bench:
-    """Instances, or a whole `plan`, in one process on a stepped clock, configured and active from the start.
+    """Instances, or a whole `plan`, in one process on a stepped clock, configured and active immediately.
 
-    `records` holds what they logged, `events` what they told the supervisor.
+    `records` holds what they logged, `events` what they reported to the supervisor.
     """
 
     def __init__(self, *instances: Instance, plan: Plan | None = None, start: bool = True) -> None:
@@ -81,7 +81,7 @@ class Bench:
         self.run_until(lambda: False, seconds)
 
     def run_until(self, reached: Callable[[], bool], most: float = 600.0) -> bool:
-        """Let time pass until `reached()` holds, at most `most` [s] of robot time; return whether it does."""
+        """Advance time until `reached()` holds, by at most `most` [s] of robot time; return whether it does."""
         end = self.clock.now() + most
         self.scheduler.advance(self.clock.now())
         while not reached():
@@ -98,7 +98,7 @@ class Bench:
         """Return the running component of an instance.
 
         Raises:
-            LookupError: if it is not there, for instance since it failed.
+            LookupError: if it does not exist, for example because it failed.
         """
         found = self.host.hosted[name].component
         if found is None:
@@ -106,18 +106,18 @@ class Bench:
         return found
 
     def publish(self, topic: str, message: Message, qos: Qos = Qos.COMMAND) -> None:
-        """Publish a message from outside the components and let it be taken."""
+        """Publish a message from outside the components and have it processed."""
         self.bus.publisher(OWNER, topic, type(message), qos)(message)
         self.advance(0.0)
 
     def collect(self, topic: str, message: type[M], qos: Qos = Qos.EVENT) -> list[M]:
-        """Return a list that grows by each message on a topic."""
+        """Return a list that grows with each message on a topic."""
         found: list[M] = []
         self.bus.subscribe(OWNER, topic, message, qos, found.append)
         return found
 
     def statuses(self, name: str) -> list[DiagnosticStatus]:
-        """Return a list that grows by each status that an instance reports to diagnostics."""
+        """Return a list that grows with each status that an instance reports to diagnostics."""
         found: list[DiagnosticStatus] = []
 
         def take(message: DiagnosticArray) -> None:
@@ -127,10 +127,10 @@ class Bench:
         return found
 
     def set_live(self, name: str, **settings: object) -> None:
-        """Change settings of an instance that are marked `Live`, to SI numbers or to text with a unit.
+        """Change `Live` settings of an instance to SI numbers or to text with a unit.
 
         Raises:
-            UnsettableError: if it has no such setting, or one that is not live, or does not take the value.
+            UnsettableError: if it has no such setting, or the setting is not live or does not accept the value.
             Refused: if the component refuses it.
         """
         hosted = self.host.hosted[name]
@@ -138,7 +138,7 @@ class Bench:
         hosted.reconfigure(changed(hosted.config, parameters))
 
     def texts(self) -> list[str]:
-        """Return what was logged, as `source: text`."""
+        """Return the log as lines of `source: text`."""
         return [f"{record.source}: {record.text}" for record in self.records]
 
     def _note(self, owner: str, text: str) -> None:

@@ -1,4 +1,4 @@
-"""Finds where a source file reads a clock itself: components get their time, or no run could be repeated."""
+"""Finds where a source file reads a clock itself: components are given their time, or no run could be repeated."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-_MODULES = {"sched", "time"}  # of these, nothing may be used
+_MODULES = {"sched", "time"}  # all names of these modules are forbidden
 _NAMES = {
     "asyncio.sleep",
     "asyncio.timeout",
@@ -26,7 +26,7 @@ _NAMES = {
 def clock_uses(path: Path) -> list[str]:
     """Return each place at which a source file reads a clock or waits: `FILE:LINE: time.monotonic`.
 
-    Names are followed through imports, also renamed ones. What is imported by a text at run time is not seen.
+    Names are followed through imports, including renamed ones. Imports by string at run time are not detected.
     """
     tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
     imported = dict(_imported(tree))
@@ -41,7 +41,7 @@ def _is_clock(name: str) -> bool:
 
 
 def _imported(tree: ast.Module) -> Iterator[tuple[str, str]]:
-    """Yield what each imported name stands for: `now` for `datetime.datetime.now`."""
+    """Yield the full name of each imported name: `datetime.datetime.now` for `now`."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:

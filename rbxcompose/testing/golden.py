@@ -1,4 +1,4 @@
-"""Golden files: output for users, kept as text beside the tests and compared to the letter."""
+"""Golden files: output for users, kept as text beside the tests and compared exactly."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Golden:
         """Compare `text` with the golden file `name`.
 
         Raises:
-            AssertionError: if they differ, or the file is not there.
+            AssertionError: if they differ, or the file does not exist.
         """
         path = self.folder / name
         if self.update:

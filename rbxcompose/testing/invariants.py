@@ -1,14 +1,14 @@
-"""What *safe* means: laws that each run of a robot keeps, whatever fails. They are applied to what the run has told.
+"""What *safe* means: laws that each run of a robot keeps, whatever fails. They are checked against its record.
 
-An `ObservedStory` is read from recorded messages: of a stepped run, or of a recording of real processes. All times are
-robot time [s], velocities [m/s] and [rad/s].
+An `ObservedStory` is read from the recorded messages of a stepped run, or of real processes. All times are robot time
+[s], velocities [m/s] and [rad/s].
 
-- Unwarranted motion: the base moves only by a live command. After the last one it may follow it for its timeout and two
+- Unwarranted motion: the base moves only on a live command. It may follow the last one for its timeout and two
   cycles, and then brakes: `v(t) <= v_max - a (t - deadline)`. A stop ends every command that was sent before a release.
-  The time in which the base's process hung meanwhile does not count.
-- Unheeded stop: between stop and release a mux lets nothing through but rest.
-- Second winner: a mux forwards what one of its inputs has just sent; while that input lives, none of lower priority.
-- Shared claim: of the goals that claim the same part of the robot, one at most is carried out.
+  Time in which the base's process hung does not count.
+- Unheeded stop: between stop and release a mux lets nothing but rest through.
+- Second winner: a mux forwards what one of its inputs has just sent; while that input is live, none of lower priority.
+- Shared claim: at most one of the goals that claim the same part of the robot is carried out.
 - Endless goal: a goal that was accepted ends within the longest time that one may take.
 """
 
@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 
 from rbxcompose.bus.goals import GoalState
 
-ROBOT = "robot itself"  # whom a stop or a release is told first; each process hears of it a little later
-ROUNDING = 1e-6  # a velocity this small is rest [m/s, rad/s]
+ROBOT = "robot itself"  # who receives a stop or a release first; each process receives it a little later
+ROUNDING = 1e-6  # velocities up to this count as rest [m/s, rad/s]
 
 PlanarVelocity = tuple[float, float]  # forwards [m/s], turning [rad/s]
 
@@ -41,7 +41,7 @@ class Base:
 
 @dataclass(frozen=True, slots=True)
 class SwitchInput:
-    """An input of a mux: the larger priority wins, until it was silent for the timeout."""
+    """An input of a mux: the highest priority wins, until it has been silent for its timeout."""
 
     priority: int
     timeout: float
@@ -58,7 +58,7 @@ class Switch:
 
 @dataclass(frozen=True, slots=True)
 class ActionClaim:
-    """The part of the robot that the goals of an action need for themselves, and the process of its server."""
+    """The part of the robot that the goals of an action need exclusively, and the process of its server."""
 
     part: str
     process: str
@@ -66,10 +66,10 @@ class ActionClaim:
 
 @dataclass(frozen=True, slots=True)
 class Laws:
-    """What a robot has to keep to.
+    """The laws that a robot has to keep.
 
-    `slack` is how late a message may be that was sent, on its way or since a process hung; `is_lossless` tells that
-    each one arrives.
+    `slack` is how late a sent message may be, because it was delayed or a process hung; `is_lossless` means that every
+    message arrives.
     """
 
     bases: Sequence[Base] = ()
@@ -82,7 +82,7 @@ class Laws:
 
 @dataclass(frozen=True, slots=True)
 class SentVelocity:
-    """A velocity on a topic: a command, or the motion that odometry tells."""
+    """A velocity on a topic: a command, or the motion reported by odometry."""
 
     time: float
     topic: str
@@ -90,18 +90,18 @@ class SentVelocity:
 
     @property
     def is_finite(self) -> bool:
-        """Return whether it is a velocity at all."""
+        """Return whether both parts are finite."""
         return math.isfinite(sum(self.velocity))
 
     @property
     def is_rest(self) -> bool:
-        """Return whether nothing moves by it."""
+        """Return whether nothing moves at this velocity."""
         return self.is_finite and max(map(abs, self.velocity)) <= ROUNDING
 
 
 @dataclass(frozen=True, slots=True)
 class Ordered:
-    """What a process was told to do: `stop`, `release`, `brake` for good, `shutdown`; or `begin`, when it is forked."""
+    """An order to a process: `stop`, `release`, `brake` for good, `shutdown`; or `begin`, when it is forked."""
 
     time: float
     process: str
@@ -110,7 +110,7 @@ class Ordered:
 
 @dataclass(frozen=True, slots=True)
 class ToldGoals:
-    """The goals of an action, by their ids, as its server told them; empty when the server has gone."""
+    """The goals of an action by their ids, as its server reported them; empty when the server is gone."""
 
     time: float
     action: str
@@ -134,7 +134,7 @@ class Violation:
 
 
 def violations(laws: Laws, story: ObservedStory) -> list[Violation]:
-    """Return what was not safe, by time; the first violation of each law says more than those that follow from it."""
+    """Return all violations, by time; the first one of each law says more than those that follow from it."""
     found: list[Violation] = []
     for base in laws.bases:
         found += unwarranted_motion(base, story, laws.slack)
@@ -148,10 +148,10 @@ def violations(laws: Laws, story: ObservedStory) -> list[Violation]:
 
 
 def unwarranted_motion(base: Base, story: ObservedStory, slack: float) -> Iterator[Violation]:
-    """Yield where a base moved faster than it can, at the latest, have braked to."""
-    force = base.timeout + 2 * base.cycle + slack  # for how long it may follow what was sent
+    """Yield the times at which a base moved faster than it could have if it had braked in time."""
+    force = base.timeout + 2 * base.cycle + slack  # how long it may follow a command
     deadline = commanded = -math.inf  # until when it may follow a command; when the last one was sent
-    is_stopped, told = False, math.inf  # when it told its motion last
+    is_stopped, told = False, math.inf  # when it last reported its motion
     fastest: PlanarVelocity = (0.0, 0.0)
     for event in story:
         match event:
@@ -165,7 +165,7 @@ def unwarranted_motion(base: Base, story: ObservedStory, slack: float) -> Iterat
                 commanded = time
                 deadline = deadline if is_stopped else time + force
             case SentVelocity(time, topic, velocity) if topic == base.motion:
-                if is_stopped:  # a simulated base whose process hung while it braked stood still in time
+                if is_stopped:  # a simulated base whose process hung while braking stood still in time
                     deadline += min(slack, max(0.0, time - told - 2 * base.cycle))
                 told = time
                 fastest = (max(fastest[0], abs(velocity[0])), max(fastest[1], abs(velocity[1])))
@@ -192,10 +192,10 @@ def unheeded_stop(switch: Switch, story: ObservedStory) -> Iterator[Violation]:
 
 
 def second_winner(switch: Switch, story: ObservedStory, slack: float, *, is_lossless: bool) -> Iterator[Violation]:
-    """Yield what a mux invented, and what it let through beside an input of higher priority.
+    """Yield what a mux made up, and what it let through beside an input of higher priority.
 
-    That is one which it has let through within its timeout; if no message can be lost, also one that has just spoken
-    and does not have to come to rest first.
+    Such an input was let through within its timeout; if no message can be lost, it may also have just sent one without
+    having to come to rest first.
     """
     inputs = {topic: _Input(source) for topic, source in switch.inputs.items()}
     for event in story:
@@ -223,9 +223,9 @@ class _Input:
 
     def __init__(self, source: SwitchInput) -> None:
         self.source = source
-        self.won = -math.inf  # when it was let through last
+        self.won = -math.inf  # when it was last let through
         self._recent: deque[SentVelocity] = deque(maxlen=200)
-        self._counting: deque[float] = deque(maxlen=200)  # when it spoke, and had not to come to rest first
+        self._counting: deque[float] = deque(maxlen=200)  # when it sent something without having to come to rest first
         self._is_held = False
 
     def forget(self) -> None:
@@ -249,7 +249,7 @@ class _Input:
 
 
 def shared_claim(claims: Mapping[str, ActionClaim], story: ObservedStory) -> Iterator[Violation]:
-    """Yield where two goals that claim the same are carried out; one that is being cancelled does not count."""
+    """Yield where two goals with the same claim are carried out; a goal being cancelled does not count."""
     executing: dict[str, dict[bytes, GoalState]] = {}  # action -> goals
     for event in story:
         if isinstance(event, Ordered) and event.verb == "begin":
@@ -264,7 +264,7 @@ def shared_claim(claims: Mapping[str, ActionClaim], story: ObservedStory) -> Ite
 
 
 def endless_goal(claims: Mapping[str, ActionClaim], story: ObservedStory, longest: float) -> Iterator[Violation]:
-    """Yield each goal that did not end in time, or that was left open by a process which was shut down."""
+    """Yield each goal that did not end in time, or was left open by a process that was shut down."""
     began: dict[str, dict[bytes, float]] = {name: {} for name in claims}
     closed: set[str] = set()  # processes
     for event in story:

@@ -1,4 +1,4 @@
-"""Checking a manifest that a test writes down."""
+"""Checking a manifest written in a test."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rbxcompose.rendering.text import render_text
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """What the compiler made of a text."""
+    """The compiler's result for a text."""
 
     compilation: Compilation
 
@@ -24,7 +24,7 @@ class Checked:
 
     @property
     def codes(self) -> list[str]:
-        """Return the codes of the findings, in the order of their places."""
+        """Return the codes of the findings, by place."""
         return [finding.code for finding in self.compilation.report]
 
     @property
@@ -50,7 +50,7 @@ def check_text(
     real: bool = False,
     environment: Mapping[str, str] | None = None,
 ) -> Checked:
-    """Write `text` to `robot.yaml` in `folder`, `others` beside it by their paths, and compile the robot."""
+    """Write `text` to `robot.yaml` in `folder`, with `others` beside it by their paths, and compile the robot."""
     for name, other in {**(others or {}), "robot.yaml": text}.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -68,7 +68,7 @@ def check_file(
     real: bool = False,
     environment: Mapping[str, str] | None = None,
 ) -> Checked:
-    """Compile the robot of a file."""
+    """Compile a robot's file."""
     return Checked(
         compile_robot(
             str(path),

@@ -13,7 +13,7 @@ LONGEST = 3600.0  # [s] of robot time
 
 @dataclass(frozen=True, slots=True)
 class Ran:
-    """A robot whose mission has ended, or that has had its time."""
+    """A robot whose mission has ended, or whose time is up."""
 
     bench: Bench
 

@@ -1,4 +1,4 @@
-"""The laws of a robot from its plan, and stories from what was recorded of it."""
+"""The laws of a robot, from its plan, and its story, from recorded messages."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from rbxcompose.testing.invariants import (
 
 
 def laws_of(plan: Plan, *, slack: float = 0.0, is_lossless: bool = False, longest_goal: float = 60.0) -> Laws:
-    """Return what a robot has to keep to: its bases, its muxes of velocities, what its actions claim."""
+    """Return the laws of a robot: its bases, its velocity muxes, and the claims of its actions."""
     switches = (_switch(one) for one in plan.instances if isinstance(one.config, MuxConfig) and _is_twist(one.config))
     return Laws(
         bases=list(_bases(plan)),
@@ -45,7 +45,7 @@ def laws_of(plan: Plan, *, slack: float = 0.0, is_lossless: bool = False, longes
 
 
 def events_of(laws: Laws, told: Iterable[Recorded | Ordered], start: int = 0) -> Iterator[ObservedEvent]:
-    """Yield what messages tell, in their order, among orders; `start` is robot time 0 on the messages' clock [ns]."""
+    """Yield the events of messages in order, merged with orders. `start`: robot time 0 on the messages' clock [ns]."""
     commands = {one.command for one in laws.bases} | {one.output for one in laws.switches}
     commands |= {topic for one in laws.switches for topic in one.inputs}
     motions = {one.motion for one in laws.bases}
@@ -69,7 +69,7 @@ def _velocity(twist: Twist) -> tuple[float, float]:
 
 
 def _bases(plan: Plan) -> Iterator[Base]:
-    """Yield the bases that say how they brake."""
+    """Yield the bases that declare how they brake."""
     for one in plan.instances:
         for drives in declared(one.type, one.config, Drives):
             timeout, straight, turning = drives.stops_after, drives.acceleration, drives.turn_acceleration

@@ -18,7 +18,7 @@ _INTERRUPTED = 130
 
 
 def send(guest: Guest, arguments: argparse.Namespace) -> int:
-    """Send a goal, print its feedback and its result."""
+    """Send a goal and print its feedback and its result."""
     found = wanted([one for one in guest.graph().actions if one.givers], arguments.name, "action")
     action = type_of(found.kinds[0], "action", registry.action, lambda found: found.SendGoal.HASH)
     goal = message_from(action.Goal, arguments.content)

@@ -1,13 +1,13 @@
-"""Pure core of `drive`: keys in, velocities out, and nothing at all once no key is pressed any more."""
+"""Pure core of `drive`: keys in, velocities out, and silence once no key is pressed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-HOLD = 0.3  # [s] that a key counts as pressed; terminals only tell presses, and repeat them while a key is held
+HOLD = 0.3  # [s] that a key counts as pressed; terminals report only presses, and repeat them while a key is held
 PERIOD = 0.1  # [s] between two commands
 
-_ENDS = ("q", "\x04", "\0")  # Ctrl-D comes as a zero if it was typed before keys came at once
+_ENDS = ("q", "\x04", "\0")  # Ctrl-D arrives as a zero byte if it was typed before the terminal was raw
 
 _FORWARD, _BACK, _LEFT, _RIGHT = (1, 0), (-1, 0), (0, 1), (0, -1)
 _STILL = (0, 0)
@@ -37,7 +37,7 @@ class Velocity:
 
 
 def keys(text: str) -> list[str]:
-    """Return the keys that a terminal has sent, the sequences of arrow keys each as one."""
+    """Return the keys that a terminal has sent; the escape sequence of an arrow key counts as one key."""
     found: list[str] = []
     while text:
         length = 3 if text[:3] in _KEYS else 1
@@ -52,17 +52,17 @@ def is_end(key: str) -> bool:
 
 
 class DeadMan:
-    """Moves only while a key was pressed within `HOLD`; then tells to stand still, once, and is silent."""
+    """Commands motion only within `HOLD` of a key press; then commands a halt, once, and is silent."""
 
     def __init__(self, speed: float, turn: float) -> None:
-        """Take what full speed [m/s] and full turn [rad/s] are."""
+        """Set full speed [m/s] and full turn [rad/s]."""
         self._speed, self._turn = speed, turn
         self._wanted = Velocity()
         self._until = 0.0  # [s]
-        self._is_moving = False  # the last that was told is not to stand still
+        self._is_moving = False  # the last command was not a halt
 
     def press(self, key: str, now: float) -> Velocity | None:
-        """Hear of a key at `now` [s]; return what to command at once, or None if that can wait."""
+        """Handle a key at `now` [s]; return the command to send immediately, or None if it can wait."""
         direction = _KEYS.get(key)
         if direction is None:
             return None
@@ -77,7 +77,7 @@ class DeadMan:
         return self._wanted if self._wanted != before else None
 
     def due(self, now: float) -> Velocity | None:
-        """Return what to command at `now` [s], asked every `PERIOD`; None for silence."""
+        """Return the command for `now` [s], to be called every `PERIOD`; None for silence."""
         if not self._is_moving:
             return None
         if now < self._until:
@@ -85,6 +85,6 @@ class DeadMan:
         return self.release()
 
     def release(self) -> Velocity | None:
-        """Return the last command before silence; None if there is silence already."""
+        """Return the final command before silence; None if already silent."""
         was_moving, self._is_moving = self._is_moving, False
         return Velocity() if was_moving else None

@@ -53,7 +53,7 @@ Good: a goal that the robot can reach.
 
 
 def visit(arguments: argparse.Namespace, do: Callable[[Guest], int]) -> int:
-    """Join the bus that is meant, do something there, and return the exit code."""
+    """Join the chosen bus, run `do` there, and return the exit code."""
     try:
         with Guest(find_place(arguments)) as guest:
             return do(guest)
@@ -75,7 +75,7 @@ def wanted(names: Sequence[GraphName], name: str, what: str) -> GraphName:
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
-    """Return rows of cells as lines with columns; foreign names in them are made fit for a terminal."""
+    """Return rows of cells as lines in aligned columns; make foreign names safe for a terminal."""
     cells = [[plain(cell) for cell in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     return "\n".join(
@@ -84,7 +84,7 @@ def table(rows: Sequence[Sequence[str]]) -> str:
 
 
 def tell_list(names: Sequence[GraphName], ends: tuple[str, str], arguments: argparse.Namespace) -> int:
-    """List names with their types and how many there are of both `ends`; hidden ones only if all are wanted."""
+    """List names with their types and the counts of both `ends`; hidden names only with `--all`."""
     listed = [one for one in names if arguments.all or not one.is_hidden]
     if arguments.json:
         tell(json.dumps([_short(one, ends) for one in listed]))
@@ -98,7 +98,7 @@ def tell_list(names: Sequence[GraphName], ends: tuple[str, str], arguments: argp
 
 
 def described(one: GraphName, ends: tuple[str, str]) -> dict[str, Any]:
-    """Return all that is known of a name, for JSON."""
+    """Return all that is known about a name, for JSON."""
     return {
         "name": one.name,
         "types": one.types,
@@ -111,9 +111,9 @@ def described(one: GraphName, ends: tuple[str, str]) -> dict[str, Any]:
 def add_server_verbs(
     parser: argparse.ArgumentParser, noun: str, verb: tuple[str, str], content: str, example: str, do: Sequence[Do]
 ) -> None:
-    """Declare what can be done with services and actions: `ls`, and a `verb` with its help, which sends a `content`.
+    """Declare the subcommands of services or actions: `ls`, and a `verb` with its help, which sends a `content`.
 
-    `do` is what carries them out, in this order.
+    `do` has the functions that carry them out, in this order.
     """
     actions = parser.add_subparsers(dest="action", metavar=f"ls|{verb[0]}", required=True)
     ls = actions.add_parser("ls", help=f"list the {noun}s with their types")
@@ -163,12 +163,12 @@ def hertz(text: str) -> float:
 
 
 def positive(dimension: Dimension) -> Callable[[str], float]:
-    """Return a reader of quantities of this dimension that are more than nothing [SI]."""
+    """Return a reader of positive quantities of this dimension [SI]."""
     return lambda text: _positive(text, dimension)
 
 
 def count(text: str) -> int:
-    """Read a number from 1 on."""
+    """Read a whole number of at least 1."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
     return int(text)

@@ -1,4 +1,4 @@
-"""A visitor on a bus: a session for the time of one command, with a loop of its own."""
+"""A visitor on a bus: a session for the duration of one command, with a loop of its own."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ from rbxcompose.scheduler import Scheduler
 if TYPE_CHECKING:
     from rbxcompose.bus.bus import Bus
 
-NAME = "_rbxcompose"  # of the node; tools do not list what begins with `_`
-LONGEST_QUEUE = 1000  # messages that wait to be shown
-PATIENCE = 2.0  # [s] for an answer of the router
+NAME = "_rbxcompose"  # node name; tools do not list names that begin with `_`
+LONGEST_QUEUE = 1000  # messages waiting to be shown
+PATIENCE = 2.0  # [s] to wait for an answer of the router
 _EACH = zenoh.ConsolidationMode.NONE
 _PAUSE = 0.01  # [s] between two looks for the router
-NO_HASHES = "TypeHashNotSupported"  # what ROS 2 Humble writes in the place of a hash
+NO_HASHES = "TypeHashNotSupported"  # ROS 2 Humble writes this in place of a hash
 
 NO_ROUTER = kind(
     "RBX9020",
@@ -56,7 +56,7 @@ Good: `rbxcompose topic ls --router tcp/127.0.0.1:7447`
 
 @dataclass(frozen=True, slots=True)
 class HeardMessage:
-    """A message as it came: when [s of the guest's clock], of which type, and its bytes."""
+    """A message as it arrived: its time [s of the guest's clock], its type, and its bytes."""
 
     time: float
     kind: WireType
@@ -64,12 +64,12 @@ class HeardMessage:
 
     @property
     def sender(self) -> bytes:
-        """Return the GID of who sent it, or nothing if it does not say."""
+        """Return the GID of the sender, or nothing if the message has none."""
         return self._attachment.gid
 
     @property
     def stamp(self) -> int:
-        """Return when it was sent, by the sender's clock [ns], or 0 if it does not say."""
+        """Return the time of sending by the sender's clock [ns], or 0 if the message has none."""
         return self._attachment.stamp
 
     @property
@@ -81,12 +81,12 @@ class HeardMessage:
 
 
 class Guest:
-    """Reads who is on the bus, listens, and lends a bus of its own to who wants to speak."""
+    """Lists who is on the bus, listens, and provides a `Bus` for sending."""
 
     def __init__(self, place: BusPlace, *, stays: bool = False) -> None:
-        """Join the bus: for a question by its router, or to stay, with links of its own to all others.
+        """Join the bus: briefly through its router, or to stay, with direct links to all others.
 
-        Who stays loses nothing when the router ends and is started again.
+        A guest that stays loses nothing when the router is restarted.
 
         Raises:
             NotDoneError: if no router answers.
@@ -99,7 +99,7 @@ class Guest:
         self.transport = ZenohTransport(self._session, self._inbox.put)
         self._bus: Bus | None = None
         self._queues: list[Inbox[HeardMessage]] = []
-        self._selector = selectors.SelectSelector()  # unlike others it can wait for less than a millisecond
+        self._selector = selectors.SelectSelector()  # unlike other selectors, it can wait for less than a millisecond
         self._selector.register(self._inbox, selectors.EVENT_READ, lambda: None)
 
     def __enter__(self) -> Self:
@@ -113,22 +113,22 @@ class Guest:
         self._inbox.close()
 
     def graph(self) -> Graph:
-        """Return who is there now."""
+        """Return the graph of all participants at this moment."""
         replies: Iterator[zenoh.Reply] = iter(
             self._session.liveliness().get(f"{SPACE}/{self.domain}/**", timeout=PATIENCE)
         )
         return Graph.of(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
 
     def ask(self, key: str, seconds: float) -> list[bytes]:
-        """Return the answers of all who answer at a key within so long [s]."""
+        """Return all answers to a query at a key within `seconds`."""
         replies: Iterator[zenoh.Reply] = iter(
             self._session.get(key, target=zenoh.QueryTarget.ALL, consolidation=_EACH, timeout=seconds)
         )
         return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
 
     def bus(self, kind: WireType | None = None) -> Bus:
-        """Return a bus to speak on, in the way of those who have this kind of data; the same one each time."""
-        from rbxcompose.bus.bus import Bus  # takes as long as all that a list needs
+        """Return the bus for sending, in the wire profile of those who use this `kind`; the same one each time."""
+        from rbxcompose.bus.bus import Bus  # this import takes as long as all else that a list needs
 
         if self._bus is None:
             wire = "humble" if kind is not None and kind.hash == NO_HASHES else "jazzy"
@@ -138,7 +138,7 @@ class Guest:
         return self._bus
 
     def listen(self, topic: GraphName, heard: Callable[[HeardMessage], None]) -> None:
-        """Have each message of a topic handed over undecoded; of latched ones also what was sent before."""
+        """Pass each message of a topic to `heard`, undecoded; if latched, also messages sent before."""
         is_latched = any(end.qos is not None and end.qos.is_transient_local for end in topic.givers)
         queue: Inbox[HeardMessage] = Inbox(NAME, LONGEST_QUEUE, heard, self.scheduler.post)
         self._queues.append(queue)
@@ -149,15 +149,15 @@ class Guest:
 
     @property
     def dropped(self) -> int:
-        """Return how many messages came too fast to be handed over."""
+        """Return how many messages came too fast to be passed on."""
         return sum(queue.dropped for queue in self._queues)
 
     def watch(self, descriptor: int, ready: Callable[[], None]) -> None:
-        """Have `ready` called when there is something to read."""
+        """Call `ready` when there is something to read."""
         self._selector.register(descriptor, selectors.EVENT_READ, ready)
 
     def run(self, until: Callable[[], bool], timeout: float = math.inf) -> bool:
-        """Let things happen until something holds, or for `timeout` [s], and return whether it does."""
+        """Run the loop until `until` holds or `timeout` [s] has passed; return whether it holds."""
         deadline = self.clock.now() + timeout
         while True:
             self.scheduler.advance(self.clock.now())
@@ -173,9 +173,9 @@ class Guest:
 
     @contextmanager
     def interruptible(self, interrupted: Callable[[], None] = lambda: None) -> Iterator[None]:
-        """Have an interrupt, or the end of the terminal, call `interrupted` in the loop instead of ending the process.
+        """Let an interrupt, or the end of the terminal, call `interrupted` in the loop instead of ending the process.
 
-        A second one ends it.
+        A second one ends the process.
         """
         numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
         before = {number: signal.getsignal(number) for number in numbers}
@@ -207,7 +207,7 @@ class Guest:
         return session
 
     def _arrived(self, queue: Inbox[HeardMessage], kind: WireType) -> Callable[[Arrival], None]:
-        # In a thread of the transport: a message has the time at which it came, not that at which it is shown.
+        # In a thread of the transport: a message is stamped when it arrives, not when it is shown.
         return lambda arrival: queue.put(HeardMessage(self.clock.now(), kind, arrival), self.transport.wake)
 
 

@@ -1,4 +1,4 @@
-"""Messages on the command line: read from YAML with places, shown as YAML or as lines of JSON; and their types."""
+"""Messages on the command line: reading YAML with source positions, showing YAML or JSON lines, finding types."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ Good: `rbxcompose topic pub /word std_msgs/String 'data: hello'`
 """,
 )
 
-MOST_SHOWN = 128  # values of a list, in text; JSON has all of them
-_SHOWN = "MESSAGE"  # the name of the text in findings
+MOST_SHOWN = 128  # values of a list that text shows; JSON shows all
+_SHOWN = "MESSAGE"  # name of the message text in findings
 
 M = TypeVar("M", bound=Message)
 T = TypeVar("T", bound=Interface)
@@ -43,21 +43,21 @@ T = TypeVar("T", bound=Interface)
 
 @dataclass(frozen=True, slots=True)
 class _Places:
-    """Places within a tree."""
+    """Source positions within a tree."""
 
     root: TreeNode
 
     def key(self, path: KeyPath) -> Span:
-        """Return the place of a key."""
+        """Return the position of a key."""
         return key_span(self.root, path)
 
     def value(self, path: KeyPath) -> Span:
-        """Return the place of a value."""
+        """Return the position of a value."""
         return value_span(self.root, path)
 
 
 def message_from(message: type[M], text: str) -> M | None:
-    """Read a message from YAML, where nothing stands for all defaults; tell what is wrong with it and return None."""
+    """Read a message from YAML; an empty text means all defaults. On mistakes, report them and return None."""
     if not text.strip():
         return message()
     root, findings = read_text(text, _SHOWN)
@@ -82,13 +82,13 @@ def _data(node: TreeNode) -> object:
 
 
 def to_text(data: object) -> str:
-    """Return plain data as YAML that could be given back; only long lists are cut."""
+    """Return plain data as YAML that could be read back; only long lists are cut."""
     shown = yaml.safe_dump(_cut(data), sort_keys=False, default_flow_style=None, width=math.inf, allow_unicode=True)
     return FORBIDDEN.sub("?", str(shown)).removesuffix("\n...\n").rstrip("\n")
 
 
 def to_json(data: object) -> str:
-    """Return plain data as one line of JSON, in which a number that is not finite is null."""
+    """Return plain data as one line of JSON, with null for numbers that are not finite."""
     return json.dumps(_finite(data), ensure_ascii=True)
 
 
@@ -98,7 +98,7 @@ def shown(data: object, as_json: bool) -> str:
 
 
 def message_type(name: str) -> type[Message]:
-    """Return the message of that name.
+    """Return the message type of that name.
 
     Raises:
         NotDoneError: if there is none.
@@ -112,10 +112,10 @@ def type_of(
     look: Callable[[str], type[T]],
     hash_of: Callable[[type[T]], str] = lambda found: found.HASH,
 ) -> type[T]:
-    """Return the type that others on the bus have; `hash_of` gives the hash by which it is known there.
+    """Return our class of a type that others on the bus use; `hash_of` gives its hash on the bus.
 
     Raises:
-        NotDoneError: if we do not have it, or define it in another way.
+        NotDoneError: if we lack the type or define it differently.
     """
     found = _known(one.type, category, look)
     if one.hash.startswith("RIHS01_") and one.hash != hash_of(found):

@@ -1,4 +1,4 @@
-"""Pure core of `topic hz`: how often and how evenly something comes."""
+"""Pure core of `topic hz`: how often and how evenly messages arrive."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ class PaceMeter:
         self._news += 1
 
     def take(self) -> Pace | None:
-        """Return the pace; None if nothing has come since it was last asked, or too little to tell."""
+        """Return the pace; None if nothing has arrived since the last call, or too little to measure."""
         news, self._news = self._news, 0
         return measured(list(self._times)) if news else None
 
 
 def measured(times: Sequence[float]) -> Pace | None:
-    """Return the pace of arrivals at these times [s], None for fewer than two moments."""
+    """Return the pace of arrivals at these times [s]; None for fewer than two different times."""
     if len(times) < 2 or times[-1] <= times[0]:
         return None
     intervals = [after - before for before, after in pairwise(times)]

@@ -1,4 +1,4 @@
-"""Where the bus is that a command means: that of a running robot, or any other by its router."""
+"""The location of the bus that a command addresses: that of a running robot, or any other by its router."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def find_place(arguments: argparse.Namespace) -> BusPlace:
     """Return the place that the options name.
 
     Raises:
-        NotDoneError: if no robot is meant, or it has no router.
+        NotDoneError: if no robot is found, or it has no router.
     """
     if arguments.router is not None:
         return BusPlace(arguments.router, arguments.domain or 0)
@@ -51,7 +51,7 @@ def place_of(folder: RobotFolder) -> BusPlace:
     """
     state = known_state(folder)
     if state is not None and not state.is_supervised:
-        raise NotDoneError(no_answer(folder))  # its router has gone with it, or is about to
+        raise NotDoneError(no_answer(folder))  # its router is gone, too, or about to go
     if state is None or state.router is None:
         raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' has no known router"))
     return BusPlace(state.router, state.domain)

@@ -16,11 +16,11 @@ from rbxcompose.msgs.cdr import CdrError, decode
 from rbxcompose.msgs.plain import to_plain
 from rbxcompose.msgs.types import Message
 
-_PERIOD = 1.0  # [s] between two words on what was left out
+_PERIOD = 1.0  # [s] between two notices about messages left out
 
 
 class EchoReader:
-    """Decodes what is heard on a topic; what it cannot read it counts, and says so once for each type."""
+    """Decodes the messages of a topic; it counts those it cannot read and reports each such type once."""
 
     def __init__(self, topic: GraphName) -> None:
         self.malformed = 0

@@ -16,7 +16,7 @@ _PERIOD = 1.0  # [s] between two lines
 
 
 def measure(guest: Guest, arguments: argparse.Namespace) -> int:
-    """Print each second how often messages come."""
+    """Print every second how often messages arrive."""
     topic = wanted(guest.graph().topics, arguments.topic, "topic")
     meter = PaceMeter(arguments.window)
     guest.listen(topic, lambda heard: meter.arrived(heard.time))

@@ -18,7 +18,7 @@ from rbxcompose.qos import Qos
 
 
 def publish(guest: Guest, arguments: argparse.Namespace) -> int:
-    """Publish a message once there is a subscriber, and report how often."""
+    """Publish a message as soon as there is a subscriber, and report how often."""
     message = message_type(arguments.type)
     made = message_from(message, arguments.message)
     if made is None:

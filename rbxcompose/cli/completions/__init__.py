@@ -1,1 +1,1 @@
-"""What may come at the end of a command line."""
+"""Completion of command lines."""

@@ -1,4 +1,4 @@
-"""What may come at the end of a command line: verbs, options and choices of the parsers, else `CandidateValues`."""
+"""Candidates to complete a command line: verbs, options and choices of the parsers, else `CandidateValues`."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from typing import Protocol
 from rbxcompose.cli.verbs import load, parser_of, verbs
 
 _GENERAL = ("--help", "--version")
-_BREAKS = re.compile(r".*[:=]", re.DOTALL)  # bash counts these as ends of words, and replaces only what follows
+_BREAKS = re.compile(r".*[:=]", re.DOTALL)  # bash treats these as ends of words and replaces only what follows
 _SEVERAL = ("*", "+")
 
 
 class CandidateValues(Protocol):
-    """Finds what may stand for an argument."""
+    """Finds candidates for the value of an argument."""
 
     def of(self, metavar: str, dest: str, current: str, given: Mapping[str, str]) -> Iterable[str]:
-        """Return what may stand there; `given` are the values of options that have been typed, by their `dest`."""
+        """Return the candidates; `given` has the values of options typed so far, by their `dest`."""
         ...
 
 
 @dataclass(slots=True)
 class _Place:
-    """Where in a command line the word stands that is typed now."""
+    """The position of the current word in a command line."""
 
     parser: argparse.ArgumentParser
-    option: argparse.Action | None = None  # that waits for its value
+    option: argparse.Action | None = None  # the option that waits for its value
     given: dict[str, str] = field(default_factory=dict)
     positionals: list[argparse.Action] = field(default_factory=list)
 
@@ -60,7 +60,7 @@ class _Place:
             self.positionals.pop(0)
 
     def fitting(self, current: str, values: CandidateValues) -> Iterable[str]:
-        """Yield what may stand for the word that is typed now."""
+        """Yield the candidates for the current word."""
         options = self.parser._option_string_actions
         name, equals, value = current.partition("=")
         if equals and name in options:
@@ -79,7 +79,7 @@ class _Place:
 
 
 def candidates(words: Sequence[str], values: CandidateValues) -> list[str]:
-    """Return what may stand in the place of the last of `words`, which come after `rbxcompose`; sorted."""
+    """Return the sorted candidates for the last of `words`, the words after `rbxcompose`."""
     *before, current = words
     if not before:
         found: Iterable[str] = _GENERAL if current.startswith("-") else verbs()
@@ -94,7 +94,7 @@ def candidates(words: Sequence[str], values: CandidateValues) -> list[str]:
 
 
 def for_shell(shell: str, words: Sequence[str], find: Callable[[Sequence[str]], list[str]]) -> list[str]:
-    """Return the candidates as a shell wants them: bash tells the line, the others its words with `rbxcompose`."""
+    """Return the candidates as a shell wants them: bash passes the line, the others its words with `rbxcompose`."""
     if shell != "bash":
         return find(list(words[1:]) or [""])
     typed = _split(words[0] if words else "")
@@ -103,7 +103,7 @@ def for_shell(shell: str, words: Sequence[str], find: Callable[[Sequence[str]], 
 
 
 def _split(line: str) -> list[str]:
-    """Return the words of a line after the first, the last one as far as it has been typed."""
+    """Return the words of a line after the first; the last one may be incomplete."""
     for ending in ("", "'", '"'):
         try:
             words = shlex.split(line + ending)

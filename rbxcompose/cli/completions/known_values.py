@@ -1,4 +1,4 @@
-"""What can be completed besides words of the program: files, robots that are up, their components and topics."""
+"""Completion of values: files, running robots, their components and topics."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from rbxcompose.cli.bus.place import BusPlace, place_of
 from rbxcompose.cli.completions.candidates import candidates, for_shell
 from rbxcompose.cli.robots.lookup import NotDoneError, find_robot, known_state, robots_up
 
-PATIENCE = 0.3  # [s] in which the bus must tell; who waits for a key does not wait for longer
+PATIENCE = 0.3  # [s] in which the bus must answer; a person at the keyboard does not wait longer
 _MANIFESTS = (".yaml", ".yml")
-_BUS = {"TOPIC": "topics", "PATTERN": "topics", "SERVICE": "services", "ACTION": "actions"}  # what tells them
+_BUS = {"TOPIC": "topics", "PATTERN": "topics", "SERVICE": "services", "ACTION": "actions"}  # attributes of the graph
 
 Tell = Callable[[BusPlace], Graph]
 
 
 class KnownValues:
-    """Finds values; `graph` tells who is on a bus."""
+    """Finds values; `graph` returns the graph of a bus."""
 
     def __init__(self, graph: Tell) -> None:
         self._graph = graph
 
     def of(self, metavar: str, dest: str, current: str, given: Mapping[str, str]) -> Iterable[str]:
-        """Return what may stand for an argument."""
+        """Return the candidates for an argument."""
         if dest == "robot" and metavar == "NAME":
             return robots()
         return [one for what in metavar.split("|") for one in self._of(what, current, given)]
@@ -75,7 +75,7 @@ def _place(given: Mapping[str, str]) -> BusPlace:
 
 
 def robots() -> list[str]:
-    """Return the names of robots that are up."""
+    """Return the names of running robots."""
     try:
         return [folder.path.name for folder in robots_up()]
     except NotDoneError:
@@ -83,7 +83,7 @@ def robots() -> list[str]:
 
 
 def files(current: str, endings: tuple[str, ...] = ("",)) -> list[str]:
-    """Return folders, with a slash, and files with one of `endings`, that go on from what has been typed."""
+    """Return the folders, with a slash, and the files with one of `endings` that continue the typed text."""
     head, slash, start = current.rpartition("/")
     try:
         found = sorted(Path(os.path.expanduser(head + slash) or ".").iterdir())
@@ -105,7 +105,7 @@ def _types() -> list[str]:
 
 
 def complete(words: Sequence[str]) -> int:
-    """Print what may stand at the end of a command line, one in a line: `rbxcompose __complete SHELL WORD ...`."""
+    """Print the candidates for the end of a command line, one per line: `rbxcompose __complete SHELL WORD ...`."""
     if not words:
         return 2
     found = for_shell(words[0], words[1:], partial(candidates, values=KnownValues(_at_once)))
@@ -115,7 +115,7 @@ def complete(words: Sequence[str]) -> int:
 
 
 def _at_once(place: BusPlace) -> Graph:
-    """Ask a bus, but not for long: a router that was stopped takes connections and says nothing."""
+    """Query a bus with a short timeout: a stopped router accepts connections but says nothing."""
     told: list[Graph] = []
     asking = Thread(target=lambda: told.extend(_ask(place)), daemon=True)
     asking.start()
@@ -126,7 +126,7 @@ def _at_once(place: BusPlace) -> Graph:
 
 
 def _ask(place: BusPlace) -> Iterable[Graph]:
-    from rbxcompose.cli.bus.guest import Guest  # with the bus, which few arguments need
+    from rbxcompose.cli.bus.guest import Guest  # imports the bus, which few arguments need
 
     try:
         with Guest(place) as guest:

@@ -1,1 +1,1 @@
-"""Missions: their pictures, live or from files, their logs, what could happen to them."""
+"""Missions: their pictures, live or from files, their logs, and their exploration."""

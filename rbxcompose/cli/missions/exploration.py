@@ -1,4 +1,4 @@
-"""`mission explore`: what could happen to a mission, and where it would hang."""
+"""`mission explore`: what could happen in a mission, and where it would hang."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rbxcompose.requests import Refused
 
 
 def explore(arguments: argparse.Namespace) -> int:
-    """Explore a mission and tell what was found; the code is 1 if anything is wrong."""
+    """Explore a mission and report the findings; the exit code is 1 if anything is wrong."""
     robot = robot_of(arguments.path)
     if robot is None:
         return FINDINGS
@@ -35,7 +35,7 @@ def explore(arguments: argparse.Namespace) -> int:
 
 
 def _inputs(robot: Robot, name: str, given: Mapping[str, str]) -> Mapping[str, Value]:
-    """Return the inputs of a mission, `given` ones laid over the robot's; raise NotDoneError if one is missing."""
+    """Return the inputs of a mission; `given` ones override the robot's. Raise NotDoneError if one is missing."""
     mission = robot.missions[name]
     inputs, findings = bind_texts(mission.program, given, mission.inputs, robot.manifest.places)
     if findings:

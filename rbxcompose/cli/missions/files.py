@@ -1,4 +1,4 @@
-"""Missions that do not run: their pictures, and the skills that they may use."""
+"""Missions in files: their pictures, and the skills that they may use."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ Good: `rbxcompose mission show patrol robots/turtlebot`
 
 
 def robot_of(path: str | None) -> Robot | None:
-    """Compile the robot of a path, or the one that runs; None if it has mistakes, which have been told then.
+    """Compile the robot at a path, or the running one; if it has mistakes, report them and return None.
 
     Raises:
-        NotDoneError: if no path is given and it is not clear which robot is meant.
+        NotDoneError: if no path is given and it is not clear which robot to use.
     """
     if path is None:
         folder = find_robot(None)
@@ -62,7 +62,7 @@ def robot_of(path: str | None) -> Robot | None:
 
 
 def show(arguments: argparse.Namespace) -> int:
-    """Write the picture of a mission; without a path that of the robot that runs, with how each node stands."""
+    """Write the picture of a mission; without a path, that of the running robot, with the state of each node."""
     try:
         picture, statuses = (None if arguments.path else _live(arguments.name)) or (None, ())
         if picture is None:
@@ -85,7 +85,7 @@ def show(arguments: argparse.Namespace) -> int:
 
 
 def _live(name: str) -> tuple[MissionPicture, Sequence[int]] | None:
-    """Return the picture of a mission that has been running, and how its nodes stand or ended."""
+    """Return the picture of a mission that has been running, and the states or outcomes of its nodes."""
     folder = find_robot(None)
     if not any(one.name == name and one.state != NAMES[IDLE] for one in answer_of(folder, ListMissions())):
         return None
@@ -107,7 +107,7 @@ def mission_in(robot: Robot, name: str) -> Any:
 
 
 def skills(arguments: argparse.Namespace) -> int:
-    """List all skills that missions of a robot may use."""
+    """List all skills that a robot's missions may use."""
     try:
         robot = robot_of(arguments.path)
     except NotDoneError as error:

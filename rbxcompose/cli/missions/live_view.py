@@ -25,11 +25,11 @@ from rbxcompose.printable import fitted, plain
 from rbxcompose.runtime.folder import RobotFolder
 
 MOST = 5  # transitions that are shown
-_WIDTH = 120  # of a picture for no terminal
+_WIDTH = 120  # columns of a picture without a terminal
 
 
 def lines_of(picture: MissionPicture, seen: Mapping[str, Any], width: int, *, colour: bool = False) -> list[str]:
-    """Return the lines that show how a mission stands."""
+    """Return the lines that show the state of a mission."""
     statuses = status_list(joined({"statuses": {}, "data": {}}, seen), picture.count)
     lines = [fitted(f"mission {plain(seen['mission'])}: {seen['state']}", width)]
     lines += mission_lines(picture, statuses, width=width, colour=colour)
@@ -48,7 +48,7 @@ def _value(value: Any) -> str:
 
 
 def follow(folder: RobotFolder, name: str, period: float) -> int:
-    """Tell a mission as JSON until it ends, or until Ctrl-C: at first the whole, then a line with what has changed."""
+    """Print a mission as JSON until it ends, or until Ctrl-C: first the whole state, then one line per change."""
     seen = answer_of(folder, LookAtMission(name))
     told: Mapping[str, Any] = {}
     try:
@@ -76,7 +76,7 @@ def watch(folder: RobotFolder, name: str, period: float) -> int:
     try:
         with raw(keyboard), full_screen(sys.stdout):
             while seen["state"] in ACTIVE:
-                size = shutil.get_terminal_size()  # of a terminal that says 0 x 0 it makes 80 x 24
+                size = shutil.get_terminal_size()  # takes 80 x 24 for a terminal that reports 0 x 0
                 show(sys.stdout, lines_of(picture, seen, size.columns, colour=colour)[: size.lines])
                 if select.select([keyboard], [], [], period)[0] and os.read(keyboard, 100).lower().count(b"q"):
                     return 0

@@ -1,4 +1,4 @@
-"""`mission replay`: runs missions again from their log, and reports where they differ from the log."""
+"""`mission replay`: run missions again from their log, and report where they differ from it."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from rbxcompose.missions.engine.logbook import INPUTS, LogRecord, ReplayError, r
 from rbxcompose.model.robot import Robot
 from rbxcompose.regular_files import read_regular
 
-_LARGEST = 16_000_000  # [B] of a log that is replayed
-_OWN = ("mission", "run")  # of a record, about which run it is
+_LARGEST = 16_000_000  # [B] largest log that is replayed
+_OWN = ("mission", "run")  # keys of a record that identify its run
 
 NO_LOG = kind(
     "RBX9041",
@@ -33,10 +33,10 @@ Good: `rbxcompose mission log --all > patrol.log; rbxcompose mission replay patr
 
 
 def replay_log(arguments: argparse.Namespace) -> int:
-    """Run all that is in a log again; the code is 1 if anything differs.
+    """Run all missions in a log again; the exit code is 1 if anything differs.
 
     Raises:
-        NotDoneError: if the file is no log, or the robot has not its missions.
+        NotDoneError: if the file is no log, or the robot lacks its missions.
     """
     runs = runs_in(arguments.log)
     robot = robot_of(arguments.path)
@@ -71,13 +71,13 @@ def runs_in(file: str) -> dict[tuple[str, int], list[LogRecord]]:
 
 
 def difference(records: Sequence[LogRecord], name: str, robot: Robot, file: str) -> str:
-    """Return in words the first record that is another one now; empty if all are the same."""
+    """Describe the first record that differs now; empty if all are the same."""
     then = [_told(record) for record in records if record["event"] not in INPUTS]
     try:
         again = replay(records, mission_in(robot, name), robot.names)
     except ReplayError as error:
         raise NotDoneError(NO_LOG.at(None, f"'{file}' cannot be replayed: {error}")) from error
-    except LookupError:  # a result of a leaf that is not there any more
+    except LookupError:  # a result of a leaf that no longer exists
         return "the log has results of nodes that the mission does not have: it has changed too much to continue"
     now = [_told(record) for record in json.loads(json.dumps(again))]
     for number in range(max(len(then), len(now))):

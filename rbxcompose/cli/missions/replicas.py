@@ -19,12 +19,12 @@ _PATH = "missions"
 
 
 class MissionsSeen:
-    """Follows all missions of a robot; `by_name` has what is known of those that have been running."""
+    """Follows all missions of a robot; `by_name` has the state of those that have been running."""
 
     def __init__(self, guest: Guest, robot: str) -> None:
         self._guest, self._robot = guest, robot
         self._replicas: dict[str, Replica] = {}
-        self._asked: set[str] = set()  # paths with an answer on its way
+        self._asked: set[str] = set()  # paths with a pending answer
         self._is_listed = False
         news: Inbox[bytes] = Inbox(NAME, LONGEST_QUEUE, self._heard, guest.scheduler.post)
         transport = guest.transport
@@ -34,16 +34,16 @@ class MissionsSeen:
 
     @property
     def by_name(self) -> Mapping[str, Mapping[str, Any]]:
-        """Return what is seen of each mission, with its picture."""
+        """Return the known state of each mission, with its picture."""
         return {name: one.seen for name, one in self._replicas.items() if one.seen}
 
     @property
     def is_complete(self) -> bool:
-        """Return whether all answers have come."""
+        """Return whether all answers have arrived."""
         return self._is_listed and not self._asked
 
     def look(self) -> None:
-        """Ask which missions there are, unless that is known; a robot that has just begun may not answer yet."""
+        """Query the list of missions, unless it is known; a robot that has just started may not answer yet."""
         if not self._is_listed:
             self._ask(_PATH)
 
@@ -56,7 +56,7 @@ class MissionsSeen:
         transport.ask(admin_key(self._robot, path), b"", b"", lambda answer: inbox.put(answer, transport.wake))
 
     def answered(self, path: str, answer: TransportReply) -> None:
-        """Take what came first of a question."""
+        """Apply the first answer to a query."""
         self._asked.discard(path)
         if answer.error:
             return
@@ -81,13 +81,13 @@ class MissionsSeen:
 
 
 def _read(payload: bytes) -> dict[str, Any] | None:
-    """Return a message, or nothing of a robot that runs in another version and shows its missions otherwise."""
+    """Return a message, or None if the robot runs another version with another format."""
     message: dict[str, Any] = json.loads(payload)
     return message if message.get("schema") == SCHEMA else None
 
 
 class _Answers:
-    """What comes of one question: it ends with an error, also after its answer, so that only the first counts."""
+    """The answers to one query: it ends with an error even after an answer, so only the first counts."""
 
     def __init__(self, asking: MissionsSeen, path: str) -> None:
         self._asking, self._path = asking, path

@@ -1,1 +1,1 @@
-"""What commands write: answers on stdout, what is wrong on stderr."""
+"""The output of commands: answers on stdout, errors on stderr."""

@@ -1,6 +1,6 @@
-"""What commands write: answers go to stdout, what is wrong to stderr.
+"""The output of commands: answers go to stdout, errors to stderr.
 
-Who asks for JSON gets JSON: what kept a command from its answer is one document too, beside the words on stderr.
+With `--json`, stdout has JSON in any case: errors without an answer are one document, too, besides the text on stderr.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ FINDINGS, USAGE = 1, 2  # exit codes
 
 @dataclass(slots=True)
 class Output:
-    """What has been told of one command: whether its answer has begun, else what is wrong."""
+    """The output of one command so far: whether its answer has begun, else what is wrong."""
 
     has_begun: bool = False
     misuse: str = ""
@@ -30,28 +30,28 @@ class Output:
     sources: dict[str, str] = field(default_factory=dict)
 
     def note(self, report: Report, sources: Sources) -> None:
-        """Keep findings that were told."""
+        """Keep reported findings."""
         self.findings.extend(report)
         self.sources.update(sources)
 
     @property
     def error(self) -> str:
-        """Return in a line what is wrong, empty if nothing is."""
+        """Return what is wrong in one line; empty if nothing is."""
         errors = (one.message for one in Report(self.findings) if one.severity is Severity.ERROR)
         return self.misuse or next(errors, "")
 
     def data(self) -> dict[str, object]:
         """Return what is wrong, for JSON."""
-        from rbxcompose.rendering.json_ import as_data  # only for who asks for it
+        from rbxcompose.rendering.json_ import as_data  # only needed for JSON
 
         return {"error": self.error, "findings": [as_data(one, self.sources) for one in Report(self.findings)]}
 
 
-_commands = [Output()]  # the one that runs is the last; all of its threads tell, so that this is no variable of one
+_commands = [Output()]  # the running command is last; no thread-local variable, since all of its threads report
 
 
 def output() -> Output:
-    """Return what has been told of the command that runs."""
+    """Return the output of the running command."""
     return _commands[-1]
 
 
@@ -68,19 +68,19 @@ def answered(in_json: bool) -> Iterator[None]:
 
 
 def misused(verb: str, problem: str) -> int:
-    """Report that a command cannot be meant like this, and return the exit code for it."""
+    """Report wrong usage of a command, and return the exit code for it."""
     output().misuse = problem
     sys.stderr.write(f"rbxcompose {verb}: {problem}\n")
     return USAGE
 
 
 def has_colour(stream: TextIO) -> bool:
-    """Return whether colours help: on a terminal, unless `NO_COLOR` is set."""
+    """Return whether to use colours: on a terminal, unless `NO_COLOR` is set."""
     return stream.isatty() and not os.environ.get("NO_COLOR")
 
 
 def tell(text: str) -> None:
-    """Write lines to stdout at once."""
+    """Write lines to stdout and flush."""
     output().has_begun = True
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()
@@ -102,9 +102,9 @@ def refuse(finding: Finding) -> int:
 
 
 class Parser(argparse.ArgumentParser):
-    """Reads the words behind a verb; what it refuses is noted as well."""
+    """Parses the words after a verb; what it refuses is noted as well."""
 
     def error(self, message: str) -> NoReturn:
-        """Note it, tell it with the usage, and end the command."""
+        """Note the error, report it with the usage, and end the command."""
         output().misuse = message
         super().error(message)

@@ -1,1 +1,1 @@
-"""Files of a project: which robots they make, their fixes, one more mission."""
+"""Files of a project: the robots that they make, their fixes, new missions."""

@@ -1,4 +1,4 @@
-"""Writing safe fixes into the files of a project, until there is nothing left that can be fixed."""
+"""Write safe fixes into the files of a project until nothing fixable is left."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from rbxcompose.manifest.limits import FILE_BYTES
 from rbxcompose.printable import plain
 from rbxcompose.regular_files import read_regular
 
-ROUNDS = 20  # one fix may let the next mistake be seen
+ROUNDS = 20  # one fix may reveal the next mistake
 _WORDS = 200  # characters of a title
 
 PrintLine = Callable[[str], None]
 
 
 class CheckedTexts(Protocol):
-    """What a check found, and the texts that it read."""
+    """The findings of a check, and the texts that it read."""
 
     @property
     def report(self) -> Report:
@@ -35,7 +35,7 @@ class CheckedTexts(Protocol):
 
 
 def fix(check: Callable[[], CheckedTexts], say: PrintLine) -> None:
-    """Check, apply what can safely be fixed, say it, and repeat until nothing is left."""
+    """Check, apply and report all safe fixes, and repeat until none is left."""
     for _ in range(ROUNDS):
         checked = check()
         fixes = safe_fixes(checked.report, checked.sources)
@@ -45,7 +45,7 @@ def fix(check: Callable[[], CheckedTexts], say: PrintLine) -> None:
 
 
 def only_ours(findings: Iterable[Finding], projects: Collection[Path]) -> Iterator[Finding]:
-    """Yield findings, without the fixes of those that would change a file that lies in none of `projects`."""
+    """Yield the findings, but drop fixes that would change a file outside of `projects`."""
     for finding in findings:
         is_ours = finding.fix is None or _is_ours(finding.fix, projects)
         yield finding if is_ours else replace(finding, fix=None)
@@ -57,7 +57,7 @@ def _is_ours(one: Fix, projects: Collection[Path]) -> bool:
 
 
 def _apply(fixes: list[Fix], sources: Sources, say: PrintLine) -> bool:
-    """Write fixes, and return whether any file has changed."""
+    """Write fixes and return whether any file has changed."""
     texts = {}
     for file in dict.fromkeys(edit.span.file for one in fixes for edit in one.edits):
         text = _unchanged_text(file, sources[file])
@@ -81,7 +81,7 @@ def _told(one: Fix) -> str:
 
 
 def _unchanged_text(file: str, read: str) -> str | None:
-    """Return the text of a file with its byte order mark and ends of lines, None if it is not what was read."""
+    """Return the text of a file with its byte order mark and line ends; None if it differs from what was read."""
     try:
         text = read_regular(Path(file), FILE_BYTES).decode("utf-8")
     except (OSError, UnicodeDecodeError):

@@ -1,4 +1,4 @@
-"""One more mission for a robot that is there: what `new mission` reads from the robot's file, and adds to it."""
+"""A new mission for an existing robot: what `new mission` reads from the robot's file and adds to it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rbxcompose.scaffold.mission import MissionAnswers, with_entry
 
 
 class MistakenRobotError(Exception):
-    """Raised when a robot has mistakes of its own, with what the compiler made of it."""
+    """Raised with the compiler's result when the robot itself has mistakes."""
 
     def __init__(self, compilation: Compilation) -> None:
         super().__init__("the robot has errors")
@@ -28,14 +28,14 @@ class MistakenRobotError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class MissionHome:
-    """The robot that gets a mission, its file, and the project that both lie in."""
+    """The robot that gets a mission, its file, and the project of both."""
 
     robot: Robot
     file: Path
     project: Path
 
     def usual(self, name: str) -> MissionAnswers:
-        """Return what must be known of a mission of this robot."""
+        """Return the default answers for a mission of this robot."""
         file = PurePosixPath(self.file.relative_to(self.project))
         places = tuple(self.robot.manifest.places.values())
         for skill in sorted(self.robot.skills) if places else ():
@@ -44,7 +44,7 @@ class MissionHome:
         return MissionAnswers(name, file)
 
     def add(self, answers: MissionAnswers) -> bool:
-        """Write the mission's entry into the robot's file, if that surely does nothing else; tell whether it did."""
+        """Write the mission's entry into the robot's file, if that surely changes nothing else; return whether done."""
         before = read_regular(self.file, FILE_BYTES)
         text = with_entry(before.decode("utf-8"), answers)
         if text is None:
@@ -57,16 +57,16 @@ class MissionHome:
             return False
         try:
             replace_file(self.file, text.encode("utf-8"))
-        except OSError:  # the caller tells what to write by hand
+        except OSError:  # the caller reports what to write by hand
             return False
         return True
 
 
 def find_home(written: str) -> MissionHome:
-    """Return the robot that gets the mission; if none is written, the only one below `robots/`.
+    """Return the robot that gets the mission; if none is named, the only one below `robots/`.
 
     Raises:
-        AnswerError: if there is no such robot, if there are several, or if it is one of the library.
+        AnswerError: if there is no such robot, if there are several, or if it belongs to the library.
         MistakenRobotError: if it has mistakes.
     """
     file = _file(written)

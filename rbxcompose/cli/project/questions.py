@@ -1,4 +1,4 @@
-"""Questions at the terminal; without one, every question has its default."""
+"""Questions at the terminal; without a terminal, defaults answer them."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ Read = Callable[[str], T]
 
 
 class CancelledError(Exception):
-    """Raised when a person ends the answers in the middle (Ctrl-D)."""
+    """Raised when a person stops answering (Ctrl-D)."""
 
 
 class Asker:
-    """Asks, or takes what is given; `is_asking` tells whether somebody is there to answer."""
+    """Asks, or takes given answers; `is_asking` is whether somebody is there to answer."""
 
     def __init__(self, *, is_asking: bool) -> None:
         self.is_asking = is_asking and sys.stdin.isatty()
         if self.is_asking and isinstance(sys.stdin, TextIOWrapper):
-            sys.stdin.reconfigure(errors="replace")  # a key that sends no UTF-8 is a wrong letter, not the end
+            sys.stdin.reconfigure(errors="replace")  # a key that sends invalid UTF-8 is a wrong letter, not an abort
 
     def ask(self, question: str, read: Read[T], default: str, *, given: str | None = None) -> T:
-        """Return what `read` makes of the answer; one that it refuses is told, and asked for again.
+        """Return what `read` makes of the answer; report a refused answer and ask again.
 
         Raises:
             AnswerError: if `given`, or the default, is refused.
@@ -42,7 +42,7 @@ class Asker:
                 refuse(error.finding)
 
     def ask_several(self, question: str, read: Callable[[str, list[T]], T]) -> list[T]:
-        """Return what `read` makes of each answer and those before it, up to an empty one; none if nobody is there."""
+        """Return what `read` makes of each answer and those before it, until an empty one; none if nobody is there."""
         found: list[T] = []
         while self.is_asking and (text := _line(f"{question}: ")):
             try:

@@ -1,4 +1,4 @@
-"""What verbs that compile a robot share: which profiles, overlays and values lie on top of its file."""
+"""Shared options of verbs that compile a robot: profiles, overlays and values on top of its file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rbxcompose.compiler import Compilation, compile_robot
 
 
 class Layers(TypedDict):
-    """What `compile_robot` takes beside the robot's file."""
+    """The arguments of `compile_robot` besides the robot's file."""
 
     profiles: Sequence[str]
     overlays: Sequence[str]
@@ -31,7 +31,7 @@ def add_layer_options(parser: argparse.ArgumentParser) -> None:
 
 
 def layers_of(arguments: argparse.Namespace) -> Layers:
-    """Return all that a command lays over the robot's file."""
+    """Return all layers that a command puts over the robot's file."""
     return {
         "profiles": arguments.profile,
         "overlays": arguments.overlays,
@@ -42,5 +42,5 @@ def layers_of(arguments: argparse.Namespace) -> Layers:
 
 
 def compiled(robot: str, arguments: argparse.Namespace) -> Compilation:
-    """Compile a robot with all that a command lays over its file."""
+    """Compile a robot with all layers that a command puts over its file."""
     return compile_robot(robot, **layers_of(arguments))

@@ -1,4 +1,4 @@
-"""Which robots `check` looks at: by file, by folder, or because they use a file."""
+"""The robots that `check` checks: by file, by folder, or because they use a file."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ Good: name the mission in a robot, or leave it out of the command.
 
 _USE = "name it in a robot ('missions:', 'include:')"
 _KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
-_HEAD = 4096  # bytes of a file in which its kind stands
+_HEAD = 4096  # bytes at the start of a file that contain its kind
 _MANIFESTS = ("*.yaml", "*.yml")
 _ROBOTS = "robots"
 
 
 @dataclass(slots=True)
 class Targets:
-    """The robots to check: `robots` in any case, `users` if they use one of `files`; and the `tests` of missions."""
+    """The robots to check: `robots` in any case, `users` only if they use one of `files`; and `tests` of missions."""
 
     robots: list[str] = field(default_factory=list)
     users: list[str] = field(default_factory=list)
@@ -43,7 +43,7 @@ class Targets:
     tests: list[str] = field(default_factory=list)
 
     def unused(self, read: Iterable[str]) -> Iterator[Finding]:
-        """Yield a finding for each of `files` that is not among the names of those that were `read`."""
+        """Yield a finding for each of `files` that is not among the `read` names."""
         known = set(read)
         for file in self.files:
             if file not in known:
@@ -55,9 +55,9 @@ class Targets:
 
 
 def targets(paths: Iterable[str]) -> Targets:
-    """Return the robots that paths of the command line mean.
+    """Return the targets that command-line paths name.
 
-    A path is a robot's file or folder, `rbx:robots/NAME`, a folder that has robots or else tests below it, or any other
+    A path is a robot's file or folder, `rbx:robots/NAME`, a folder with robots or else tests below it, or any other
     manifest, which means the robots of its project that use it.
     """
     out = Targets()
@@ -83,7 +83,7 @@ def targets(paths: Iterable[str]) -> Targets:
 
 
 def robots_below(folder: Path) -> list[str]:
-    """Return the robots' files of a project, or of a folder of robots; at most two folders deep."""
+    """Return the robot files of a project, or of a folder of robots; at most two folders deep."""
     base = folder / _ROBOTS if (folder / _ROBOTS).is_dir() else folder
     files = (path for depth in ("", "*/", "*/*/") for pattern in _MANIFESTS for path in base.glob(depth + pattern))
     return sorted(shown_name(path.resolve()) for path in files if _kind_of(path) == "Robot")
@@ -96,13 +96,13 @@ def tests_below(folder: Path) -> list[str]:
 
 
 def projects_of(paths: Iterable[str]) -> list[Path]:
-    """Return the folders of the projects that robots lie in; what ships with the package belongs to nobody's."""
+    """Return the project folders of robots; files that ship with the package belong to no project."""
     files = [find(path) for path in paths if not path.startswith(PREFIX)]
     return list(dict.fromkeys(project_of(file) for file in files if isinstance(file, Path)))
 
 
 def _kind_of(path: Path) -> str:
-    """Return the kind that a manifest names, nothing if it names none or cannot be read."""
+    """Return the kind that a manifest names; empty if it names none or cannot be read."""
     try:
         with open_regular(path) as file:
             found = _KIND.search(file.read(_HEAD))

@@ -1,1 +1,1 @@
-"""Recordings: what takes and sends messages, options, one component run again."""
+"""Recordings: receiving and sending messages, options, and the replay of one component."""

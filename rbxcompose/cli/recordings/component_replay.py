@@ -1,4 +1,4 @@
-"""`replay --into`: one component of a recorded run is run again, and what it sends is compared with the recording."""
+"""`replay --into`: run one component of a recorded run again, and compare its outputs with the recording."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ HOW = "'rbxcompose up PATH --rate max --record FILE' records everything that is 
 
 
 def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> int:
-    """Run the component that `--into` names, tell the first difference; return 0 if there is none.
+    """Run the component that `--into` names and report the first difference; return 0 if there is none.
 
     Raises:
-        NotDoneError: if the recording has not all that is needed, or the outputs cannot be written.
+        NotDoneError: if the recording lacks something needed, or the outputs cannot be written.
     """
-    deque(reader.messages(), maxlen=0)  # the index of a recording that was cut short has no attachments
+    deque(reader.messages(), maxlen=0)  # the index of a truncated recording has no attachments
     plan = _plan(arguments, path, reader)
     instance = _instance(plan, arguments.into)
     if missing := missing_topics(plan, instance, reader.topics):
@@ -94,7 +94,7 @@ def _settings(plan: Plan, instance: Instance) -> list[object]:
 
 @contextmanager
 def _kept(path: Path | None) -> Iterator[Callable[[Recorded], None] | None]:
-    """Give what takes the outputs, and write them to a file if there is to be one."""
+    """Yield a function that takes the outputs, and write them to a file if one is requested."""
     if path is None:
         yield None
         return

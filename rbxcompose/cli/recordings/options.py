@@ -1,4 +1,4 @@
-"""What `record` and `replay` share besides the bus: options, findings, tables."""
+"""Shared code of `record` and `replay` besides the bus: options, findings, tables."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def add_selection_options(parser: argparse.ArgumentParser) -> None:
 
 
 def selection_of(arguments: argparse.Namespace) -> Selection:
-    """Return which topics are wanted."""
+    """Return the selection of topics."""
     return Selection(tuple(arguments.topics), tuple(arguments.classes))
 
 
@@ -51,7 +51,7 @@ def _class(text: str) -> Qos:
 
 
 def recover_in(folder: Path) -> None:
-    """Recover the unfinished recordings of a folder and tell of them."""
+    """Recover the unfinished recordings of a folder and report them."""
     for one in recover_all(folder):
         if one.problem:
             warn(RECOVERED.at(None, f"'{plain(str(one.path))}' is unfinished and stays so: {plain(one.problem)}"))

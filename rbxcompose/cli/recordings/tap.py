@@ -1,4 +1,4 @@
-"""The bus as `record` and `replay` see it: one more participant, which sends and takes bytes and decodes nothing."""
+"""The bus for `record` and `replay`: one more participant, which sends and receives bytes without decoding."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from rbxcompose.recording.definitions import definition_of
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.topics import RecordedTopic, Selection, topic_of
 
-MOST_WAITING = 20_000  # messages that came and are not yet written
+MOST_WAITING = 20_000  # messages that arrived and are not yet written
 MOST_TOPICS = 2_000
-_MATCHING = 1.0  # [s] at most until subscribers have found a new publisher
-_PAUSE = 0.01  # [s] between two looks for them
+_MATCHING = 1.0  # [s] maximum wait until subscribers have found a new publisher
+_PAUSE = 0.01  # [s] between two checks for them
 
 
 class Tap:
-    """Takes what is published on all topics that are wanted, also on those that come while it runs."""
+    """Receives the messages of all selected topics, including those that appear while it runs."""
 
     def __init__(self, guest: Guest, wanted: Selection) -> None:
         self._guest, self._wanted = guest, wanted
@@ -42,7 +42,7 @@ class Tap:
         return max(0, self._arrived - self._taken - len(self._waiting))
 
     def take(self) -> Iterator[Recorded]:
-        """Yield what has come, and subscribe to what is new."""
+        """Yield the messages that have arrived, and subscribe to new topics."""
         while self._tokens:
             self._subscribe(self._tokens.popleft())
         for _ in range(len(self._waiting)):
@@ -75,7 +75,7 @@ def _recorded(topic: RecordedTopic, stamp: int, arrival: Arrival) -> Recorded:
     try:
         sequence, published, _ = decode_attachment(arrival.attachment)
     except ValueError:
-        sequence, published = 0, stamp  # it comes from no ROS participant: when it came is all that is known
+        sequence, published = 0, stamp  # it comes from no ROS participant: only its time of arrival is known
     return Recorded(topic, stamp, max(0, published), max(0, sequence), arrival.payload)
 
 
@@ -98,7 +98,7 @@ class Player:
             self._publishers[topic] = publisher, gid(token)
 
     def wait_for_subscribers(self) -> None:
-        """Wait until each topic has a subscriber, but not for long: many will never have one."""
+        """Wait until each topic has a subscriber, but only briefly: many will never have one."""
         publishers = [one for one, _ in self._publishers.values()]
         deadline = self._guest.clock.now() + _MATCHING
         while not all(one.has_match for one in publishers) and self._guest.clock.now() < deadline:

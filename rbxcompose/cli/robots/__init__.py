@@ -1,1 +1,1 @@
-"""Running robots: which one is addressed, what it is asked, how it is watched and changed."""
+"""Running robots: which one is addressed, requests to it, watching it, and changing it."""

@@ -1,4 +1,4 @@
-"""Verbs that pass one command to a running robot and print what it answers."""
+"""Verbs that send one command to a running robot and print its answer."""
 
 from __future__ import annotations
 
@@ -29,5 +29,5 @@ def pass_on(arguments: argparse.Namespace, command: Command) -> int:
 
 
 def show_answer(arguments: argparse.Namespace, folder: RobotFolder, answer: str) -> None:
-    """Print what a robot answered."""
+    """Print a robot's answer."""
     tell(json.dumps({"robot": folder.path.name, "answer": answer}) if arguments.json else answer)

@@ -1,4 +1,4 @@
-"""`up --watch`: compiles a running robot again when one of its files changes, and lets it take the difference."""
+"""`up --watch`: recompile a running robot when one of its files changes, and apply the difference."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from rbxcompose.compiler import Compilation
 from rbxcompose.composition.overlay import SET
 from rbxcompose.manifest.library import PREFIX
 
-_LOOK = 0.25  # [s] between looks at the files; a change is taken at the second look at which it is the same
-_AGAIN = 0.5  # [s] between tries of what the robot cannot do now
+_LOOK = 0.25  # [s] between checks of the files; a change is taken at the second check that finds it unchanged
+_AGAIN = 0.5  # [s] between retries of what the robot cannot do now
 
 
 class LiveReload:
-    """Follows the files of a robot that runs. What it cannot do while it moves waits; that is said once."""
+    """Follows the files of a running robot. Changes that are impossible while it moves wait; that is reported once."""
 
     def __init__(self, compiled: Callable[[], Compilation], first: Compilation) -> None:
         self._compiled, self._newest = compiled, first
         self._files = FileWatch(files_of(first))
-        self._is_pending = False  # the newest is to be taken as soon as it can
-        self._told = ""  # why it has to wait, as it was said
+        self._is_pending = False  # the newest is to be applied as soon as possible
+        self._told = ""  # the reported reason for waiting
         self._next_look = self._next_try = 0.0  # [s, monotonic]
 
     def look(self) -> None:
@@ -50,7 +50,7 @@ class LiveReload:
             tell("the files have changed and have errors: the robot stays as it is")
 
     def _take(self) -> None:
-        """Show the difference and let the robot take it, or wait."""
+        """Show the difference and apply it, or wait."""
         if self._newest.plan is None or self._newest.robot is None:
             return
         try:
@@ -73,7 +73,7 @@ class LiveReload:
 
 
 def files_of(found: Compilation) -> Set[Path]:
-    """Return the files that a robot was read from; after mistakes also their folders: one may be missing there."""
+    """Return the files that a robot was read from; after mistakes also their folders, where a file may be missing."""
     names = (name for name in found.sources if name != SET and not name.startswith(PREFIX))
     files = {Path(name).absolute() for name in names}
     return files | {path.parent for path in files} if found.plan is None else files

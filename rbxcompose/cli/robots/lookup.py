@@ -1,4 +1,4 @@
-"""Which robot a command means: by `--robot NAME`, by its name or its file, or the only one that is up."""
+"""Find the robot that a command addresses: by `--robot NAME`, by its name or file, or the only running one."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ Lock, state and control socket of a robot are in a folder that nobody else may o
 
 
 class NotDoneError(Exception):
-    """Raised with the finding when it is not clear which robot is meant, or none is up."""
+    """Raised with the finding when it is unclear which robot is addressed, or none is up."""
 
     def __init__(self, finding: Finding) -> None:
         super().__init__(finding.message)
@@ -74,7 +74,7 @@ def add_robot_option(parser: argparse.ArgumentParser) -> None:
 
 
 def find_robot(wanted: str | None) -> RobotFolder:
-    """Return the folder of the robot that is meant by a name or a path, or of the only one.
+    """Return the folder of the robot with a given name or path, or of the only one.
 
     Raises:
         NotDoneError: if there is none or more than one.
@@ -95,7 +95,7 @@ def robots_up() -> list[RobotFolder]:
     """Return the folders of all robots that are up or were left behind.
 
     Raises:
-        NotDoneError: if somebody else could have put something there.
+        NotDoneError: if another user could have put something there.
     """
     try:
         return all_folders()
@@ -123,7 +123,7 @@ def _possible_files(path: str) -> Iterable[str]:
 
 
 def known_state(folder: RobotFolder) -> RobotState | None:
-    """Return the state from the robot's folder or, if the file is gone or broken, from its supervisor; else None."""
+    """Return the state from the robot's folder or, if that file is gone or broken, from its supervisor; else None."""
     with suppress(BrokenStateError):
         if (state := folder.read_state()) is not None:
             return state
@@ -149,7 +149,7 @@ def answer_of(folder: RobotFolder, request: Request[A], *, timeout: float = ANSW
 
 
 def no_answer(folder: RobotFolder) -> Finding:
-    """Return that a robot does not answer, with the reason if its state tells it."""
+    """Return the finding that a robot does not answer, with the reason if its state has one."""
     name, state = folder.path.name, known_state(folder)
     why = ""
     if state is not None and not state.is_supervised:

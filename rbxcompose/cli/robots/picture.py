@@ -1,4 +1,4 @@
-"""Pure core: what `top` shows of a robot at one moment, and the lines that show it."""
+"""Pure core: the snapshot of a robot that `top` shows, and its lines."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MOST_OF_NAMES = 24  # columns
 
 @dataclass(frozen=True, slots=True)
 class ComponentPicture:
-    """A component: its messages that go out [1/s], and what diagnostics say of it; None where nothing is known."""
+    """A component: the rate of its outgoing messages [1/s] and its diagnostics; None where unknown."""
 
     name: str
     type: str
@@ -35,7 +35,7 @@ class ComponentPicture:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """A process: the share of one processor that it takes, None if not known yet, and its memory [B]."""
+    """A process: its share of one processor, None if not known yet, and its memory [B]."""
 
     process: str
     pid: int
@@ -45,7 +45,7 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Tree:
-    """A mission that runs: its name, how it stands, and the nodes that run, from the outside in, as lines."""
+    """A running mission: its name, its state, and its running nodes as lines, from the outside in."""
 
     mission: str
     state: str
@@ -54,7 +54,7 @@ class Tree:
 
 @dataclass(frozen=True, slots=True)
 class RobotPicture:
-    """All that is shown: `health` has the level and the words of each group of the diagnostics."""
+    """Everything shown: `health` has the level and text of each group of the diagnostics."""
 
     robot: str
     is_supervised: bool
@@ -68,7 +68,7 @@ class RobotPicture:
     trees: Sequence[Tree] = ()
 
     def to_data(self) -> dict[str, Any]:
-        """Return it for JSON; levels by their names."""
+        """Return the picture for JSON, with levels by name."""
         return {
             "robot": self.robot,
             "is_supervised": self.is_supervised,
@@ -99,9 +99,9 @@ class _Line:
 
 
 def lines_of(picture: RobotPicture, width: int, height: int, *, colour: bool = False) -> list[str]:
-    """Return at most `height` lines of at most `width` columns; what does not fit is counted.
+    """Return at most `height` lines of at most `width` columns; count what does not fit.
 
-    Missions have the room that is left by all else; components go last.
+    Missions get the room that all else leaves; components go last.
     """
     head = _head(picture)
     loads = [_Line(""), *_loads(picture.loads)]

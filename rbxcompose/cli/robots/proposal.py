@@ -1,4 +1,4 @@
-"""Comparing a compiled robot with the one that runs, and letting it take the changes."""
+"""Compare a compiled robot with the running one, and apply the changes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _APPLY = LONGEST + _COMPARE  # [s]
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """What another plan would change in a robot that runs, and why it cannot now, if so."""
+    """What another plan would change in a running robot, and why it cannot do so now, if it cannot."""
 
     folder: RobotFolder
     plan: str
@@ -43,12 +43,12 @@ class Proposal:
 
     @property
     def is_empty(self) -> bool:
-        """Return whether there is nothing to do."""
+        """Return whether nothing would change."""
         return not self.found.impossible and all(one.fate is Fate.KEPT for one in self.found.components)
 
     @property
     def why_not(self) -> str:
-        """Return why it cannot be done now, or nothing if it can."""
+        """Return why the change is impossible now, or nothing if it is possible."""
         return self.found.why_not
 
     def text(self) -> str:
@@ -56,9 +56,9 @@ class Proposal:
         return changes_text(self.data)
 
     def apply(self) -> str:
-        """Let the robot take the changes and return what it tells of it.
+        """Apply the changes and return the robot's report.
 
         Raises:
-            NotDoneError: if it refuses, does them only in part, or does not answer.
+            NotDoneError: if the robot refuses, applies them only in part, or does not answer.
         """
         return answer_of(self.folder, ApplyPlan(self.plan, self.found.generation), timeout=_APPLY)

@@ -1,4 +1,4 @@
-"""Running a plan and showing the run: follows the log as `logs -f` does; the supervisor reports the rest."""
+"""Run a plan and show the run: follow the log as `logs -f` does; the supervisor reports the rest."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from rbxcompose.runtime.supervision.launch import (
     start_supervisor,
 )
 
-_LOOK = 0.05  # [s] between looks at the log
+_LOOK = 0.05  # [s] between checks of the log
 
 
 def run_plan(plan: Plan, options: RunOptions, reload: LiveReload | None = None) -> int:
-    """Run a robot to its end, or until all is active if detached, and return the exit code.
+    """Run a robot to its end, or if detached until it is up, and return the exit code.
 
-    `reload` follows its files meanwhile.
+    Meanwhile, `reload` follows its files.
     """
     plan = plan.in_one_process() if options.is_stepped else plan
     started = start_supervisor(plan, options)
@@ -48,7 +48,7 @@ class _Watch:
         self._plan, self._options, self._started, self._reload = plan, options, started, reload
         self._is_up = False
         self._story = StoryWriter([one.name for one in plan.instances], colour=has_colour(sys.stdout))
-        self._log: Follower | None = None  # none before the log of this run has begun
+        self._log: Follower | None = None  # None until the log of this run has begun
 
     def run(self) -> int:
         """Watch until the robot is down, or up if detached, and return the exit code."""
@@ -56,7 +56,7 @@ class _Watch:
             while True:
                 records = self._records()
                 report = self._started.wait_for_report(0.0 if records else _LOOK)
-                exit_code = self._tell(report) if isinstance(report, Up) else None  # comes before what starts with it
+                exit_code = self._tell(report) if isinstance(report, Up) else None  # before the records that follow
                 self._tell_story([*records, *self._records()])
                 if self._reload is not None and self._is_up and exit_code is None:
                     self._reload.look()
@@ -74,7 +74,7 @@ class _Watch:
                 self._log.close()
 
     def _records(self) -> list[Record]:
-        """Return what has been logged since the last call."""
+        """Return the records since the last call."""
         return self._log.read() if self._log is not None else []
 
     def _tell_story(self, records: Iterable[Record]) -> None:

@@ -1,4 +1,4 @@
-"""Looks at a running robot again and again: its state file, its processes, its log, and its bus."""
+"""Samples a running robot repeatedly: its state file, its processes, its log, and its bus."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from rbxcompose.units import UNITS
 
 _HEALTH = "/diagnostics_agg"
 _SUPERVISOR = "supervisor"
-_WIDEST = 200  # columns of a line of a mission
+_WIDEST = 200  # columns per line of a mission
 
 
 class Sampler:
-    """Makes a picture of a robot; rates and shares are those since the picture before.
+    """Makes pictures of a robot; rates and shares are those since the previous picture.
 
-    Messages are counted by their senders. Only topics that are neither latched nor sent with best effort are
-    subscribed to: those of the class `bulk` may be large, and somebody who looks on must cost little.
+    It counts messages by their senders. It subscribes only to topics that are neither latched nor best effort: those
+    of the class `bulk` may be large, and an observer must cost little.
     """
 
     def __init__(self, folder: RobotFolder, guest: Guest) -> None:
@@ -52,18 +52,18 @@ class Sampler:
         self._missions: MissionsSeen | None = None
 
     def close(self) -> None:
-        """Give the log back."""
+        """Close the log."""
         self._follower.close()
 
     @property
     def is_complete(self) -> bool:
-        """Return whether diagnostics and batteries have been heard and the missions seen, if there are any."""
+        """Return whether diagnostics, batteries and missions have been received, if there are any."""
         is_healthy = _HEALTH not in self._listened or bool(self._statuses)
         is_charged = self._charges.keys() >= self._gauges.keys() & self._listened
         return is_healthy and is_charged and (self._missions is None or self._missions.is_complete)
 
     def sample(self) -> RobotPicture | None:
-        """Return how things are now, or None if the robot is down."""
+        """Return the current picture, or None if the robot is down."""
         now, state = self._guest.clock.now(), known_state(self._folder)
         if state is None:
             return None
@@ -83,7 +83,7 @@ class Sampler:
                 self._guest.listen(topic, partial(self._heard, topic.name))
 
     def _trees(self, state: RobotState) -> list[Tree]:
-        """Follow the missions of a robot that has some, and return those that run, if their process lives."""
+        """Follow the missions, if the robot has any, and return the running ones while their process lives."""
         alive = state.alive()
         if not any(one.name == state.executive and one.process in alive for one in state.components):
             return []
@@ -111,7 +111,7 @@ class Sampler:
         self._statuses = {one.name: one for one in told.status}
 
     def _rates(self, graph: Graph, elapsed: float | None) -> dict[str, float]:
-        """Return the messages of each component [1/s]; nothing of those that publish nothing that is counted."""
+        """Return the message rate of each component [1/s], without those that publish nothing that is counted."""
         if elapsed is None:
             return {}
         rates: dict[str, float] = {}
@@ -167,10 +167,10 @@ def _component(end: GraphEnd) -> str:
 
 
 def _charge(gauge: Gauge, heard: HeardMessage) -> float | None:
-    """Return the charge that a message tells (a ratio); None if it tells none."""
+    """Return the charge that a message reports (a ratio); None if it reports none."""
     try:
         message = decode(registry.message(heard.kind.type), heard.arrival.payload)
-    except (CdrError, KeyError):  # broken, or of a package that is not here
+    except (CdrError, KeyError):  # broken, or of a package that is not installed
         return None
     values = [getattr(message, name) for name in message.FIELDS]
     if heard.kind.type != gauge.message or len(values) != 1 or not isinstance(values[0], int | float):

@@ -1,4 +1,4 @@
-"""Stopping a robot whose supervisor does not answer: its processes are asked one by one, over the bus."""
+"""Stop a robot whose supervisor does not answer, by a request to each of its processes over the bus."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _OTHERS = ("parent", "router")  # processes in which nothing moves
 
 
 def stop_by_bus(folder: RobotFolder) -> str:
-    """Stop the robot past its supervisor, and return who was told and who was not.
+    """Stop the robot without its supervisor, and return which processes were reached and which were not.
 
     Raises:
-        NotDoneError: if no process can be told.
+        NotDoneError: if no process can be reached.
     """
     name, state = folder.path.name, known_state(folder)
     with Guest(place_of(folder)) as guest:

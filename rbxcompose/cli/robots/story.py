@@ -1,4 +1,4 @@
-"""The story of a run as people read it: a line for each record, and a few at the end."""
+"""The story of a run for people: a line for each record, and a summary at the end."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from rbxcompose.levels import Level
 from rbxcompose.printable import plain
 from rbxcompose.runtime.records import Record
 
-_LONGEST = 2000  # characters of a record's text that are shown
+_LONGEST = 2000  # maximum characters shown of a record's text
 _RESET, _FAINT = "\x1b[0m", "\x1b[2m"
 _LEVELS = {Level.WARN: "\x1b[33m", Level.ERROR: "\x1b[1;31m", Level.STALE: "\x1b[35m"}
 _SOURCES = ("\x1b[36m", "\x1b[32m", "\x1b[34m", "\x1b[96m", "\x1b[92m", "\x1b[94m")
 
 
 class StoryWriter:
-    """Writes records as lines; the column of sources is as wide as the longest name that is to come."""
+    """Writes records as lines; the source column is as wide as the longest name that will come."""
 
     def __init__(self, sources: Iterable[str], *, colour: bool) -> None:
         self._width = max((len(name) for name in (*sources, "robot")), default=0)

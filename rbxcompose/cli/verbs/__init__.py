@@ -1,4 +1,4 @@
-"""The commands: found by the names of their files, and imported only when needed."""
+"""The verbs: found by the names of their files, and imported only when needed."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Protocol, cast
 
 from rbxcompose import cli
 
-if TYPE_CHECKING:  # a command that is not run costs no imports
+if TYPE_CHECKING:  # a verb that does not run costs no imports
     import argparse
 
 
 class Verb(Protocol):
-    """What a verb's module holds."""
+    """The contents of a verb's module."""
 
     __doc__: str | None
 
@@ -22,7 +22,7 @@ class Verb(Protocol):
         ...
 
     def run(self, arguments: argparse.Namespace) -> int:
-        """Do it and return the exit code."""
+        """Run the verb and return the exit code."""
         ...
 
 
@@ -39,7 +39,7 @@ def load(verb: str) -> Verb:
 
 def parser_of(name: str, verb: Verb) -> argparse.ArgumentParser:
     """Return the parser of a verb."""
-    from rbxcompose.cli.output.console import Parser  # help can do without
+    from rbxcompose.cli.output.console import Parser  # help does not need it
 
     parser = Parser(f"rbxcompose {name}", description=verb.__doc__ or "", allow_abbrev=False)
     verb.add_arguments(parser)

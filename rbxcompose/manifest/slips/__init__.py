@@ -1,10 +1,10 @@
 """The slips of manifests, one file each: in their text, and in values that a model refuses.
 
-Under `@value_slip(ERRORS)` stands a function of a `RefusedValue` and the node there, which returns the node that was
-meant. It counts only if the model takes that.
+`@value_slip(ERRORS)` decorates a function of a `RefusedValue` and the node there, which returns the node that was
+meant. It counts only if the model accepts that.
 
-Under `@text_slip(WORDS)` stands a function of a `Trouble`. It has another shape, since it cannot repair anything: the
-parser has given up, and nobody knows what else stands in a text that it cannot read. Both return None for no slip.
+`@text_slip(WORDS)` decorates a function of a `Trouble`. It has another shape, since it cannot repair anything: the
+parser has stopped, and nobody knows what else is in a text that it cannot read. Both return None for no slip.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rbxcompose.manifest.parser_error import Trouble
 from rbxcompose.manifest.tree import KeyPath, TreeNode
 from rbxcompose.slips import Repair, Slips
 
-# What the parser says, in its words.
+# Messages of the parser.
 COLON = "mapping values are not allowed"
 NO_COLON = "could not find expected ':'"
 NO_DASH = "did not find expected '-' indicator"
@@ -26,7 +26,7 @@ ANY = ""
 
 
 class RefusedValue(NamedTuple):
-    """A place at which a model objects: its path in the file, and what is said if that is no slip."""
+    """A place that a model refuses: its path in the file, and the finding to report if it is not a slip."""
 
     path: KeyPath
     finding: Finding

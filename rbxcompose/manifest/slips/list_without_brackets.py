@@ -1,4 +1,4 @@
-"""A list that was written without its brackets: `match: battery, charger`."""
+"""A list written without its brackets: `match: battery, charger`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rbxcompose.slips import Repair
 
 @value_slip("list_type", "tuple_type")
 def list_without_brackets(place: RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise one item or several where a list belongs."""
+    """Recognise one or several items where a list is required."""
     found = without_brackets(node)
     if not found or not isinstance(node, ScalarNode):
         return None

@@ -28,7 +28,7 @@ def missing_dash(trouble: Trouble) -> Finding | None:
 
 
 def _is_in_list(trouble: Trouble, line: int, column: int) -> bool:
-    """Return whether the nearest line above that stands no deeper is the item of a list in this column."""
+    """Return whether the nearest line above that is not indented deeper is a list item in this column."""
     above = (trouble.lines[one] for one in trouble.above(line))
     nearest = next((one for one in above if indent(one) <= column), "")
     return indent(nearest) == column and nearest.lstrip().startswith("- ")

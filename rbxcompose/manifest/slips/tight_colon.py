@@ -15,7 +15,7 @@ _TIGHT = re.compile(r"[a-z][a-z0-9_]*:(?!//)(?=\S)")
 
 @text_slip(COLON, NO_COLON, after=(key_in_line, missing_dash))
 def tight_colon(trouble: Trouble) -> Finding | None:
-    """Recognise a key that was taken for a text: in the line above, or where the parser looked for a colon."""
+    """Recognise a key that was read as text: in the line above, or where the parser expected a colon."""
     if trouble.value_column and COLON in trouble.problem:
         return None
     is_above = COLON in trouble.problem

@@ -13,7 +13,7 @@ _TIGHT = re.compile(r"( *)-([a-z][a-z0-9_]*)(?=: |:? *$)")
 
 @text_slip(ANY)
 def tight_dashes(trouble: Trouble) -> Finding | None:
-    """Recognise them in the column in which the parser met with trouble."""
+    """Recognise them in the column where the parser failed."""
     near = {line for line in (trouble.line, trouble.opening.line - 1) if line < len(trouble.lines)}
     indents = {len(found[1]) for line in near if (found := _TIGHT.match(trouble.lines[line]))}
     if not indents or "block scalar" in trouble.context:
@@ -30,7 +30,7 @@ def tight_dashes(trouble: Trouble) -> Finding | None:
 
 
 def _siblings(trouble: Trouble, column: int) -> list[int]:
-    """Return the lines around the trouble that begin in a column, as far as no line begins before it."""
+    """Return the lines around the error that begin in a column, up to any line that begins before it."""
     first = last = min(trouble.line, len(trouble.lines) - 1)
     while first > 0 and not _leaves(trouble.lines[first - 1], column):
         first -= 1

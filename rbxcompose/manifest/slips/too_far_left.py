@@ -1,4 +1,4 @@
-"""A line that is further left than its neighbours."""
+"""A line indented less than its neighbours."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _FULL_LINE = re.compile(r" *+[a-z][a-z0-9_]*: ++[^\s#].*")
 
 @text_slip(COLON, NO_KEY, NO_DASH, after=(step_without_colon,))
 def too_far_left(trouble: Trouble) -> Finding | None:
-    """Recognise it by the line below it: that of the error, or the one behind."""
+    """Recognise it by the line below it: that of the error, or the next one."""
     if (COLON in trouble.problem and trouble.value_column) or (NO_KEY in trouble.problem and trouble.is_behind_quote):
         return None
     lines = trouble.lines
@@ -25,7 +25,7 @@ def too_far_left(trouble: Trouble) -> Finding | None:
 
 
 def _outlier(trouble: Trouble, line: int) -> Finding | None:
-    """Return the finding about the line above one that stands in the column of the line before that."""
+    """Return the finding about the line above one that is in the column of the line before that."""
     lines = trouble.lines
     above = next(trouble.above(line), None)
     before = next(trouble.above(above), None) if above is not None else None
