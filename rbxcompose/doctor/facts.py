@@ -1,4 +1,4 @@
-"""What examinations look at, as data: collected beforehand by code that may open a bus and read the machine."""
+"""The data that examinations use, collected beforehand by code that may open a bus and read the machine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rbxcompose.runtime.processes import Process
 
 @dataclass(frozen=True, slots=True)
 class BusFacts:
-    """Who is on a robot's bus, and by how much its nodes' stamps lie in the past [s], at the least, by node."""
+    """The participants of a robot's bus, and the minimum age of the nodes' stamps [s], by node."""
 
     graph: Graph
     ages: Mapping[str, float] = field(default_factory=dict)
@@ -22,9 +22,9 @@ class BusFacts:
 
 @dataclass(frozen=True, slots=True)
 class RunningRobot:
-    """A robot that is up, or what is left of one.
+    """A robot that is up, or the remains of one.
 
-    `problem` is why its state cannot be read, `robot` what its file describes now; `bus` is None if it cannot be
+    `problem` is why its state cannot be read, `robot` is what its file describes now; `bus` is None if it cannot be
     reached.
     """
 
@@ -42,20 +42,20 @@ class RunningRobot:
 
 @dataclass(frozen=True, slots=True)
 class ResourceLimits:
-    """What this user's processes may have; None is no limit. Sizes in bytes."""
+    """The limits of this user's processes; None means no limit. Sizes in bytes."""
 
     open_files: int | None
     real_time_priority: int | None
     locked_memory: int | None
-    shared_memory: int | None  # that is free; None if there is none
+    shared_memory: int | None  # free space; None if there is none
 
 
 @dataclass(frozen=True, slots=True)
 class Clocks:
-    """The wall clock [s since the epoch], and its step against the monotonic clock while we looked [s].
+    """The wall clock [s since the epoch], and its step against the monotonic clock during the examination [s].
 
-    `is_synchronised` tells whether the kernel follows a time server; None if it does not say. `oldest` is a time that
-    has surely passed.
+    `is_synchronised` says whether the kernel follows a time server; None if unknown. `oldest` is a time that has surely
+    passed.
     """
 
     wall: float
@@ -66,7 +66,7 @@ class Clocks:
 
 @dataclass(frozen=True, slots=True)
 class Listener:
-    """Who listens at a TCP port; a process of another user is not known."""
+    """A listener at a TCP port; the process is unknown if it belongs to another user."""
 
     pid: int | None
     title: str
@@ -74,7 +74,7 @@ class Listener:
 
 @dataclass(frozen=True, slots=True)
 class Version:
-    """A package: what is installed and what is locked; None where there is none."""
+    """A package, with its installed and its locked version; None where there is none."""
 
     name: str
     installed: str | None
@@ -83,7 +83,7 @@ class Version:
 
 @dataclass(frozen=True, slots=True)
 class HostFacts:
-    """Everything. `file` is the robot that was named and need not be up; `processes` are titled ones of this user."""
+    """All facts. `file` is the named robot, which need not be up; `processes` are this user's titled processes."""
 
     running: Sequence[RunningRobot]
     file: Robot | None
@@ -97,5 +97,5 @@ class HostFacts:
 
     @property
     def robots(self) -> list[Robot]:
-        """Return what the files describe, of all robots that are looked at."""
+        """Return the robots that the files describe, of all that are examined."""
         return [robot for robot in (self.file, *(one.robot for one in self.running)) if robot is not None]

@@ -28,7 +28,7 @@ _DAY = 86_400.0  # [s]
 
 
 def listeners(proc: Path = _PROC) -> dict[int, Listener]:
-    """Return who listens at TCP ports."""
+    """Return the listeners at TCP ports."""
     inodes = dict(_listening(proc))
     owners = {inode: pid for inode, pid in _sockets(proc) if inode in inodes.values()}
     return {port: _listener(owners.get(inode), proc) for port, inode in inodes.items()}
@@ -39,14 +39,14 @@ def _listening(proc: Path) -> Iterator[tuple[int, str]]:
         try:
             lines = (proc / name).read_text(encoding="ascii").splitlines()[1:]
         except FileNotFoundError:
-            continue  # a kernel without this family of addresses
+            continue  # a kernel without this address family
         for fields in map(str.split, lines):
             if fields[_STATE] == _LISTENS:
                 yield int(fields[_ADDRESS].rpartition(":")[2], 16), fields[_INODE]
 
 
 def _sockets(proc: Path) -> Iterator[tuple[str, int]]:
-    """Yield the sockets of all processes that we may look into, by their inode."""
+    """Yield the sockets of all processes that we may inspect, by inode."""
     for folder in (one for one in proc.iterdir() if one.name.isdigit()):
         for link in _links(folder / "fd"):
             if found := _SOCKET.fullmatch(link):
@@ -54,13 +54,13 @@ def _sockets(proc: Path) -> Iterator[tuple[str, int]]:
 
 
 def _links(folder: Path) -> Iterator[str]:
-    """Yield what is open; nothing of a process that is somebody else's, or has ended while we looked."""
+    """Yield the open files of a process; nothing if it belongs to somebody else or has ended meanwhile."""
     try:
         for link in os.listdir(folder):
             try:
                 yield os.readlink(folder / link)
             except FileNotFoundError:
-                continue  # it was closed meanwhile
+                continue  # closed meanwhile
     except (PermissionError, FileNotFoundError, ProcessLookupError):
         return
 
@@ -82,7 +82,7 @@ def processes() -> dict[Process, str]:
 
 
 def limits() -> ResourceLimits:
-    """Return what processes may have."""
+    """Return the limits of processes."""
     return ResourceLimits(
         _limit(resource.RLIMIT_NOFILE), _limit(resource.RLIMIT_RTPRIO), _limit(resource.RLIMIT_MEMLOCK), _free(_SHARED)
     )
@@ -102,25 +102,25 @@ def _free(folder: Path) -> int | None:
 
 
 class ClockWatch:
-    """Compares the wall clock with the monotonic one, from its making on."""
+    """Compares the wall clock with the monotonic clock, from its creation on."""
 
     def __init__(self) -> None:
         self._offset = time.time() - time.monotonic()
 
     def clocks(self) -> Clocks:
-        """Return how the clocks are now."""
+        """Return the present state of the clocks."""
         made = Path(rbxcompose.__file__).stat().st_mtime - _DAY  # time zones and archives may be that far off
         return Clocks(time.time(), time.time() - time.monotonic() - self._offset, _is_synchronised(), made)
 
 
 def _is_synchronised() -> bool | None:
-    """Ask the kernel, as adjtimex(2) does when it is to change nothing."""
+    """Query the kernel with an adjtimex(2) that changes nothing."""
     state = ctypes.CDLL(None, use_errno=True).adjtimex(ctypes.create_string_buffer(_TIMEX))
     return None if state < 0 else state != _UNSYNCHRONISED
 
 
 def versions() -> list[Version]:
-    """Return the packages that rbxcompose needs; what is locked stands beside the package in a checkout."""
+    """Return the packages that rbxcompose needs; in a checkout, the lock file is beside the package."""
     lock = Path(rbxcompose.__file__).parents[1] / "requirements.lock"
     locked = _locks(lock.read_text(encoding="utf-8")) if lock.is_file() else {}
     return [Version(name, _installed(name), locked.get(_normal(name))) for name in sorted(_needed())]
@@ -130,7 +130,7 @@ def _needed() -> set[str]:
     try:
         required = metadata.requires(NAME) or []
     except metadata.PackageNotFoundError:
-        return set()  # run from its folder, without having been installed
+        return set()  # run from its folder without being installed
     return {found[0] for one in required if "extra ==" not in one and (found := _REQUIRED.match(one))}
 
 

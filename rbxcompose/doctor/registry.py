@@ -20,7 +20,7 @@ FINE = "ok"
 
 @dataclass(frozen=True, slots=True)
 class ExaminationResult:
-    """What one examination tells: words on what is fine, or a finding."""
+    """The result of one examination: words on what is fine, or a finding."""
 
     examination: str
     told: str | Finding
@@ -31,7 +31,7 @@ class ExaminationResult:
         return FINE if isinstance(self.told, str) else self.told.severity.value
 
     def to_data(self) -> dict[str, Any]:
-        """Return it for JSON."""
+        """Return the result as data for JSON."""
         data: dict[str, Any] = {"examination": self.examination, "level": self.level}
         if isinstance(self.told, str):
             return {**data, "message": self.told}

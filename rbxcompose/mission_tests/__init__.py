@@ -1,1 +1,1 @@
-"""Tests of missions: read, run in virtual time, judged; which ways of a mission no test took; what could happen."""
+"""Tests of missions: reading, running in virtual time, judging; the paths that no test took; exploration."""

@@ -1,4 +1,4 @@
-"""What can be wrong with the file of a test."""
+"""Possible errors in the file of a test."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which ways of a mission the tests took: results of skills, branches, alternatives, interrupts, transitions."""
+"""Which paths of a mission the tests took: results of skills, branches, alternatives, interrupts, transitions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rbxcompose.missions.program.statuses import SKIPPED
 
 @dataclass(frozen=True, slots=True, order=True)
 class CoveredWay:
-    """Something that a mission may do: the place of its node, and in words."""
+    """A path that a mission may take: the place of its node, and a description."""
 
     span: Span
     mission: str
@@ -24,13 +24,13 @@ class CoveredWay:
 
 @dataclass(slots=True)
 class Coverage:
-    """The ways of all missions that were tested; the same node is one, however often a mission is used."""
+    """The paths of all tested missions; a node counts once, however often its mission is used."""
 
     ways: set[CoveredWay] = field(default_factory=set)
     taken: set[CoveredWay] = field(default_factory=set)
 
     def add(self, linked: Program, robot: RobotNames, seen: set[StateKey]) -> None:
-        """Add what one run of a mission saw."""
+        """Add the paths taken in one run of a mission."""
         for way, key in ways_of(linked, robot):
             self.ways.add(way)
             if key in seen:
@@ -38,27 +38,27 @@ class Coverage:
 
     @property
     def missing(self) -> list[CoveredWay]:
-        """Return the ways that no test took, by place."""
+        """Return the paths that no test took, by place."""
         return sorted(self.ways - self.taken)
 
 
 class SeenWays:
-    """Watches one run of a mission, and keeps the keys of the ways that it took."""
+    """Observes one run of a mission, and keeps the keys of the paths that it took."""
 
     def __init__(self) -> None:
         self.keys: set[StateKey] = set()
 
     def started(self, number: int, /) -> None:
-        """Hear that a node starts."""
+        """Handle the start of a node."""
         self.keys.add(started(number))
 
     def ended(self, number: int, status: int, outcome: str, /) -> None:
-        """Hear that a node ended."""
+        """Handle the end of a node."""
         if status == SKIPPED:
             self.keys.add(skipped(number))
 
     def hear(self, event: MissionEvent, /) -> None:
-        """Hear what the mission tells."""
+        """Handle an event of the mission."""
         match event:
             case SkillEnded(leaf=leaf, result=result):
                 self.keys.add(ended(leaf, result))
@@ -70,7 +70,7 @@ class SeenWays:
 
 
 def ways_of(linked: Program, robot: RobotNames) -> Iterator[tuple[CoveredWay, StateKey]]:
-    """Yield the ways of a linked mission, each with the key under which it is seen."""
+    """Yield the paths of a linked mission, each with the key under which it is recorded."""
     owners = _owners(linked)
     for node in linked.nodes:
         for possible in node.step.possibilities(node, linked.nodes, robot):
@@ -83,7 +83,7 @@ def ways_of(linked: Program, robot: RobotNames) -> Iterator[tuple[CoveredWay, St
 
 
 def _owners(linked: Program) -> Mapping[int, str]:
-    """Return the name of the mission of each node."""
+    """Return the name of each node's mission."""
     owners = dict.fromkeys(range(len(linked.nodes)), linked.name)
     for node in linked.nodes:
         if node.inner:

@@ -62,7 +62,7 @@ def _published(context: TrialContext, node: TreeNode, sent: trials.SentModel) ->
 
 
 def _topics(context: TrialContext) -> dict[str, str]:
-    """Return the absolute names of topics with their types: those of components, and those that are values."""
+    """Return the absolute names of topics with their types: those of components, and those of values."""
     namespace = context.robot.manifest.bus.namespace or ""
     own = {resolve(name, namespace): message for name, message in context.names.topics.items()}
     return {**own, **{source.topic: source.message for source in context.robot.values.values()}}
@@ -70,7 +70,7 @@ def _topics(context: TrialContext) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class MessagePlaces:
-    """Where the parts of a message stand."""
+    """The places of the parts of a message."""
 
     node: TreeNode
     below: KeyPath

@@ -35,7 +35,7 @@ ENDS = {one: one for one in (SUCCEEDS, FAILS, HALTED, SKIPPED)}
 
 
 def read_expect(context: TrialContext, node: TreeNode | None, model: trials.ExpectModel) -> Expectations:
-    """Return what is expected."""
+    """Return the expectations."""
     root = node or MappingNode()
     _look_at_outcome(context, root, model)
     expect = Expectations(
@@ -72,7 +72,7 @@ def _steps(context: TrialContext, node: TreeNode | None) -> list[ExpectedStep]:
 
 
 def _step(context: TrialContext, node: TreeNode) -> ExpectedStep | None:
-    """Read one step: a word, or a map with one name beside `ended` and `at`."""
+    """Read one step: a word, or a map with one name besides `ended` and `at`."""
     entries = dict(entries_of(node))
     if isinstance(node, ScalarNode):
         entries = {node.text: Entry(node, ScalarNode("", node.span))}
@@ -108,7 +108,7 @@ def _ended(context: TrialContext, name: str, entries: Mapping[str, Entry]) -> st
 
 
 def _arguments(context: TrialContext, name: str, node: TreeNode) -> dict[str, Value]:
-    """Return the arguments of a call that are expected; a single value is the main one."""
+    """Return the expected arguments of a call; a single value is the main one."""
     if isinstance(node, ScalarNode) and node.plain and not node.text:
         return {}
     skill = context.facts.skills.get(name)
@@ -174,7 +174,7 @@ def _published(
 
 
 def _fields(context: TrialContext, topic: str, node: TreeNode | None) -> dict[str, Value]:
-    """Return the fields that are expected of a message; a single value stands for the only one."""
+    """Return the expected fields of a message; a single value means the only one."""
     if node is None:
         return {}
     fields = registry.message(context.names.topics[topic]).FIELDS

@@ -1,6 +1,6 @@
-"""Tries what could happen to a mission: every result of its skills, values on either side of what it compares.
+"""Explores what could happen to a mission: every result of its skills, values on either side of its comparisons.
 
-Breadth first, so that the script to each find is the shortest; a state that was met before is not gone into again.
+Breadth first, so that the script to each fault is the shortest; a known state is not explored again.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _DONE = {SUCCEEDS: "succeeds", FAILS: "fails"}
 
 @dataclass(frozen=True, slots=True)
 class ExplorationLimits:
-    """How far a mission is explored: states in all, and choices one after the other."""
+    """Limits of exploration: the total number of states, and of choices one after the other."""
 
     states: int = 2000
     depth: int = 30
@@ -38,7 +38,7 @@ class ExplorationLimits:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Something wrong, in words, and the choices that lead there."""
+    """A fault, in words, and the choices that lead to it."""
 
     what: str
     script: tuple[str, ...]
@@ -46,7 +46,7 @@ class Found:
 
 @dataclass(slots=True)
 class Explored:
-    """What came out: states that were met, the ends with the shortest way to each, what is wrong."""
+    """The result: the number of states, the ends with the shortest script to each, the faults."""
 
     mission: str
     states: int = 0
@@ -70,25 +70,25 @@ class ExploredChoice:
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """Where a mission stands: the engine's snapshot and what surrounds it; None before the mission has begun."""
+    """A state of a mission: the engine's snapshot, None before the mission has begun, and the state of its world."""
 
     engine: dict[str, Any] | None
     now: float
     values: Mapping[str, Value]
-    calls: Mapping[int, str]  # what runs, in words, by leaf
-    held: Mapping[int, str]  # what is held
+    calls: Mapping[int, str]  # running calls, in words, by leaf
+    held: Mapping[int, str]  # held calls
     script: tuple[str, ...] = ()
 
 
 def explore(
     program: Program, robot: RobotNames, inputs: Mapping[str, Value], limits: ExplorationLimits = ExplorationLimits()
 ) -> Explored:
-    """Explore a mission without mistakes."""
+    """Explore a mission that has no errors."""
     return Explorer(program, robot, inputs, limits).explore()
 
 
 class Explorer:
-    """Restores an engine to each moment, lets one more thing happen, and looks at where that leads."""
+    """Restores an engine to each moment, lets one more thing happen, and examines the result."""
 
     def __init__(
         self, program: Program, robot: RobotNames, inputs: Mapping[str, Value], limits: ExplorationLimits
@@ -107,7 +107,7 @@ class Explorer:
         self.fresh = save(self.engine)
 
     def explore(self) -> Explored:
-        """Continue until there is nothing new, or the limits are reached."""
+        """Continue until there is nothing new or a limit is reached."""
         while self.waiting:
             moment = self.waiting.popleft()
             self.out.deepest = max(self.out.deepest, len(moment.script))
@@ -139,14 +139,14 @@ class Explorer:
                     yield ExploredChoice(f"{name} becomes {words}", name=name, value=value)
 
     def wake_of(self, moment: Moment) -> float | None:
-        """Return when the mission wakes by itself [s]."""
+        """Return when the mission wakes up by itself [s]."""
         if moment.engine is None:
             return None
         restore(self.engine, moment.engine)
         return self.engine.next_wake()
 
     def follow(self, moment: Moment, choice: ExploredChoice) -> None:
-        """Let one thing happen, and keep where it leads if that is new."""
+        """Let one thing happen, and keep the resulting moment if it is new."""
         engine, world = self.engine, self.world
         restore(engine, self.fresh if moment.engine is None else moment.engine)
         world.enter(moment)
@@ -172,7 +172,7 @@ class Explorer:
         return (skill.outcomes if skill else {}).get(choice.outcome, choice.outcome)
 
     def look(self, script: tuple[str, ...]) -> None:
-        """Report what is wrong here, and keep the moment if the mission continues."""
+        """Report the faults at this moment, and keep it if the mission continues."""
         for text in self.world.reports:
             self.tell(text, script)
         if self.engine.held_until is not None:
@@ -192,7 +192,7 @@ class Explorer:
         self.keep(moment)
 
     def keep(self, moment: Moment) -> None:
-        """Continue from a moment later, if it is new."""
+        """Queue a moment, if it is new, to continue from it later."""
         mark = fingerprint(moment, self.engine.tasks)
         if mark not in self.met:
             self.met.add(mark)
@@ -200,7 +200,7 @@ class Explorer:
             self.waiting.append(moment)
 
     def tell(self, what: str, script: tuple[str, ...]) -> None:
-        """Keep something wrong, with the first script that leads there."""
+        """Record a fault, with the first script that leads to it."""
         if what not in self.said:
             self.said.add(what)
             self.out.found.append(Found(what, script))
@@ -220,14 +220,14 @@ class ExploredWorld:
         self.story = MissionStory(mission, robot.skills)
 
     def enter(self, moment: Moment) -> None:
-        """Be as it was then."""
+        """Restore the world of a moment."""
         self.now = moment.now
         self.values, self.calls, self.held = dict(moment.values), dict(moment.calls), dict(moment.held)
         self.counts = dict.fromkeys(self.values, 1)
         self.reports, self.end = [], None
 
     def set(self, name: str, value: Value) -> None:
-        """Let a value come."""
+        """Receive a value."""
         self.values[name] = value
         self.counts[name] += 1
 
@@ -236,15 +236,15 @@ class ExploredWorld:
         return self.values.get(name, NOT_ARRIVED)
 
     def age(self, name: str, /) -> float | NotArrived:
-        """Return that every value has just come."""
+        """Return zero: every value has just arrived."""
         return 0.0 if name in self.values else NOT_ARRIVED
 
     def count(self, name: str, /) -> int:
-        """Return how many have come."""
+        """Return how many values have arrived."""
         return self.counts.get(name, 0)
 
     def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
-        """Let a call run."""
+        """Start a call."""
         self.calls.setdefault(leaf, skill)
 
     def halt(self, leaf: int, /) -> None:
@@ -253,7 +253,7 @@ class ExploredWorld:
         self.held.pop(leaf, None)
 
     def pause(self, leaf: int, /) -> None:
-        """Hold a call; it does not end meanwhile."""
+        """Hold a call, which then cannot end."""
         self.held[leaf] = self.calls.pop(leaf)
 
     def resume(self, leaf: int, /) -> None:
@@ -264,11 +264,11 @@ class ExploredWorld:
         """Do nothing: there is no subscriber."""
 
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
-        """Let a call run."""
+        """Start a call."""
         self.calls[leaf] = service
 
     def say(self, event: MissionEvent, /) -> None:
-        """Keep what is wrong, and how calls are told."""
+        """Record faults, and the texts of calls."""
         _, text = self.story.tell(event) if isinstance(event, SkillStarted) else (None, "")
         match event:
             case SkillStarted(leaf=leaf):
@@ -280,7 +280,7 @@ class ExploredWorld:
 
 
 def fingerprint(moment: Moment, tasks: Sequence[Task]) -> str:
-    """Return a text that is the same for moments from which the same can happen: times count from now on."""
+    """Return a text that is equal for moments with the same possible futures: times are relative to now."""
     values = {name: str(value) for name, value in moment.values.items()}
     if moment.engine is None:
         return json.dumps(values, sort_keys=True)
@@ -304,7 +304,7 @@ def fingerprint(moment: Moment, tasks: Sequence[Task]) -> str:
 
 
 def _state(task: Task, state: Sequence[Any], now: float, runs: bool) -> list[Any]:
-    """Return what counts of a task's state: of one that does not run, what its latest run left behind is forgotten."""
+    """Return the relevant part of a task's state; if it does not run, the leftovers of its latest run do not count."""
     counting = []
     for name, value in zip(("current", *task.saved), state, strict=True):
         is_time = name in task.times and isinstance(value, float)
@@ -314,7 +314,7 @@ def _state(task: Task, state: Sequence[Any], now: float, runs: bool) -> list[Any
 
 
 def text_of(explored: Explored) -> str:
-    """Return what came out, for people."""
+    """Return the result as text for people."""
     reach = "cut off at the limits" if explored.is_cut else "complete"
     lines = [f"{explored.mission}: {explored.states} states, {explored.deepest} choices deep; {reach}"]
     for end, script in sorted(explored.ends.items()):

@@ -1,4 +1,4 @@
-"""Which files are tests: those that are named, and all below folders."""
+"""Which files are tests: those that are named, and all tests in folders."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from rbxcompose.manifest.test_file import TEST
 from rbxcompose.regular_files import open_regular
 
 _KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
-_HEAD = 4096  # bytes of a file in which its kind stands
+_HEAD = 4096  # [B] at the start of a file that contain its kind
 _SUFFIXES = (".yaml", ".yml")
 
 
 def tests_of(paths: Iterable[Path]) -> list[Path]:
-    """Return the tests that paths mean; a file that is named is one, whatever it holds."""
+    """Return the tests that paths mean; a file that is named is one, whatever it contains."""
     found: dict[Path, None] = {}
     for path in paths:
         below = sorted(one for one in path.rglob("*") if is_test(one)) if path.is_dir() else [path]

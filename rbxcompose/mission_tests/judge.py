@@ -14,12 +14,12 @@ from rbxcompose.mission_tests.scope import agrees
 from rbxcompose.missions.engine.value_text import show
 from rbxcompose.units import format_number
 
-ON_TIME = 0.01  # [s] by which a step may differ from its `at`
+ON_TIME = 0.01  # [s] by which the start of a step may differ from its `at`
 
 
 @dataclass(frozen=True, slots=True)
 class UnmetExpectation:
-    """Something that is not as expected: in words, its place in the test, the line of the trace that it follows."""
+    """An unmet expectation: a description, its place in the test, the line of the trace that it follows."""
 
     message: str
     span: Span | None = None
@@ -27,7 +27,7 @@ class UnmetExpectation:
 
 
 def judge(expect: Expectations, record: TrialRecord, types: Mapping[str, Type]) -> list[UnmetExpectation]:
-    """Return what is not as it was expected, nothing for a test that passed; `types` are those of the data."""
+    """Return the unmet expectations, none for a test that passed; `types` are those of the data."""
     return [
         *_ending(expect, record),
         *_steps(expect.steps, record),
@@ -63,7 +63,7 @@ def _how(outcome: str) -> str:
 
 
 def _steps(expected: Sequence[ExpectedStep], record: TrialRecord) -> Iterator[UnmetExpectation]:
-    """Look for each step behind the one before it, also after one that is missing."""
+    """Search each step after the previous one, even if that one is missing."""
     behind = 0
     for step in expected:
         found = next((i for i in range(behind, len(record.steps)) if is_it(step, record.steps[i])), None)
@@ -77,12 +77,12 @@ def _steps(expected: Sequence[ExpectedStep], record: TrialRecord) -> Iterator[Un
 
 
 def is_it(step: ExpectedStep, done: Done) -> bool:
-    """Return whether a step that was done is the one that is looked for."""
+    """Return whether a step that ran is the expected one."""
     return done.name == step.name and not _differences(step, done)
 
 
 def _differences(step: ExpectedStep, done: Done) -> list[str]:
-    """Return in which ways a step of the same name is another one; empty words for other arguments."""
+    """Return the differences between an expected step and one of the same name; an empty text for other arguments."""
     found = []
     arguments = step.arguments.items()
     if any(name not in done.arguments or not agrees(value, done.arguments[name]) for name, value in arguments):
@@ -95,9 +95,9 @@ def _differences(step: ExpectedStep, done: Done) -> list[str]:
 
 
 def _nearest(step: ExpectedStep, done: Sequence[Done], behind: int) -> str:
-    """Return what comes nearest to a step that is missing, in words: the same call first, then one that is alike.
+    """Return in words what comes nearest to a missing step: the same call first, then a similar one.
 
-    What was done before what was looked for counts more than a call with other arguments behind it.
+    The same call earlier counts more than a later call with other arguments.
     """
     earlier = [one for one in done[:behind] if is_it(step, one)]
     later = [(one, _differences(step, one)) for one in done[behind:] if one.name == step.name]
@@ -164,5 +164,5 @@ def _reports(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpecta
 
 
 def at(seconds: float) -> str:
-    """Return a time as people read it."""
+    """Return a time in readable form."""
     return f"{format_number(round(seconds, 3))} s"

@@ -1,4 +1,4 @@
-"""Results of tests as JUnit's XML, which continuous integration reads."""
+"""Results of tests as JUnit XML, for continuous integration."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010fff
 
 
 def junit(outcomes: Sequence[FileOutcome]) -> str:
-    """Return one suite with a case for each test; what kept a test from running is an error, all else a failure."""
+    """Return one suite with a case for each test; what kept a test from running is an error, the rest a failure."""
     failed = [one for one in outcomes if one.verdict and not one.passed]
     broken = [one for one in outcomes if not one.verdict]
     counts = {"tests": len(outcomes), "failures": len(failed), "errors": len(broken)}

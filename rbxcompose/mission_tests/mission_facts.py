@@ -1,4 +1,4 @@
-"""What a mission with all that it uses needs from the robot, and which steps it has."""
+"""What a mission and the missions it uses need from the robot, and the steps that they have."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from rbxcompose.missions.program.program import Program, RobotNames, Skill
 
 
 def missions_in(program: Program) -> Iterator[Program]:
-    """Yield a linked mission and each that it uses, as often as it does."""
+    """Yield a linked mission and each mission that it uses, once per use."""
     yield program
     yield from (node.inner for node in program.nodes if node.inner)
 
 
 @dataclass(frozen=True, slots=True)
 class MissionFacts:
-    """What a mission asks of the robot, and its steps by name, each with what its outcomes count as."""
+    """What a mission needs from the robot, and its steps by name, each with what its outcomes count as."""
 
     skills: Mapping[str, Skill]
     services: frozenset[str]
@@ -31,7 +31,7 @@ class MissionFacts:
 
     @classmethod
     def of(cls, program: Program, robot: RobotNames) -> MissionFacts:
-        """Return what is known of a linked mission."""
+        """Return the facts of a linked mission."""
         named: dict[str, Mapping[str, str]] = {}
         for node in program.nodes:
             if node.name:

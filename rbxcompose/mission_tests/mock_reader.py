@@ -1,4 +1,4 @@
-"""Reads `mocks`: the skills and services for which a test answers."""
+"""Reads `mocks`: the skills and services that a test answers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rbxcompose.missions.program.program import Skill
 
 
 def read_mocks(context: TrialContext, node: TreeNode | None, models: Mapping[str, trials.MockModel]) -> dict[str, Mock]:
-    """Return the mocks by the name of what they stand for."""
+    """Return the mocks by the name of the skill or service that they replace."""
     return {name: _mock(context, name, entry, models[name]) for name, entry in entries_of(node) if name in models}
 
 
@@ -48,7 +48,7 @@ def _mock(context: TrialContext, name: str, entry: Entry, model: trials.MockMode
 
 
 def _outcomes(value: TreeNode, model: trials.MockModel, outcomes: Mapping[str, str]) -> Iterator[Finding]:
-    """Yield what is wrong with the outcomes."""
+    """Yield the findings on the outcomes."""
     written: dict[KeyPath, str] = {("result",): model.result}
     written |= {("outcome_at", call): outcome for call, outcome in model.outcome_at.items()}
     for path, outcome in written.items():

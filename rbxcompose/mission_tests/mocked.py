@@ -18,7 +18,7 @@ ROUNDING = 1e-9  # [s]
 
 @dataclass(slots=True)
 class MockedCall:
-    """A call that is being answered until `due` [s]; while it is held, `due` is what is left."""
+    """A call whose answer is due at `due` [s]; while it is held, `due` is the remaining time."""
 
     leaf: int
     mock: Mock
@@ -28,7 +28,7 @@ class MockedCall:
 
 
 class Mocked:
-    """Answers calls; how one ends is decided at its end, so that one that was halted is not counted."""
+    """Answers calls; the outcome of a call is decided when it ends, so that a halted call does not count."""
 
     def __init__(self, mocks: Mapping[str, Mock]) -> None:
         self.mocks = mocks
@@ -36,12 +36,12 @@ class Mocked:
         self._ended: Counter[str] = Counter()
 
     def start(self, leaf: int, name: str, arguments: Mapping[str, Value], now: float) -> None:
-        """Begin to answer."""
+        """Begin to answer a call."""
         mock = self.mocks[name]
         self._calls[leaf] = MockedCall(leaf, mock, arguments, now + mock.takes)
 
     def halt(self, leaf: int) -> bool:
-        """Forget a call; tell whether there was one."""
+        """Forget a call; return whether there was one."""
         return self._calls.pop(leaf, None) is not None
 
     def pause(self, leaf: int, now: float) -> bool:
@@ -63,7 +63,7 @@ class Mocked:
         return min((call.due for call in self._calls.values() if not call.is_held), default=None)
 
     def ended(self, now: float) -> Iterator[tuple[MockedCall, Result]]:
-        """Yield the calls that end now, in the order in which they are due, then in that of their leaves."""
+        """Yield the calls that end now, ordered by due time, then by leaf."""
         due = [call for call in self._calls.values() if not call.is_held and call.due <= now + ROUNDING]
         for call in sorted(due, key=lambda call: (call.due, call.leaf)):
             del self._calls[call.leaf]
@@ -84,13 +84,13 @@ class SetValues:
     def __init__(self, robot: RobotNames, inputs: Mapping[str, Value], below: RobotValues | None = None) -> None:
         self._robot = robot
         self._inputs = inputs
-        self.below = below  # the robot's own, if it runs
+        self.below = below  # the robot's own values, if it runs
         self._set: dict[str, Value] = {}
         self._times: dict[str, float] = {}
         self._counts: dict[str, int] = {}
 
     def set(self, settings: Mapping[str, ValueSetting], known: Mapping[str, Value], now: float) -> dict[str, Value]:
-        """Compute all values, then set them; raises what expressions raise. Return what was set."""
+        """Compute all values, then set and return them; raise what the expressions raise."""
         scope = TrialScope({**self._inputs, **known}, self._robot.places, Now(self, now))
         computed = {name: setting(scope) for name, setting in settings.items()}
         for name, value in computed.items():
@@ -105,13 +105,13 @@ class SetValues:
         return NOT_ARRIVED if self.below is None else self.below.value(name)
 
     def age(self, name: str, now: float) -> float | NotArrived:
-        """Return how long ago it came [s]."""
+        """Return the age of a value [s]."""
         if name in self._times:
             return now - self._times[name]
         return NOT_ARRIVED if self.below is None else self.below.age(name)
 
     def count(self, name: str) -> int:
-        """Return how many have come: of the robot's only those before the test set the first one."""
+        """Return how many values have arrived; those of the robot count only until the test sets the first one."""
         if name in self._counts:
             return self._counts[name]
         return 0 if self.below is None else self.below.count(name)
@@ -129,9 +129,9 @@ class Now:
         return self._values.value(name)
 
     def age(self, name: str, /) -> float | NotArrived:
-        """Return how long ago it came [s]."""
+        """Return the age of a value [s]."""
         return self._values.age(name, self._now)
 
     def count(self, name: str, /) -> int:
-        """Return how many have come."""
+        """Return how many values have arrived."""
         return self._values.count(name)

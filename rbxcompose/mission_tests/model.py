@@ -1,4 +1,4 @@
-"""A test of a mission that was read: names are known, values have their types."""
+"""A test of a mission after reading: all names are known, values have their types."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ ValueSetting = Callable[[Scope], Value]
 
 @dataclass(frozen=True, slots=True)
 class Mock:
-    """How a test answers in the place of a skill or a service.
+    """How a test answers for a skill or a service.
 
-    `main` is the argument to which `fails_for` belongs; `outcomes` tell what each outcome counts as.
+    `main` is the argument that `fails_for` refers to; `outcomes` says what each outcome counts as.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Mock:
 
 @dataclass(frozen=True, slots=True)
 class EventDeed:
-    """One thing that happens: a word of the file, with what belongs to it."""
+    """One action of an event: a word of the file, with its values."""
 
     word: str
     settings: Mapping[str, ValueSetting] = field(default_factory=dict)
@@ -68,9 +68,9 @@ class TrialEvent:
 
 @dataclass(frozen=True, slots=True)
 class ExpectedStep:
-    """A step that is looked for: a call of a skill, a named node or a state.
+    """An expected step: a call of a skill, a named node or a state.
 
-    `counts_as` tells for the outcomes that this step may have what each counts as.
+    `counts_as` says what each possible outcome of this step counts as.
     """
 
     name: str
@@ -84,7 +84,7 @@ class ExpectedStep:
 
 @dataclass(frozen=True, slots=True)
 class ExpectedMessage:
-    """A message that is looked for: a topic, and those of its fields that count."""
+    """An expected message: a topic, and the fields to compare."""
 
     topic: str
     fields: Mapping[str, Value]
@@ -93,7 +93,7 @@ class ExpectedMessage:
 
 @dataclass(frozen=True, slots=True)
 class ExpectedValue:
-    """Something that is expected under a name, with its place."""
+    """A value expected under a name, with its place."""
 
     name: str
     value: Value
@@ -102,7 +102,7 @@ class ExpectedValue:
 
 @dataclass(frozen=True, slots=True)
 class Expectations:
-    """What must have happened; `until` [s] ends the test before the mission does."""
+    """What must have happened; at `until` [s] the test ends even if the mission has not."""
 
     outcome: str = ""
     outcome_span: Span | None = None
@@ -117,14 +117,14 @@ class Expectations:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A test of a mission on a robot, ready to run; `linked` is the program with all that it uses.
+    """A test of a mission on a robot, ready to run; `linked` is the program with all missions that it uses.
 
-    `is_complete` tells that the test answers for all that the mission asks of the robot, so that no robot is needed.
+    `is_complete` means that the test answers everything the mission needs from the robot, so that no robot is needed.
     """
 
     name: str
     about: str
-    file: str  # as findings show it
+    file: str  # as shown in findings
     span: Span
     mission: str
     program: Program

@@ -1,4 +1,4 @@
-"""From the file of a test to the test, with a finding for each error."""
+"""Reads the file of a test, with a finding for each error."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from rbxcompose.plan.model import Plan
 
 @dataclass(frozen=True, slots=True)
 class WrittenTrial:
-    """The file of a test, before anything in it is understood; without `root` it cannot be read."""
+    """The file of a test before it is interpreted; without `root`, it could not be read."""
 
     path: Path
     name: str
@@ -42,31 +42,31 @@ class WrittenTrial:
 
 @dataclass(slots=True)
 class TrialReader:
-    """Reads the tests of one run; each robot is compiled once, and its findings are told once.
+    """Reads the tests of one run; each robot is compiled once, and its findings are reported once.
 
-    `sources` are the texts of all files, `report` has what is wrong with robots.
+    `sources` are the texts of all files, `report` has the findings on robots.
     """
 
     environment: Mapping[str, str]
     sources: dict[str, str] = field(default_factory=dict)
     report: Report = field(default_factory=Report)
     _robots: dict[str, Compilation] = field(default_factory=dict)
-    _kept_back: dict[Finding, str] = field(default_factory=dict)  # what a test is told of a robot with mistakes
+    _kept_back: dict[Finding, str] = field(default_factory=dict)  # the finding in a test of a robot with errors
 
     def read(self, path: Path) -> tuple[Trial | None, Report]:
-        """Return the test of a file, None if there is something wrong with it or with its robot; and its findings."""
+        """Return the test of a file, None if the test or its robot has errors; and its findings."""
         written = self.open(path)
         return self.understand(written), written.report
 
     def open(self, path: Path) -> WrittenTrial:
-        """Return what is written in a file; a test without a name is called like its file."""
+        """Return the contents of a file; a test without a name gets that of its file."""
         report = Report()
         root = Documents(report, self.sources).read(path, TEST)
         name = root.get("name") if root else None
         return WrittenTrial(path, name.text if isinstance(name, ScalarNode) and name.text else path.name, root, report)
 
     def understand(self, written: WrittenTrial) -> Trial | None:
-        """Return the test that is written, None if it cannot run; what is wrong is added to its report."""
+        """Return the test that a file contains, None if it cannot run; add its findings to its report."""
         root, report = written.root, written.report
         if root is None:
             return None
@@ -78,7 +78,7 @@ class TrialReader:
         return None if report.has_errors else trial
 
     def summed_up(self, findings: Iterable[Finding]) -> Iterator[Finding]:
-        """Yield findings, but for all tests together that a robot with mistakes keeps from running only one."""
+        """Yield the findings, but merge those of all tests that the same robot with errors keeps from running."""
         kept_back: dict[str, list[Finding]] = {}
         for one in Report(list(findings)):
             if one in self._kept_back:
@@ -90,7 +90,7 @@ class TrialReader:
             yield replace(ones[0], message=_no_robot(robot, which))
 
     def _robot(self, root: MappingNode, path: Path, report: Report) -> Compilation | None:
-        """Return what the compiler makes of the robot, if it can run."""
+        """Return the compilation of the robot; None if its file cannot be found."""
         written = _text(root, "robot", "the robot's file", report)
         if written is None:
             return None
@@ -117,7 +117,7 @@ def _no_robot(robot: str, which: str) -> str:
 
 
 def _without_values(root: MappingNode) -> MappingNode:
-    """Return the header and the names of the sections; what these hold is looked at where it is read."""
+    """Return the header and the names of the sections; their contents are checked where they are read."""
     sections = {name: Entry(entry.key, ScalarNode("", entry.value.span)) for name, entry in root.entries.items()}
     header = {name: entry for name, entry in root.entries.items() if name in ManifestHeader.model_fields}
     return replace(root, entries={**sections, **header})
@@ -176,7 +176,7 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
 
 
 def _is_complete(facts: MissionFacts, mocks: Mapping[str, Mock], events: tuple[TrialEvent, ...]) -> bool:
-    """Return whether the mission asks for nothing but what the test gives, and nothing goes over the bus."""
+    """Return whether the mission needs only what the test provides, and nothing is sent over the bus."""
     deeds = [deed for event in events for deed in event.deeds]
     values = {name for deed in deeds for name in deed.settings} | {name for one in mocks.values() for name in one.sets}
     is_answered = {*facts.skills, *facts.services} <= mocks.keys()
@@ -184,7 +184,7 @@ def _is_complete(facts: MissionFacts, mocks: Mapping[str, Mock], events: tuple[T
 
 
 def _there(root: MappingNode) -> list[tuple[str, Any]]:
-    """Return the sections that have something in them, with their models."""
+    """Return the sections that are not empty, with their models."""
     return [(key, model) for key, model in SECTIONS.items() if key in root and not _is_empty(root.entries[key].value)]
 
 
@@ -195,7 +195,7 @@ def _is_empty(node: TreeNode) -> bool:
 def _inputs(
     root: MappingNode, robot: Robot, chosen: ScalarNode, program: Program, report: Report
 ) -> Mapping[str, object]:
-    """Return the inputs: those that the test gives, then the robot's, then the defaults."""
+    """Return the inputs: those of the test, else the robot's, else the defaults."""
     given = root.get("with")
     entries: dict[str, Entry] = {}
     if isinstance(given, MappingNode):
@@ -209,7 +209,7 @@ def _inputs(
 
 
 def _look_at_times(events: tuple[TrialEvent, ...], until: float | None, report: Report) -> None:
-    """Add what can never happen: an event after the end, an order that the robot refuses."""
+    """Add findings on what can never happen: an event after the end, an order that the robot refuses."""
     is_stopped = is_paused = False
     latest = 0.0
     for event in events:

@@ -1,4 +1,4 @@
-"""The record of a run: lines with their times, the steps that were done, messages, data, the end."""
+"""The record of a run: lines with their times, the steps that ran, messages, data, the end."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class TraceLine:
 
 @dataclass(slots=True)
 class Done:
-    """A step that was done: a call of a skill, a named node or a state, from `began` to `ended_at` [s].
+    """A step that ran: a call of a skill, a named node or a state, from `began` to `ended_at` [s].
 
-    `line` is that of its start in the trace. `ended` is `running` until it ends.
+    `line` is the line of its start in the trace. `ended` is `running` until it ends.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Done:
 
 @dataclass(slots=True)
 class TrialRecord:
-    """Hears the events of a mission, and what the test does."""
+    """Records the events of a mission, and the actions of the test."""
 
     mission: str
     skills: Mapping[str, Skill]
@@ -61,21 +61,21 @@ class TrialRecord:
     reports: list[str] = field(default_factory=list)
     data: Mapping[str, Value] = field(default_factory=dict)
     end: MissionEnded | None = None
-    trouble: str = ""  # why the run itself could not be brought to its end
-    late: int = 0  # events of the test that did not come any more
+    trouble: str = ""  # why the run itself could not be completed
+    late: int = 0  # events of the test that were never reached
     _story: MissionStory = field(init=False)
-    _open: dict[int, Done] = field(default_factory=dict)  # steps that run: calls by node, named nodes by its negative
+    _open: dict[int, Done] = field(default_factory=dict)  # running steps: calls by node, named nodes by its negative
 
     def __post_init__(self) -> None:
         """Begin the story."""
         self._story = MissionStory(self.mission, self.skills)
 
     def note(self, text: str) -> None:
-        """Add a line on what the test does."""
+        """Add a line on an action of the test."""
         self.lines.append(TraceLine(self.now, f"* {text}"))
 
     def hear(self, event: MissionEvent) -> None:
-        """Keep what an event tells."""
+        """Record an event."""
         level, text = self._story.tell(event)
         if text:
             self.lines.append(TraceLine(self.now, text, level))
@@ -106,5 +106,5 @@ class TrialRecord:
 
     @property
     def outcome(self) -> str:
-        """Return how the mission ended, by its own word for it; `running` if it has not."""
+        """Return the outcome of the mission in its own word; `running` if it has not ended."""
         return RUNS if self.end is None else self.end.outcome or self.end.result

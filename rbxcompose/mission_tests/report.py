@@ -1,4 +1,4 @@
-"""The report of tests: one line each, a trace of what went wrong, a summary, the paths not covered; text and JSON."""
+"""The report of tests: one line each, a trace of each failure, a summary, the paths not covered; text and JSON."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from rbxcompose.mission_tests.record import TrialRecord
 from rbxcompose.mission_tests.runner import Verdict
 from rbxcompose.printable import plain
 
-MOST_LINES = 60  # of a trace; of a longer one the middle is left out
-MARK = ">>>"  # stands before what is not as expected
+MOST_LINES = 60  # of a trace; the middle of a longer one is left out
+MARK = ">>>"  # precedes what is not as expected
 _COLOURS = {"pass": "\x1b[32m", "fail": "\x1b[1;31m", "time": "\x1b[2m", "warn": "\x1b[33m"}
 _RESET = "\x1b[0m"
 
 
 @dataclass(frozen=True, slots=True)
 class FileOutcome:
-    """What became of one file: a verdict, or the findings that kept it from running; `took` is real time [s]."""
+    """The result of one file: a verdict, or the findings that kept it from running; `took` is real time [s]."""
 
     file: str
     name: str
@@ -32,7 +32,7 @@ class FileOutcome:
 
     @property
     def passed(self) -> bool:
-        """Return whether the test ran, and all was as expected."""
+        """Return whether the test ran and all was as expected."""
         return self.verdict is not None and self.verdict.passed
 
     @property
@@ -58,7 +58,7 @@ class Teller:
         return f"{word}  {one.name or '?'}  {self.paint('time', f'({one.file}, {times})')}"
 
     def trace(self, verdict: Verdict) -> str:
-        """Return what happened, with each problem behind the line at which it shows."""
+        """Return the trace, with each problem after the line that it concerns."""
         record = verdict.record
         placed: dict[int, list[UnmetExpectation]] = {}
         for problem in verdict.problems:
@@ -86,7 +86,7 @@ class Teller:
         return f"  {self.paint('fail', f'{MARK:>9}  {plain(problem.message)}')}{where}"
 
     def summary(self, outcomes: Sequence[FileOutcome], coverage: Coverage) -> str:
-        """Return how many passed, and how much of the missions was tried."""
+        """Return how many tests passed, and how many paths of the missions were taken."""
         failed = sum(not one.passed for one in outcomes)
         took = sum(one.took for one in outcomes)
         counted = f"{len(outcomes) - failed} passed" + (f", {failed} failed" if failed else "")
@@ -99,7 +99,7 @@ class Teller:
 
 
 def _shown(count: int, placed: dict[int, list[UnmetExpectation]]) -> Iterator[int]:
-    """Yield which lines of a trace are shown: all, or of a long one its ends and what surrounds the problems."""
+    """Yield the lines of a trace to show: all, or for a long one its ends and the lines around the problems."""
     near = {line + offset for line in placed for offset in range(-5, 6)}
     for index in range(count):
         if count <= MOST_LINES or index < MOST_LINES // 2 or index >= count - MOST_LINES // 4 or index in near:
@@ -107,7 +107,7 @@ def _shown(count: int, placed: dict[int, list[UnmetExpectation]]) -> Iterator[in
 
 
 def coverage_text(coverage: Coverage) -> str:
-    """Return the ways that no test took, by mission, each with its place."""
+    """Return the paths that no test took, by mission, each with its place."""
     lines = []
     for mission in sorted({way.mission for way in coverage.ways}):
         ways = [way for way in coverage.ways if way.mission == mission]
@@ -118,7 +118,7 @@ def coverage_text(coverage: Coverage) -> str:
 
 
 def as_json(outcomes: Sequence[FileOutcome], coverage: Coverage) -> dict[str, Any]:
-    """Return all as data for programs."""
+    """Return the report as data for programs."""
     return {
         "tests": [_test(one) for one in outcomes],
         "coverage": {

@@ -1,4 +1,4 @@
-"""Values that represent all others: one on either side of each number that a mission compares a value with."""
+"""Values that represent all others: one on each side of every number that a mission compares a value with."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from rbxcompose.missions.analysis.facts import constants_of, number_in
 from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.program.program import Program, RobotNames
 
-MOST_PLACES = 3  # at which the robot may be
-BESIDE = 0.1  # how far from a limit the outermost values lie, as a part of it
-OTHER = "something else"  # a text that is compared with nothing
+MOST_PLACES = 3  # where the robot may be
+BESIDE = 0.1  # distance of the outermost values from a limit, as a fraction of it
+OTHER = "something else"  # a text that no comparison contains
 
 
 def representatives(linked: Program, robot: RobotNames, inputs: Mapping[str, Value]) -> dict[str, tuple[Value, ...]]:
-    """Return values for each name of the robot that a mission reads; the largest number, or true, comes first."""
+    """Return values for each robot value that a mission reads; the largest number, or true, comes first."""
     compared: dict[str, set[Value]] = {}
     for program in missions_in(linked):
         constants = constants_of(program, inputs if program is linked else {})
@@ -47,14 +47,14 @@ def _values(robot: RobotNames, name: str, compared: set[Value]) -> tuple[Value, 
 
 
 def _around(limits: Sequence[float]) -> tuple[float, ...]:
-    """Return numbers above, between and below limits, the largest first."""
+    """Return numbers above, between and below the limits, largest first."""
     width = max(abs(limit) for limit in limits) * BESIDE or BESIDE
     between = [(one + other) / 2 for one, other in pairwise(limits)]
     return tuple(sorted({limits[-1] + width, *between, limits[0] - width}, reverse=True))
 
 
 def _compared(expression: Expression, constants: Mapping[str, Value]) -> Iterator[tuple[str, Value]]:
-    """Yield what is compared with a constant, and the constant."""
+    """Yield each name that is compared with a constant, and the constant."""
     for part, _ in walk(expression.tree):
         if isinstance(part, Comparison):
             for one, other in ((part.left, part.right), (part.right, part.left)):

@@ -1,4 +1,4 @@
-"""Runs a mission on the whole robot, in virtual time: what the test does not answer for runs as it is."""
+"""Runs a mission on the whole robot, in virtual time: whatever the test does not answer runs for real."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from rbxcompose.testing.bench import Bench
 
 OWNER = "test"
 WhenEnded = Callable[[int, Result], None]
-BEGINS_WITHIN = 60.0  # [s] after the last event of the test, else something never comes
+BEGINS_WITHIN = 60.0  # [s] after the last event of the test; after that, something never comes
 _COMMANDS = {"pause": PauseMission, "resume": ResumeMission, "cancel": CancelMission}
 
 
 class RobotRun:
-    """A robot whose executive runs the mission in a world of the test's."""
+    """A robot whose executive runs the mission in the world of the test."""
 
     def __init__(self, trial: Trial, watcher: Watcher) -> None:
         self.trial = trial
@@ -40,8 +40,8 @@ class RobotRun:
         self.mocked = Mocked(trial.mocks)
         self.values = SetValues(trial.names, trial.inputs)
         self.setter = Setter(trial, self.record, self.values)
-        self.ended: WhenEnded = lambda leaf, result: None  # tells the engine, once there is one
-        self.events = list(trial.events)  # that are still to come
+        self.ended: WhenEnded = lambda leaf, result: None  # notifies the engine, once there is one
+        self.events = list(trial.events)  # events still to come
         plan = _with_mission(trial.plan, trial)
         self.bench = Bench(plan=plan, start=False)
         name = next(one.name for one in plan.instances if declared(one.type, one.config, RunsMissions))
@@ -125,18 +125,18 @@ class RobotRun:
         self.look()
 
     def await_calls(self) -> None:
-        """Look at the calls when the next one is due."""
+        """Schedule the end of the call that is due next."""
         due = self.mocked.next_due()
         if due is not None:
             self.bench.scheduler.at(due, OWNER, self.settle)
 
     def look(self) -> None:
-        """Let the executive look at the mission."""
+        """Have the executive examine the mission."""
         self.executive.look_soon()
 
 
 class TrialWorld:
-    """The world of a robot's mission, but for what the test answers or sets."""
+    """The world of a robot's mission, except for what the test answers or sets."""
 
     def __init__(self, run: RobotRun, robot: World) -> None:
         self._run = run
@@ -147,11 +147,11 @@ class TrialWorld:
         return self._run.values.value(name)
 
     def age(self, name: str, /) -> float | NotArrived:
-        """Return how old it is [s]."""
+        """Return the age of a value [s]."""
         return self._run.values.age(name, self._run.now)
 
     def count(self, name: str, /) -> int:
-        """Return how many have come."""
+        """Return how many values have arrived."""
         return self._run.values.count(name)
 
     def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
@@ -180,7 +180,7 @@ class TrialWorld:
             self._robot.resume(leaf)
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
-        """Let the robot publish."""
+        """Publish on the robot."""
         self._robot.publish(topic, fields)
 
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:

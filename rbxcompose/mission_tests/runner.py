@@ -1,4 +1,4 @@
-"""Runs a test, in the way that it needs, and judges what happened."""
+"""Runs a test in the way that it needs, and judges the result."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rbxcompose.mission_tests.stage import TrialStage
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """A test that ran: what happened, what was not as expected, and which ways its mission took."""
+    """The result of a test: what happened, what was not as expected, and which paths its mission took."""
 
     trial: Trial
     record: TrialRecord
@@ -27,12 +27,12 @@ class Verdict:
 
 
 def run_trial(trial: Trial) -> Verdict:
-    """Run a test: the mission alone if the test answers for all that it needs, else the whole robot."""
+    """Run a test: the mission alone if the test answers everything that it needs, else the whole robot."""
     seen = SeenWays()
     if trial.is_complete:
         record = TrialStage(trial, seen).run()
     else:
-        from rbxcompose.mission_tests.robot_run import RobotRun  # a robot is not needed by every test
+        from rbxcompose.mission_tests.robot_run import RobotRun  # not every test needs a robot
 
         record = RobotRun(trial, seen).run()
     types = {name: datum.type for name, datum in trial.program.data.items()}

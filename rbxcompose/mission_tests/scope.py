@@ -1,4 +1,4 @@
-"""What the expressions of a test see, before it runs and while it does; and how its values are written down."""
+"""What the expressions of a test see, before and during its run; and how its values are written."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from rbxcompose.missions.language.written import PLACED
 from rbxcompose.missions.program.program import Program, RobotNames
 
 STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
-CLOSE = 1e-6  # relative difference of numbers that are equal
+CLOSE = 1e-6  # relative difference up to which numbers are equal
 
 
 class TrialScope:
-    """The inputs of the mission, or the arguments of a call before them, then the robot's values and places."""
+    """The scope of a test: inputs of the mission or arguments of a call first, then the robot's values and places."""
 
     def __init__(self, known: Mapping[str, Value], places: Mapping[str, Place], values: RobotValues) -> None:
         self._known = known
@@ -36,7 +36,7 @@ class TrialScope:
         self._values = values
 
     def variable(self, name: str) -> Value | NotArrived:
-        """Return what is known under a name."""
+        """Return the value of a name."""
         return self._known[name] if name in self._known else self._values.value(name)
 
     def word(self, name: str) -> Value:
@@ -48,19 +48,19 @@ class TrialScope:
         return self._values.age(name)
 
     def is_new(self, name: str) -> bool:
-        """Return whether any message has come."""
+        """Return whether any message has arrived."""
         return name not in self._known and self._values.count(name) > 0
 
 
 def names_of(robot: RobotNames) -> Mapping[str, Type]:
-    """Return the types of all that a test can set: the robot's values, and the pose."""
+    """Return the types of everything that a test can set: the robot's values, and the pose."""
     return {**robot.values, POSE_NAME: POSE}
 
 
 def check_setting(
     node: TreeNode, wanted: Type, program: Program, robot: RobotNames, known: Mapping[str, Type]
 ) -> Iterator[Finding]:
-    """Yield what is wrong with a value that a test gives to something of the type `wanted`."""
+    """Yield the findings on a value that a test assigns to a name of the type `wanted`."""
     if not isinstance(node, ScalarNode):
         if wanted.kind not in STRUCTURED and wanted != UNKNOWN:
             yield codes.WRONG_VALUE.at(node.span, f"this must be {wanted.phrase}")
@@ -70,7 +70,7 @@ def check_setting(
 
 
 def setting_of(node: TreeNode, wanted: Type, robot: RobotNames) -> ValueSetting:
-    """Return what computes a value that is written down; only for one without findings."""
+    """Return the function that computes a written value; only for a value without findings."""
     if not isinstance(node, ScalarNode):
         constant = literal(node).value
         return lambda scope: constant
@@ -94,7 +94,7 @@ def _word(value: Value) -> Value:
 
 
 def read_value(node: TreeNode, wanted: Type, robot: RobotNames, what: str) -> tuple[Value, list[Finding]]:
-    """Return a value that is expected, of the type `wanted`, and what is wrong with it."""
+    """Return an expected value of the type `wanted`, and the findings on it."""
     if wanted == UNKNOWN:
         return literal(node).value, []
     try:
@@ -108,9 +108,9 @@ def read_value(node: TreeNode, wanted: Type, robot: RobotNames, what: str) -> tu
 
 
 def agrees(expected: Value, happened: Value) -> bool:
-    """Return whether a value is the one that was expected.
+    """Return whether a value is the expected one.
 
-    Of maps only the entries that were written count; one without entries is expected to be empty.
+    Only the written entries of a map count; a map without entries expects an empty one.
     """
     if isinstance(expected, Mapping) and isinstance(happened, Mapping):
         if not expected:

@@ -1,4 +1,4 @@
-"""What all sections of a test are read with."""
+"""Shared means for reading the sections of a test."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rbxcompose.model.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class TrialContext:
-    """The robot and the mission that a test is about, what is known of them, and where mistakes go."""
+    """The robot and the mission of a test, what is known about them, and the report for findings."""
 
     robot: Robot
     program: Program
@@ -27,7 +27,7 @@ class TrialContext:
     report: Report
 
     def settings(self, node: TreeNode | None, known: Mapping[str, Type]) -> dict[str, ValueSetting]:
-        """Return what is set by name; expressions also see what is `known` beside the robot's values."""
+        """Return the settings by name; besides the robot's values, expressions see what is `known`."""
         found: dict[str, ValueSetting] = {}
         valid = names_of(self.names)
         for name, entry in entries_of(node):
@@ -43,13 +43,13 @@ class TrialContext:
         return found
 
     def type_of_datum(self, name: str) -> Type | None:
-        """Return the type of a datum of the mission, None if it has no such one."""
+        """Return the type of a datum of the mission, None if it does not exist."""
         if name in self.program.data:
             return self.program.data[name].type
         return UNKNOWN if name in self.program.saved else None
 
 
 def entries_of(node: TreeNode | None) -> Iterator[tuple[str, Entry]]:
-    """Yield the entries of a map; nothing of anything else, which was told before."""
+    """Yield the entries of a map; nothing for any other node, which has its finding already."""
     if isinstance(node, MappingNode):
         yield from node.entries.items()

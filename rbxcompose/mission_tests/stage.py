@@ -1,4 +1,4 @@
-"""Runs a mission alone, in virtual time: every skill is answered, and every value set, by the test."""
+"""Runs a mission alone, in virtual time: the test answers every skill and sets every value."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.world import Settings
 from rbxcompose.missions.program.statuses import IDLE, RUNNING
 
-MOST_INSTANTS = 100_000  # at which something happens
+MOST_INSTANTS = 100_000  # instants at which something happens
 MOST_STEPS = 5000
 
 
@@ -31,17 +31,17 @@ class TrialStage:
         self.mocked = Mocked(trial.mocks)
         self.values = SetValues(trial.names, trial.inputs)
         self.setter = Setter(trial, self.record, self.values)
-        self.events = list(trial.events)  # that are still to come
+        self.events = list(trial.events)  # events still to come
         self.engine = Engine(trial.program, trial.names, trial.inputs, self, Settings(observer=watcher))
 
-    # What the engine asks.
+    # What the engine calls.
 
     def value(self, name: str, /) -> Value | NotArrived:
         """Return the newest value."""
         return self.values.value(name)
 
     def age(self, name: str, /) -> float | NotArrived:
-        """Return how old it is [s]."""
+        """Return the age of a value [s]."""
         return self.values.age(name, self.now)
 
     def count(self, name: str, /) -> int:
@@ -65,14 +65,14 @@ class TrialStage:
         self.mocked.resume(leaf, self.now)
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
-        """There is no subscriber; the event is what counts."""
+        """Do nothing: there is no subscriber, only the event counts."""
 
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
         """Begin a call."""
         self.start(leaf, service, fields)
 
     def say(self, event: MissionEvent, /) -> None:
-        """Keep it."""
+        """Record an event."""
         self.record.hear(event)
         self.watcher.hear(event)
 
@@ -108,7 +108,7 @@ class TrialStage:
             self.record.trouble = f"did not end within {LONGEST_TEST:g} s of robot time"
 
     def _instant(self) -> None:
-        """Do all that is due: calls end, the test acts, the mission is ticked."""
+        """Do everything that is due: end calls, let the test act, tick the mission."""
         for call, result in self.mocked.ended(self.now):
             if result.success:
                 self.setter.set(call.mock.sets, call.arguments, self.now)

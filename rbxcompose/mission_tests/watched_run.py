@@ -1,4 +1,4 @@
-"""What both ways of running a test share: the observers, and values that are set and reported."""
+"""What both ways of running a test share: the observers, and the setting of values."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from rbxcompose.missions.engine.world import Observer
 
 
 class Watcher(Observer, Protocol):
-    """Who wants to know which ways a mission takes."""
+    """An observer of the paths that a mission takes."""
 
     def hear(self, event: MissionEvent, /) -> None:
-        """Hear what the mission tells."""
+        """Handle an event of the mission."""
         ...
 
 
 class Setter:
-    """Sets values for a test and tells it; an expression without a value is the end of the test."""
+    """Sets values for a test and reports them; an expression without a value ends the test."""
 
     def __init__(self, trial: Trial, record: TrialRecord, values: SetValues) -> None:
         self.trial = trial

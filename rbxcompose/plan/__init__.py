@@ -1,1 +1,1 @@
-"""From a checked robot to the plan of what will run: frozen, sorted, free of the manifest's language."""
+"""From a checked robot to the plan of what will run: frozen, sorted, independent of the manifest's language."""

@@ -9,7 +9,7 @@ from rbxcompose.sdk.capabilities import RunsMissions
 
 
 def build_plan(robot: Robot) -> Plan:
-    """Return what `up` has to do; the robot must be without errors."""
+    """Return the plan for `up`; the robot must have no errors."""
     manifest = robot.manifest
     missions = (component.name for component, _ in robot.declared(RunsMissions))
     last = [name for name in missions if name not in robot.written]  # starts when everything else is active

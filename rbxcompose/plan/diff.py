@@ -1,4 +1,4 @@
-"""What is other in one plan than in another, and which processes of a running robot that concerns."""
+"""The difference between two plans, and which processes of a running robot it affects."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.units import Quantity, format_number, format_quantity, to_si
 
 EMPTY = "{}"
-LONGEST = 1000  # characters of a text that a person would read in a difference
-WHOLE = ("robot", "bus", "is_simulated")  # what no process keeps running through
+LONGEST = 1000  # characters of a text that a person would still read in a difference
+WHOLE = ("robot", "bus", "is_simulated")  # keys whose change restarts every process
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A key with its text before and after; None where it was or is not there."""
+    """A key with its text before and after; None where it does not exist."""
 
     key: str
     before: str | None
@@ -40,7 +40,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """What leads from one plan to another. `restarts` are processes of both that hold what has changed."""
+    """The changes from one plan to another. `restarts` are processes of both that contain a change."""
 
     plan: tuple[Change, ...]
     added: tuple[Instance, ...]
@@ -52,11 +52,11 @@ class Difference:
 
     @property
     def is_empty(self) -> bool:
-        """Return whether the plans do the same."""
+        """Return whether the plans are equivalent."""
         return not (self.plan or self.added or self.removed or self.changed)
 
     def text(self) -> str:
-        """Return it for people."""
+        """Return the difference as text for people."""
         if self.is_empty:
             return "no difference"
         return "\n".join(self._lines())
@@ -73,7 +73,7 @@ class Difference:
                 yield f"processes that {what}: {', '.join(groups)}"
 
     def data(self) -> dict[str, Any]:
-        """Return it for programs."""
+        """Return the difference as data for programs."""
         return {
             "plan": list(map(_data, self.plan)),
             "added": [one.name for one in self.added],
@@ -88,7 +88,7 @@ def _data(change: Change) -> dict[str, Any]:
 
 
 def difference(before: Plan, after: Plan) -> Difference:
-    """Return what leads from `before` to `after`."""
+    """Return the changes from `before` to `after`."""
     old, new = ({one.name: one for one in plan.instances} for plan in (before, after))
     changed = {name: _changes(old[name], one) for name, one in new.items() if name in old}
     changed = {name: changes for name, changes in changed.items() if changes}
@@ -105,7 +105,7 @@ def difference(before: Plan, after: Plan) -> Difference:
 
 
 def _restarts(before: Plan, after: Plan, names: set[str], whole: tuple[Change, ...]) -> tuple[str, ...]:
-    """Return the processes of both plans that hold one of these instances; all, if the plan itself has changed."""
+    """Return the processes of both plans that contain one of these instances; all, if the plan itself has changed."""
     touched = {one.process for plan in (before, after) for one in plan.instances if one.name in names}
     is_all = any(change.key.partition(".")[0] in WHOLE for change in whole)
     return tuple(group for group in after.groups if group in before.groups and (is_all or group in touched))
@@ -131,12 +131,12 @@ def _compared(before: Mapping[str, str], after: Mapping[str, str]) -> Iterator[C
 
 
 def _fills(key: str, empty: Mapping[str, str], full: Mapping[str, str]) -> bool:
-    """Return whether a map is empty on one side only: what the other side has in it tells that already."""
+    """Return whether a map is empty on one side only: the entries of the other side show this already."""
     return empty.get(key) == EMPTY and any(one.startswith(f"{key}.") for one in full)
 
 
 def _of_instance(one: Instance) -> dict[str, str]:
-    """Return all that an instance is, by key; its settings as a person writes them."""
+    """Return the properties of an instance, by key; settings as a person writes them."""
     wires = {f"topic of {wire.port}": f"{wire.topic} ({wire.type})" for wire in one.wires if wire.topic}
     options = {"type": one.type, "process": one.process, "starts_after": ", ".join(one.starts_after) or "nothing"}
     options["log"] = log_word(one.log)
@@ -144,7 +144,7 @@ def _of_instance(one: Instance) -> dict[str, str]:
 
 
 def _flat(value: Any, path: str) -> Iterator[tuple[str, str]]:
-    """Yield the leaves of a value by their path with dots."""
+    """Yield the leaves of a value by their dotted path."""
     match value:
         case Program():
             yield from _flat(to_plain(value.root), path)

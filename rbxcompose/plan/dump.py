@@ -1,8 +1,8 @@
-"""A plan as text, and back: `load(dump(plan)) == plan`, unless a configuration has a secret, which is never shown.
+"""Plans as text, and back: `load(dump(plan)) == plan`, unless a configuration has a secret, which is never shown.
 
-The text is JSON. Types stand in no text: they are those of the plan's fields and of the components' configurations, so
-that loading a file makes nothing but plans. Configurations are validated again, missions are read again from their
-located tree. Maps are sorted by key, so that equal plans give equal texts, unless their order is to be kept.
+The text is JSON. It names no types: they are those of the plan's fields and of the components' configurations, so
+that loading a file creates nothing but plans. Configurations are validated again, missions are read again from their
+located tree. Maps are sorted by key, so that equal plans give equal texts, unless their order must be kept.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ VERSION = 1
 VERSION_KEY = "rbxcompose_plan"
 
 
-EntryOrder = Callable[[Iterable[tuple[str, Any]]], list[tuple[str, Any]]]  # brings the entries of a map in order
+EntryOrder = Callable[[Iterable[tuple[str, Any]]], list[tuple[str, Any]]]  # sorts the entries of a map
 
 
 class PlanTextError(ValueError):
-    """Raised when a text is no plan that this installation can read."""
+    """Raised when a text is not a plan that this installation can read."""
 
 
 def dump(plan: Plan, *, reveals_secrets: bool = False, keeps_order: bool = False) -> str:
     """Return a plan as JSON; a secret is written as `***`, unless it is for the robot's own processes.
 
-    Components see the order of maps: that of analyzers is the order of groups in what is told of them.
+    Components see the order of maps: that of analyzers is the order of the groups that they report.
     """
 
     def secret(value: Secret) -> str:
@@ -58,7 +58,7 @@ def load(text: str) -> Plan:
     """Return the plan that `dump` wrote.
 
     Raises:
-        PlanTextError: if the text is none, or names a component type that is not installed.
+        PlanTextError: if the text is not a plan, or names a component type that is not installed.
     """
     try:
         data = json.loads(text)
@@ -83,7 +83,7 @@ def _encode(value: Any, hint: Any, order: EntryOrder) -> Any:
         return _encode_free(value)
     match value:
         case Secret():
-            return value  # whoever writes the text decides what is shown of it
+            return value  # the caller of `dump` decides whether it is shown
         case Program():
             return node_to_data(value.root)
         case Dimension():
@@ -104,7 +104,7 @@ def _encode(value: Any, hint: Any, order: EntryOrder) -> Any:
 
 
 def _encode_free(value: Any) -> Any:
-    """Return a value of an expression as data: what is no plain value of JSON is a map with one key, its kind."""
+    """Return a value of an expression as data: one that is no plain JSON value is a map with one key, its kind."""
     match value:
         case Place():
             return {"place": _encode(value, Place, sorted)}
@@ -117,7 +117,7 @@ def _encode_free(value: Any) -> Any:
 
 
 def _decode(data: Any, hint: Any) -> Any:
-    """Return the value of a field's type that `_encode` made data of; what pydantic can read is left to it."""
+    """Return the value of a field's type from the data of `_encode`; what pydantic can read is left to it."""
     dimensions = [one.dimension for one in _metadata(hint) if isinstance(one, Dimensioned)]
     whole, hint = hint, _plain_hint(hint)
     if hint in (Any, object):
@@ -156,7 +156,7 @@ def _none(hint: Any) -> None:
 
 def _decode_several(data: Any, hint: Any) -> Any:
     origin = get_origin(hint)
-    if not isinstance(origin, type):  # a type without items, a choice
+    if not isinstance(origin, type):  # a type without item types, a choice
         return data
     if issubclass(origin, Mapping):
         return {key: _decode(each, _item(hint)) for key, each in data.items()}
@@ -215,14 +215,14 @@ def _members(data: Any, cls: Any) -> dict[str, Any]:
 
 @cache
 def _hints(cls: Any) -> dict[str, Any]:
-    """Return the types of the fields of a dataclass or a configuration, with what they are annotated with."""
+    """Return the types of the fields of a dataclass or a configuration, with their annotations."""
     hints = get_type_hints(cls, include_extras=True)
     names = cls.model_fields if issubclass(cls, BaseModel) else [field.name for field in fields(cls)]
     return {name: hints[name] for name in names}
 
 
 def _metadata(hint: Any) -> tuple[Any, ...]:
-    """Return what a type is annotated with, also within `... | None`."""
+    """Return the annotations of a type, including those within `... | None`."""
     if get_origin(hint) is Annotated:
         return (*hint.__metadata__, *_metadata(get_args(hint)[0]))
     alternative = _not_none(hint)
@@ -230,7 +230,7 @@ def _metadata(hint: Any) -> tuple[Any, ...]:
 
 
 def _plain_hint(hint: Any) -> Any:
-    """Return a type without what it is annotated with and without `| None`."""
+    """Return a type without its annotations and without `| None`."""
     while True:
         if get_origin(hint) is Annotated:
             hint = get_args(hint)[0]
@@ -241,7 +241,7 @@ def _plain_hint(hint: Any) -> Any:
 
 
 def _not_none(hint: Any) -> Any:
-    """Return the only alternative to None; None if there is another number of them, which is left to pydantic."""
+    """Return the only alternative to None; None if there is not exactly one, which is left to pydantic."""
     if get_origin(hint) not in (Union, types.UnionType):
         return None
     others = [one for one in get_args(hint) if one is not type(None)]
@@ -249,7 +249,7 @@ def _not_none(hint: Any) -> Any:
 
 
 def _item(hint: Any, index: int = 0) -> Any:
-    """Return the type of an item of a list or set, of a value of a map; of a tuple that one at `index`."""
+    """Return the type of the items of a list or set, or of the values of a map; for a tuple, that of item `index`."""
     arguments = get_args(hint)
     if not arguments:
         return Any

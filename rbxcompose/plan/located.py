@@ -1,4 +1,4 @@
-"""The located tree as data for JSON, and back: a mission in a plan is kept as what it was read from."""
+"""The located tree as data for JSON, and back: a plan keeps a mission as the tree that it was read from."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rbxcompose.units import Quantity
 
 
 def node_to_data(node: TreeNode, file: str = "") -> dict[str, Any]:
-    """Return a node as data; what is as usual is left out, and `file` is that of the node around it."""
+    """Return a node as data; default values are left out, and `file` is that of the node around it."""
     data = _place(node.span, file)
     match node:
         case ScalarNode():

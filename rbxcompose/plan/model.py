@@ -32,7 +32,7 @@ class Instance:
     starts_after: tuple[str, ...] = ()
     wires: tuple[Wire, ...] = ()
     restart: Restart = DEFAULT
-    log: Level = Level.OK  # the least of what goes to the log
+    log: Level = Level.OK  # the lowest level that goes to the log
 
     def topic(self, port: str) -> str:
         """Return the absolute name at a port.
@@ -48,7 +48,7 @@ class Instance:
 
 @dataclass(frozen=True, slots=True)
 class BusPlan:
-    """Where and how the robot is on the bus."""
+    """The robot's address and settings on the bus."""
 
     domain: int = 0
     namespace: str = ""
@@ -61,18 +61,18 @@ class BusPlan:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Everything that `up` needs; `instances` stand in start order."""
+    """Everything that `up` needs; `instances` are in start order."""
 
     robot: str
     file: str
     instances: tuple[Instance, ...]
     bus: BusPlan = BusPlan()
-    start: str | None = None  # the mission that runs by itself
+    start: str | None = None  # the mission that starts by itself
     is_simulated: bool = True
 
     @property
     def follows_clock(self) -> bool:
-        """Return whether robot time is told from outside."""
+        """Return whether robot time comes from outside."""
         return self.bus.clock == "external"
 
     @property
@@ -85,11 +85,11 @@ class Plan:
         return tuple(instance for instance in self.instances if instance.process == group)
 
     def in_one_process(self) -> Plan:
-        """Return the same robot with all instances in one process group, as a stepped clock needs it."""
+        """Return the same robot with all instances in one process group, as a stepped clock requires."""
         return replace(self, instances=tuple(replace(one, process=STEPPED_GROUP) for one in self.instances))
 
 
 def extent(components: int, processes: int) -> str:
-    """Return in words how large a robot is: `2 components in 1 process`."""
+    """Return the size of a robot in words: `2 components in 1 process`."""
     component, process = "component" if components == 1 else "components", "process" if processes == 1 else "processes"
     return f"{components} {component} in {processes} {process}"

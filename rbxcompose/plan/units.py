@@ -8,7 +8,7 @@ from rbxcompose.units import DIMENSIONS, Dimension, Quantity
 
 
 def dimension_to_data(dimension: Dimension) -> str | dict[str, Any]:
-    """Return the name of a dimension that has one of its own, else the name with the exponents."""
+    """Return the name of a dimension, if it has its own, else the name with the exponents."""
     if DIMENSIONS.get(dimension.name) == dimension:
         return dimension.name
     return {"name": dimension.name, "exponents": list(dimension.exponents)}

@@ -45,12 +45,12 @@ class Release:
 
 @dataclass(frozen=True, slots=True)
 class Brake:
-    """Come to rest for good and say `AtRest`."""
+    """Come to rest for good, then send `AtRest`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """These components of another process have gone."""
+    """These components of another process are gone."""
 
     names: list[str]
     cause: str
@@ -67,30 +67,30 @@ class Ask:
 
 @dataclass(frozen=True, slots=True)
 class Adopt:
-    """Before `Configure`: this plan holds, as text, and not the one that the process was forked with."""
+    """Before `Configure`: this plan, as text, replaces the one that the process was forked with."""
 
     plan: str
 
 
 @dataclass(frozen=True, slots=True)
 class Retire:
-    """Bring these components to rest, in this order, and forget them; then say `Retired`."""
+    """Bring these components to rest, in this order, and forget them; then send `Retired`."""
 
     names: list[str]
 
 
 @dataclass(frozen=True, slots=True)
 class Prepare:
-    """Configure the components of this plan, as text, beside those that run; then say `Configured`."""
+    """Configure the components of this plan, as text, beside those that run; then send `Configured`."""
 
     plan: str
 
 
 @dataclass(frozen=True, slots=True)
 class Reconfigure:
-    """Let components follow their settings in this plan, as text; then say `Reconfigured`.
+    """Apply the settings in this plan, as text, to its components; then send `Reconfigured`.
 
-    `keys` are the settings that have changed, by component: what `param set` did to others stays.
+    `keys` are the settings that have changed, by component; what `param set` did to others remains.
     """
 
     plan: str
@@ -99,7 +99,7 @@ class Reconfigure:
 
 @dataclass(frozen=True, slots=True)
 class Blocked:
-    """What of this process cannot do its work, and why; whoever is not named, can."""
+    """The components of this process that cannot do their work, and why; all others can."""
 
     causes: dict[str, str]
 
@@ -118,14 +118,14 @@ class Configured:
 
 @dataclass(frozen=True, slots=True)
 class States:
-    """Lifecycle state and number of restarts of components, by name."""
+    """Lifecycle states and numbers of restarts of components, by name."""
 
     states: dict[str, tuple[str, int]]
 
 
 @dataclass(frozen=True, slots=True)
 class StoppedByBus:
-    """Somebody had this process hold everything that moves, past the supervisor."""
+    """Somebody ordered this process, past the supervisor, to hold everything that moves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +143,7 @@ class Failed:
 
 @dataclass(frozen=True, slots=True)
 class Repeated:
-    """These requests, as data, are to be told to a component again when its process has come back."""
+    """These requests, as data, must be sent to a component again when its process was restarted."""
 
     instance: str
     requests: list[dict[str, Any]]
@@ -156,7 +156,7 @@ class TimeIsUp:
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """What came of an `Ask`, as data."""
+    """The answer to an `Ask`, as data."""
 
     number: int
     answer: Any
@@ -172,7 +172,7 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """Facts for the end: robot time [s], and text by instance and label."""
+    """Facts for the summary at the end: robot time [s], and text by instance and label."""
 
     time: float
     facts: dict[str, dict[str, str]]
@@ -180,19 +180,19 @@ class Summary:
 
 @dataclass(frozen=True, slots=True)
 class Retired:
-    """What was to be retired has gone."""
+    """The components to retire are gone."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reconfigured:
-    """Components follow their new settings, but for those that have `refused`, by name with the reason."""
+    """Components have applied their new settings, except those that `refused`, by name with the reason."""
 
     refused: dict[str, str]
 
 
 @dataclass(frozen=True, slots=True)
 class Alive:
-    """The loop of the process turns; its robot time [s], what moves the robot, and at what components are."""
+    """The loop of the process runs; its robot time [s], what moves the robot, and what its components are doing."""
 
     time: float
     moves: list[str] = field(default_factory=list)
@@ -238,7 +238,7 @@ MESSAGES: Family[ChannelMessage] = Family(get_args(ChannelMessage))
 
 @dataclass
 class Channel:
-    """One end of a socket pair. It never blocks: what the other side does not take yet is kept for the next call."""
+    """One end of a socket pair. It never blocks: data not taken yet by the other side are kept for the next call."""
 
     connection: socket.socket
     is_open: bool = True
@@ -253,18 +253,18 @@ class Channel:
         return self.connection.fileno()
 
     def send(self, message: ChannelMessage) -> None:
-        """Send a message; to a closed channel nothing is sent."""
+        """Send a message; do nothing if the channel is closed."""
         if self.is_open:
             self._unsent += MESSAGES.to_line(message)
         self.flush()
 
     @property
     def is_behind(self) -> bool:
-        """Return whether the other side has not taken all; what can be left out may be left out."""
+        """Return whether the other side has not taken everything; dispensable messages may then be left out."""
         return bool(self._unsent)
 
     def flush(self) -> None:
-        """Send what has not been taken yet, as far as it goes."""
+        """Send as much as possible of the unsent data."""
         try:
             while self.is_open and self._unsent:
                 del self._unsent[: self.connection.send(self._unsent)]
@@ -274,7 +274,7 @@ class Channel:
             self.is_open = False
 
     def receive(self) -> list[ChannelMessage]:
-        """Return the messages that have come; `is_open` turns false at the end of the other side."""
+        """Return the messages that have arrived; `is_open` becomes false when the other side has closed."""
         with contextlib.suppress(BlockingIOError):
             while self.is_open:
                 chunk = self._read()

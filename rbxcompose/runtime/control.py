@@ -24,13 +24,13 @@ from rbxcompose.typed_json import UnreadableError, from_data
 A = TypeVar("A")
 
 _MOST = 64_000_000  # [B] of a request; the plan of a large robot is one
-_CHUNK = 262144  # [B] that are read at once
+_CHUNK = 262144  # [B] per read
 _BACKLOG = 128
-_MOST_OPEN = 64  # connections; a program that forgets to close its own must not shut out `stop`
+_MOST_OPEN = 64  # connections; a program that forgets to close its own must not block `stop`
 _TIMEVAL = struct.Struct("ll")  # seconds, microseconds
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
 
-ANSWER = 2.0  # [s] in which a supervisor that is there answers
+ANSWER = 2.0  # [s] in which a live supervisor answers
 
 Handle = Callable[[object, int], None]  # request as data, number of the connection
 
@@ -41,7 +41,7 @@ class NoAnswerError(OSError):
 
 @contextmanager
 def _short_address(folder: Path) -> Iterator[str]:
-    # The address of a unix socket holds 107 characters at most; that of a descriptor is short.
+    # The address of a unix socket has at most 107 characters; the path of a descriptor is short.
     descriptor = os.open(folder, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         yield f"/proc/self/fd/{descriptor}/{SOCKET}"
@@ -50,10 +50,10 @@ def _short_address(folder: Path) -> Iterator[str]:
 
 
 class ControlServer:
-    """Takes requests of this user; each is answered once, at once or later, by its number."""
+    """Takes requests of this user; each is answered once, now or later, by its number."""
 
     def __init__(self, folder: RobotFolder, selector: selectors.BaseSelector) -> None:
-        """Open the door; `handle` is to be set before the next request is read."""
+        """Open the door; `handle` must be set before the first request is read."""
         self.handle: Handle = lambda request, number: self.refuse(number, "nobody is here")
         self._selector = selector
         self._folder = folder
@@ -62,7 +62,7 @@ class ControlServer:
         self._listener = self._listen()
 
     def open_again(self) -> None:
-        """Open the door where it was, if its file has gone."""
+        """Open the door again at its old path if its file is gone."""
         if not (self._folder.path / SOCKET).exists():
             listener = self._listen()
             self._selector.unregister(self._listener)
@@ -91,7 +91,7 @@ class ControlServer:
         self._reply(number, {"refused": reason})
 
     def close(self) -> None:
-        """Close the door; who still waits hears the end."""
+        """Close the door; clients that still wait see the end of their connections."""
         for number in list(self._connections):
             self._drop(number)
         self._selector.unregister(self._listener)
@@ -101,7 +101,7 @@ class ControlServer:
         try:
             connection, _ = self._listener.accept()
         except OSError:
-            return  # it has gone again
+            return  # it is gone again
         credentials = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
         if _CREDENTIALS.unpack(credentials)[1] != os.getuid():
             connection.close()
@@ -132,7 +132,7 @@ class ControlServer:
     def _request(self, number: int, line: bytes) -> None:
         try:
             request = json.loads(line)
-        except (ValueError, RecursionError):  # no JSON, or nested without end
+        except (ValueError, RecursionError):  # no JSON, or nested too deeply
             self.refuse(number, "this is not a request")
         else:
             self.handle(request, number)
@@ -153,9 +153,9 @@ class ControlServer:
 
 
 def supervisor_of(folder: RobotFolder) -> Process | None:
-    """Return the process of this user that listens at the control socket, also if it is suspended; None if none does.
+    """Return the process of this user that listens at the control socket, even if suspended; None if none does.
 
-    The kernel tells who that is: no file has to be believed.
+    The kernel identifies it, so no file has to be trusted.
     """
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         connection.settimeout(ANSWER)
@@ -165,7 +165,7 @@ def supervisor_of(folder: RobotFolder) -> Process | None:
             credentials = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
             pid, uid, _ = _CREDENTIALS.unpack(credentials)
             return Process.of(pid) if uid == os.getuid() else None
-        except OSError:  # nobody is there, or not any more
+        except OSError:  # nobody listens, or not any more
             return None
 
 
@@ -191,10 +191,10 @@ def ask(folder: RobotFolder, request: Request[A], *, timeout: float = ANSWER) ->
 
 
 def _exchange(folder: RobotFolder, line: bytes, timeout: float) -> bytes:
-    """Return the line with which the supervisor answers one."""
+    """Send a line and return the line that the supervisor answers."""
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection, _short_address(folder.path) as address:
-            # Blocking, but for so long: without blocking, a door with others waiting before it is an error at once.
+            # Blocking, with a timeout: a non-blocking connection fails immediately while others wait at the door.
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _TIMEVAL.pack(int(timeout), _micros(timeout)))
             connection.connect(address)
             connection.settimeout(timeout)

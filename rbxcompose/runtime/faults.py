@@ -1,4 +1,4 @@
-"""What follows a fault: how it is reported, and when the component that raised it may retry."""
+"""The consequences of a fault: how it is reported, and when the component that raised it may retry."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rbxcompose.restarts import DEFAULT, Restart
 
 
 class RestartPolicy:
-    """Counts failures: `after_failure` tells how long to wait for the next try."""
+    """Counts failures and backs off: `after_failure` returns the pause before the next try."""
 
     def __init__(self, restart: Restart = DEFAULT) -> None:
         self.restarts = 0
@@ -19,7 +19,7 @@ class RestartPolicy:
 
     @property
     def is_allowed(self) -> bool:
-        """Return whether there is any further try, however few failures there were."""
+        """Return whether the component may ever be restarted, however few failures there were."""
         return self._restart.when != "never"
 
     def after_failure(self, now: float) -> float | None:
@@ -39,7 +39,7 @@ class RestartPolicy:
 def explain(error: BaseException, file: str | None = None) -> tuple[str, str]:
     """Return one line that names the error and where it was raised, and the whole traceback.
 
-    The line is the innermost one in `file`, where the component is written, if the error came through it.
+    The place is the innermost one in `file`, the component's source, if the error passed through it.
     """
     frames = traceback.extract_tb(error.__traceback__)
     words = f"{type(error).__name__}: {error}".removesuffix(": ")

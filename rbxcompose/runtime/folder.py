@@ -22,9 +22,9 @@ from rbxcompose.typed_json import UnreadableError, from_data, to_data
 STATE, LOCK, SOCKET = "state.json", "lock", "control.sock"
 _BUS = "bus"
 _VERSION = 1
-_PASSING = (STATE, SOCKET, LOCK)  # what goes when the robot is down; the log stays
+_PASSING = (STATE, SOCKET, LOCK)  # files removed when the robot is down; the log stays
 _LARGEST = 16_000_000  # [B] of a state
-_LOCK_TRIES, _LOOKING = 5, 0.01  # who looks whether the lock is held holds it for a moment [s]
+_LOCK_TRIES, _LOOKING = 5, 0.01  # [s] for which a check whether the lock is held may hold it
 
 
 SUSPENDED = "suspended"
@@ -38,7 +38,7 @@ class UnsafeFolderError(OSError):
 
 
 class BrokenStateError(ValueError):
-    """Raised when the state file is not what was written."""
+    """Raised when the state file is corrupt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +51,12 @@ class ComponentState:
     process: str
     pid: int | None
     restarts: int
-    waits_for: str | None = None  # the failed component without which it cannot do its work
+    waits_for: str | None = None  # the failed component that it depends on
 
 
 @dataclass(frozen=True, slots=True)
 class Gauge:
-    """Where a battery tells its charge: the topic, the type of its messages, the unit of the number in them."""
+    """Where a battery publishes its charge: the topic, the type of its messages, the unit of the number in them."""
 
     topic: str
     message: str
@@ -65,7 +65,7 @@ class Gauge:
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
-    """What is known of a robot from outside, also when its supervisor is dead."""
+    """What is known about a robot from outside, even if its supervisor is dead."""
 
     robot: str
     file: str
@@ -88,7 +88,7 @@ class RobotState:
         """Read what `to_text` wrote.
 
         Raises:
-            BrokenStateError: if it is something else.
+            BrokenStateError: if the text is anything else.
         """
         checksum, _, body = text.partition("\n")
         if checksum != _checksum(body):
@@ -103,7 +103,7 @@ class RobotState:
         return state
 
     def alive(self) -> dict[str, Process]:
-        """Return those of its processes that still run, by name, without the supervisor."""
+        """Return its processes that still run, by name, except the supervisor."""
         return {name: process for name, process in self.processes.items() if self._is_ours(process)}
 
     @property
@@ -112,12 +112,12 @@ class RobotState:
         return self._is_ours(self.supervisor)
 
     def _is_ours(self, process: Process) -> bool:
-        # A file alone must not decide whom `down` ends: the process has to call itself one of this robot.
+        # A file alone must not decide what `down` ends: the process must have the title of one of this robot.
         return self.boot == boot_id() and process.is_running and process.is_titled(title(self.robot))
 
 
 def title(robot: str, process: str = "") -> str:
-    """Return what the system's `ps` shows of a process of a robot; without its name, how those of all begin."""
+    """Return the title of a robot's process in the system's `ps`; without a process name, the prefix of all titles."""
     return f"rbxcompose {robot}: {process}"
 
 
@@ -126,7 +126,7 @@ def _checksum(body: str) -> str:
 
 
 def base_folder() -> Path:
-    """Return the folder that holds those of all robots of this user."""
+    """Return the folder that holds the folders of all robots of this user."""
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     return Path(runtime) / "rbxcompose" if runtime else Path(tempfile.gettempdir()) / f"rbxcompose-{os.getuid()}"
 
@@ -135,24 +135,24 @@ def all_folders() -> list[RobotFolder]:
     """Return the folders of all robots that are up or were left behind, by name.
 
     Raises:
-        UnsafeFolderError: if the folder above them is another user's or open to others.
+        UnsafeFolderError: if the folder above them belongs to another user or is open to others.
     """
     base = base_folder()
     try:
         _require_private(base)
     except FileNotFoundError:
         return []
-    # Any of these files may have been removed under a robot that runs.
+    # Any of these files may have been removed while the robot runs.
     names = {path.parent.name for mark in _PASSING for path in base.glob(f"*/{mark}")}
     return [folder for name in sorted(names) if (folder := RobotFolder(base / name)).is_known]
 
 
 def _require_private(folder: Path) -> None:
-    """Refuse a folder that others could have put something into.
+    """Refuse a folder that others may have written to.
 
     Raises:
         FileNotFoundError: if it does not exist.
-        UnsafeFolderError: if it is another user's, open to others, or not a folder.
+        UnsafeFolderError: if it belongs to another user, is open to others, or is not a folder.
     """
     try:
         found = os.lstat(folder)
@@ -174,10 +174,10 @@ class RobotFolder:
         return cls(base_folder() / robot)
 
     def make(self) -> None:
-        """Create the folder if it is not there.
+        """Create the folder if it does not exist.
 
         Raises:
-            UnsafeFolderError: if it, or the one above, is another user's or open to others.
+            UnsafeFolderError: if it, or the one above, belongs to another user or is open to others.
         """
         for folder in (self.path.parent, self.path, self.sockets):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -209,7 +209,7 @@ class RobotFolder:
         return False
 
     def has_lost(self, lock: int) -> bool:
-        """Return whether somebody has removed files of a robot that runs and holds `lock`."""
+        """Return whether somebody has removed files of a running robot, which holds `lock`."""
         return self.has_lost_lock(lock) or not all((self.path / name).exists() for name in (STATE, SOCKET))
 
     def has_lost_lock(self, lock: int) -> bool:
@@ -232,7 +232,7 @@ class RobotFolder:
                 continue
             if self._is_current(descriptor):
                 return descriptor
-            os.close(descriptor)  # it was removed by who held it before
+            os.close(descriptor)  # its previous holder removed it
 
     def _is_current(self, descriptor: int) -> bool:
         try:
@@ -244,7 +244,7 @@ class RobotFolder:
         """Return the state, or None if there is none.
 
         Raises:
-            BrokenStateError: if the file is not what was written, or another user may have written it.
+            BrokenStateError: if the file is corrupt, or another user may have written it.
         """
         try:
             file = open_regular(self.path / STATE, follow=False)
@@ -256,23 +256,23 @@ class RobotFolder:
             found = os.fstat(file.fileno())
             if found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) & 0o077:
                 raise BrokenStateError("another user may have written it")
-            text = file.read(_LARGEST)  # a file that is cut off here has another checksum
+            text = file.read(_LARGEST)  # if the file is cut off here, its checksum differs
         try:
             return RobotState.from_text(text.decode())
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise error if isinstance(error, BrokenStateError) else BrokenStateError("it has another form") from error
 
     def write_state(self, state: RobotState) -> None:
-        """Replace the state file: whole or not at all, whatever happens meanwhile."""
+        """Replace the state file atomically, whatever happens meanwhile."""
         replace_file(self.path / STATE, state.to_text().encode(), mode=0o600)
 
     def sweep(self) -> None:
-        """Remove what a run that was killed has left: temporary files, outputs, its socket. Needs the lock."""
+        """Remove what a killed run has left: temporary files, outputs, its socket. Needs the lock."""
         for path in self._leftovers():
             path.unlink(missing_ok=True)
 
     def clear(self) -> None:
-        """Remove everything but the log. Needs the lock, which goes last."""
+        """Remove everything but the log. Needs the lock, which is removed last."""
         self.sweep()
         with contextlib.suppress(OSError):  # somebody has put something into it, or removed it
             self.sockets.rmdir()

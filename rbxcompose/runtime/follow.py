@@ -1,4 +1,4 @@
-"""Reading a log that may still be written: whole lines only, and on to the next file when a new one starts."""
+"""Reads a log that may still be written: only whole lines, and on to the next file when a new one starts."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from rbxcompose.runtime.records import Record
 
 
 class Follower:
-    """Reads the records of a log as they come, those of older files first. `skipped` counts torn and foreign lines."""
+    """Reads the records of a log as they arrive, older files first. `skipped` counts torn and foreign lines."""
 
     def __init__(self, path: Path) -> None:
         self.skipped = 0
         self._path = path
-        self._files: list[_Part] = []  # the oldest first; the last is the one that is written
+        self._files: list[_Part] = []  # oldest first; the last one is being written
 
     def read(self) -> list[Record]:
         """Return the records that have come since the last call."""
@@ -24,7 +24,7 @@ class Follower:
         records = [record for file in self._files for record in file.read()]
         for file in self._files[
             :-2
-        ]:  # what has just been set aside may get the line of a process that was about to write
+        ]:  # a file that was just renamed may still get the line of a process that was about to write
             self._close(file)
         self._files = self._files[-2:]
         self.skipped += sum(file.take_skipped() for file in self._files)
@@ -40,9 +40,9 @@ class Follower:
         self.skipped += file.take_skipped()
 
     def _new_files(self) -> list[_Part]:
-        """Open the files that have begun since, the oldest first.
+        """Open the files that have begun since, oldest first.
 
-        They are looked for from the newest on: one that is set aside meanwhile is met again by its next name.
+        The search begins with the newest: one that is renamed meanwhile is found again under its next name.
         """
         found: list[_Part] = []
         for path in parts_of(self._path):
@@ -50,7 +50,7 @@ class Follower:
                 part = _Part(path)
             except FileNotFoundError:
                 if path == self._path:
-                    continue  # it is just being set aside
+                    continue  # it is just being renamed
                 break
             if any(part.is_same(one) for one in found):
                 part.close()
@@ -85,7 +85,7 @@ class _Part:
         return records
 
     def take_skipped(self) -> int:
-        """Return how many lines were skipped since the last call."""
+        """Return the number of lines skipped since the last call."""
         skipped, self._skipped = self._skipped, 0
         return skipped
 

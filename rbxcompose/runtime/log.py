@@ -1,7 +1,7 @@
-"""The log file of a robot: one record per line, each written by one system call, by several processes.
+"""The log file of a robot: one record per line, each written by one system call; several processes write to it.
 
-A file that has grown to `LARGEST` is set aside as `log.jsonl.1`, what was that before as `.2`, and so on; the oldest of
-`PARTS` goes. Whichever process finds the file full does it, the others notice at their next line.
+A file that has grown to `LARGEST` is renamed to `log.jsonl.1`, the previous `.1` to `.2`, and so on; the oldest of
+`PARTS` is removed. The process that finds the file full does this, the others notice at their next line.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from rbxcompose.runtime.records import Record
 
 NAME, PREVIOUS = "log.jsonl", "log.1.jsonl"
 LARGEST = 4_000_000  # [B] of one file
-PARTS = 4  # files that are kept beside the one that is written
+PARTS = 4  # files that are kept besides the current one
 
 
 class LogFile:
-    """Appends records to a file. A full disk costs records, never a step; what was lost is told when there is room."""
+    """Appends records to a file. A full disk costs records, never a step; the loss is reported when there is room."""
 
     def __init__(self, path: Path, *, largest: int = LARGEST) -> None:
-        """Open the file; `largest` [B] is the size from which a new one is begun."""
+        """Open the file; `largest` [B] is the size at which a new one is begun."""
         self._path, self._largest = path.absolute(), largest
         self._descriptor = _opened(self._path)
         self._lost = 0
@@ -60,9 +60,9 @@ class LogFile:
         return not self._is_torn
 
     def _go_on(self) -> None:
-        """Write to the file that has the log's name now; set it aside first if it is full.
+        """Write to the file that has the log's name now; rename it first if it is full.
 
-        If that fails, or a process that was stopped meanwhile has the lock, the file grows on.
+        If that fails, or a suspended process has the lock, the file continues to grow.
         """
         with suppress(OSError), _closing(_opened(self._path)) as current:
             fcntl.flock(current, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -71,7 +71,7 @@ class LogFile:
                 with _closing(_opened(self._path)) as fresh:
                     os.dup2(fresh, self._descriptor, inheritable=False)
             else:
-                fcntl.flock(current, fcntl.LOCK_UN)  # a duplicate would go on holding it
+                fcntl.flock(current, fcntl.LOCK_UN)  # a duplicate would keep holding it
                 os.dup2(current, self._descriptor, inheritable=False)
 
 

@@ -11,7 +11,7 @@ class RunOptions:
     """Real time (`is_stepped` false) or stepped time at `rate` times real time (None: as fast as it goes).
 
     `duration` [s] of robot time ends the run; a robot that is detached stays up when its mission has ended.
-    A stepped run can be recorded to the file `record` from within, so that it can be done again component by component.
+    A stepped run can be recorded to the file `record` from within, so that each component can be replayed.
     """
 
     is_stepped: bool = False

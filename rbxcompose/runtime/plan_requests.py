@@ -12,7 +12,7 @@ from rbxcompose.runtime.supervision.changes import Changes, Fate
 
 @dataclass(frozen=True, slots=True)
 class ComponentChange:
-    """What becomes of a component, and why."""
+    """What a change does to a component, and why."""
 
     name: str
     type: str
@@ -23,10 +23,10 @@ class ComponentChange:
 
 @dataclass(frozen=True, slots=True)
 class PlanComparison:
-    """What another plan would change in the robot that runs.
+    """What another plan would change in the running robot.
 
-    `impossible` are reasons for which it never can be done while the robot is up, `why_not` is why it cannot be done
-    now; `generation` counts the plans that the robot has had.
+    `impossible` are the reasons why it can never be done while the robot is up, `why_not` is why it cannot be done now;
+    `generation` counts the plans that the robot has had.
     """
 
     robot: str
@@ -37,7 +37,7 @@ class PlanComparison:
 
     @classmethod
     def of(cls, found: Changes, generation: int, why_not: str) -> PlanComparison:
-        """Return what changes tell people and programs."""
+        """Return changes in a form for people and programs."""
         components = tuple(
             ComponentChange(one.instance.name, one.instance.type, one.instance.process, one.fate, one.reasons)
             for one in found.fated
@@ -47,7 +47,7 @@ class PlanComparison:
 
 @dataclass(frozen=True, slots=True)
 class ComparePlan(Query[PlanComparison]):
-    """Ask what a plan, as text, would change; nothing happens."""
+    """Query what a plan, as text, would change; nothing happens."""
 
     about = ROBOT
     plan: str
@@ -55,7 +55,7 @@ class ComparePlan(Query[PlanComparison]):
 
 @dataclass(frozen=True, slots=True)
 class ApplyPlan(Command):
-    """Let a plan hold that was compared in this generation; answered when all that is new is active."""
+    """Apply a plan that was compared in this generation; answered when everything new is active."""
 
     about = ROBOT
     plan: str

@@ -1,4 +1,4 @@
-"""Processes of this machine, named so that a process id which was given to someone else cannot fool us."""
+"""Processes of this machine, identified so that a reused process id cannot fool us."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Process:
 
     @classmethod
     def of(cls, pid: int) -> Process:
-        """Name the process that has this id now.
+        """Return the process that has this id now.
 
         Raises:
             ProcessLookupError: if there is none.
@@ -48,7 +48,7 @@ class Process:
 
     @property
     def is_stopped(self) -> bool:
-        """Return whether a signal has stopped it, so that it can hear no other but SIGKILL."""
+        """Return whether a signal has suspended it, so that it reacts to no other signal but SIGKILL."""
         return self._state() in ("T", "t")
 
     def is_titled(self, prefix: str) -> bool:
@@ -62,15 +62,15 @@ class Process:
             return False
 
     def holds_file_of(self, folder: Path) -> bool:
-        """Return whether it has a file open that lies in `folder`, or lay there before it was removed."""
+        """Return whether it has a file open that is in `folder`, or was before it was removed."""
         try:
             return any(os.readlink(one).startswith(f"{folder}/") for one in Path(f"/proc/{self.pid}/fd").iterdir())
-        except OSError:  # it has ended, or closes one meanwhile
+        except OSError:  # it has ended, or has closed one meanwhile
             return False
 
     @property
     def usage(self) -> tuple[float, int] | None:
-        """Return the time it had of processors so far [s], and the memory that it holds [B]; None if it has ended."""
+        """Return its processor time so far [s] and its memory [B]; None if it has ended."""
         fields = _stat(self.pid)
         if fields is None or int(fields[_START_TIME]) != self.started:
             return None
@@ -82,13 +82,13 @@ class Process:
             descriptor = os.pidfd_open(self.pid)
         except ProcessLookupError:
             return None
-        if self.is_running:  # read after opening: from here on the id cannot change hands unseen
+        if self.is_running:  # read after opening: from here on the id cannot be reused unnoticed
             return descriptor
         os.close(descriptor)
         return None
 
     def send_signal(self, number: signal.Signals) -> bool:
-        """Send a signal to it and to no other process; tell whether it was there."""
+        """Send a signal to it and to no other process; return whether it existed."""
         descriptor = self.open()
         if descriptor is None:
             return False
@@ -111,7 +111,7 @@ def _stat(pid: int) -> list[str] | None:
 
 
 def signal_descriptor(descriptor: int, number: signal.Signals) -> bool:
-    """Send a signal through a pidfd; tell whether the process was there."""
+    """Send a signal through a pidfd; return whether the process existed."""
     try:
         signal.pidfd_send_signal(descriptor, number)
     except ProcessLookupError:
@@ -120,7 +120,7 @@ def signal_descriptor(descriptor: int, number: signal.Signals) -> bool:
 
 
 def wait_until_ended(processes: Sequence[Process], seconds: float) -> list[Process]:
-    """Wait until all have ended, but at most `seconds` of real time, and return those that have not."""
+    """Wait until all have ended, at most `seconds` of real time, and return those that have not."""
     deadline = time.monotonic() + seconds
     for process in processes:
         descriptor = process.open()
@@ -134,9 +134,9 @@ def wait_until_ended(processes: Sequence[Process], seconds: float) -> list[Proce
 
 
 def end_with(parent: int, number: signal.Signals) -> None:
-    """Let the kernel send `number` to this process when its parent ends; the process ends now if that has happened.
+    """Have the kernel send `number` to this process when its parent ends; end now if the parent has already ended.
 
-    Call it in the main thread's child: the kernel means the thread that forked.
+    Call it in a child of the main thread: for the kernel, the parent is the thread that forked.
     """
     if _LIBC.prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0) != 0:
         raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG) failed")
@@ -151,15 +151,15 @@ def adopt_orphans() -> None:
 
 
 def give_back_large_memory() -> None:
-    """Have memory of large messages given back to the system when it is free, now and in all forked processes.
+    """Return freed memory of large messages to the system, now and in all forked processes.
 
-    Else the C library takes the size of what was freed last for usual, and keeps as much.
+    Else the C library considers the size of the last freed block usual, and keeps that much.
     """
     _LIBC.mallopt(_M_MMAP_THRESHOLD, _LARGE)
 
 
 def boot_id() -> str:
-    """Return what differs from one boot of this machine to the next."""
+    """Return an id that differs between boots of this machine."""
     return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
 
 
@@ -173,6 +173,6 @@ def titled(prefix: str) -> Iterator[Process]:
 
 
 def describe_exit(status: int) -> str:
-    """Say in words how a process ended, from its wait status."""
+    """Return in words how a process ended, from its wait status."""
     code = os.waitstatus_to_exitcode(status)
     return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with status {code}"

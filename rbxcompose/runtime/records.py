@@ -11,7 +11,7 @@ from rbxcompose.levels import Level
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What `source` (an instance, or `robot` for the whole) told at robot time `time` [s].
+    """What `source` (an instance, or `robot` for the whole) reported at robot time `time` [s].
 
     It holds no wall-clock time and no process id, so that a stepped run writes the same bytes each time.
     `detail` is for the log file only, such as a traceback.
@@ -40,7 +40,7 @@ class Record:
         """Read what `to_json` wrote.
 
         Raises:
-            ValueError: if the line is torn or something else.
+            ValueError: if the line is torn or is no record.
         """
         fields = json.loads(line)
         try:

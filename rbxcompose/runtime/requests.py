@@ -1,4 +1,4 @@
-"""What people and tools may ask of a supervisor."""
+"""Requests of people and tools to a supervisor."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ ROBOT = "robot"
 
 @dataclass(frozen=True, slots=True)
 class RobotStatus(Query[RobotState]):
-    """Ask what is known of the robot from outside."""
+    """Query what is known about the robot from outside."""
 
     about = ROBOT
 
 
 @dataclass(frozen=True, slots=True)
 class StopRobot(Command):
-    """Hold everything that moves, until the release."""
+    """Hold everything that moves until the release."""
 
     about = ROBOT
 
@@ -33,6 +33,6 @@ class ReleaseRobot(Command):
 
 @dataclass(frozen=True, slots=True)
 class BringDown(Command):
-    """Bring the robot to rest and end it."""
+    """Bring the robot to rest and shut it down."""
 
     about = ROBOT

@@ -1,1 +1,1 @@
-"""What `new` writes: from answers to the texts of files, and those to the disk, all or none."""
+"""What `new` writes: answers become the texts of files, which are written to the disk, all or none."""

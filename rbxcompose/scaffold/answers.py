@@ -1,4 +1,4 @@
-"""Answers of a person: names, places and sentences, read and checked."""
+"""A person's answers, read and checked: names, places and sentences."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rbxcompose.units import ANGLE, LENGTH, UnitError, to_si
 
 LONGEST_NAME = 60  # characters
 LONGEST_TEXT = 200
-FARTHEST = 100.0  # [m] from the origin of `map`; a longer tour is for a person to think through
+FARTHEST = 100.0  # [m] from the origin of `map`; a person should plan a longer tour
 
 NAME = kind(
     "RBX9102",
@@ -31,11 +31,11 @@ ANSWER = kind(
 )
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
-_YAML_WORDS = frozenset({"true", "false", "null"})  # as values they are no text
+_YAML_WORDS = frozenset({"true", "false", "null"})  # as YAML values these are not texts
 
 
 class AnswerError(Exception):
-    """Raised with the finding that says why an answer cannot be used."""
+    """Raised with the finding on an answer that cannot be used."""
 
     def __init__(self, finding: Finding) -> None:
         super().__init__(finding.message)
@@ -46,7 +46,7 @@ def read_name(text: str, what: str, taken: Collection[str] = ()) -> str:
     """Return a name for `what` ("the robot").
 
     Raises:
-        AnswerError: if it is no name, or one of `taken`.
+        AnswerError: if it is no valid name, or one of `taken`.
     """
     shown = plain(text, LONGEST_NAME)
     if not _NAME.fullmatch(text) or len(text) > LONGEST_NAME:
@@ -90,7 +90,7 @@ def read_place(text: str, taken: Collection[str] = ()) -> Place:
     """Return the place that is written as `NAME=X,Y` or `NAME=X,Y,HEADING`, such as `table=2 m,50 cm,90 deg`.
 
     Raises:
-        AnswerError: if it is written otherwise, if the name is one of `taken`, or if it lies too far away.
+        AnswerError: if it has another form, if the name is one of `taken`, or if it is too far away.
     """
     name, equals, pose = text.partition("=")
     numbers = [number.strip() for number in pose.split(",")]

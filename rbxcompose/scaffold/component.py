@@ -1,4 +1,4 @@
-"""A new component type, as a small distribution of its own that is found once it is installed."""
+"""A new component type, as a small distribution of its own, found once it is installed."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _CLASSES = frozenset({"Component", "Config", "Field", "Float32", "In", "Level", 
 
 
 def read_component_name(text: str) -> str:
-    """Return the name of a new component type, which is also that of a Python module.
+    """Return the name of a new component type, which is also the name of a Python module.
 
     Raises:
-        AnswerError: if it is no name, or means something to Python or to rbxcompose already.
+        AnswerError: if it is no valid name, or already has a meaning in Python or rbxcompose.
     """
     name = read_name(text, "a component type", component_names())
     if keyword.iskeyword(name) or keyword.issoftkeyword(name):
@@ -31,7 +31,7 @@ def read_component_name(text: str) -> str:
 
 def _is_module(name: str) -> bool:
     spec = importlib.util.find_spec(name)
-    return spec is not None and spec.origin is not None  # a mere folder has none
+    return spec is not None and spec.origin is not None  # a plain folder has none
 
 
 def _taken(name: str, why: str) -> AnswerError:

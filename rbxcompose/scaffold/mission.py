@@ -1,4 +1,4 @@
-"""One more mission for a robot that is there: its file, a test, and the robot's entry for it."""
+"""A new mission for an existing robot: its file, a test, and the robot's entry for it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import PurePosixPath
 from rbxcompose.config import Place
 from rbxcompose.scaffold.texts import render
 
-MOST_PLACES = 2  # that it goes to
+MOST_PLACES = 2  # places that it visits
 
 _SECTION = re.compile(r"^missions:[ \t]*(#[^\n]*)?\r?\n", re.MULTILINE)
 _INDENT = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\r?\n)*( +)\S")
@@ -21,9 +21,9 @@ _INDENT = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\r?\n)*( +)\S")
 
 @dataclass(frozen=True, slots=True)
 class MissionAnswers:
-    """What must be known of a new mission.
+    """What must be known about a new mission.
 
-    `robot` is the path of the robot's file in its project, `skill` the one that drives to places, if there is one, at
+    `robot` is the path of the robot's file in its project, `skill` the skill that drives to places, if there is one, at
     `speed` [m/s].
     """
 
@@ -35,19 +35,19 @@ class MissionAnswers:
     about: str = ""
 
     def __post_init__(self) -> None:
-        """Say what it does if nothing else is said."""
+        """Set the default description."""
         if not self.about:
             ways = " and ".join(f"to {place.name}" for place in self.goals)
             object.__setattr__(self, "about", f"Goes {ways}." if ways else "Waits, and says so.")
 
     @property
     def goals(self) -> Sequence[Place]:
-        """The places that it goes to."""
+        """The places that it visits."""
         return self.places[:MOST_PLACES] if self.skill else ()
 
     @property
     def entry(self) -> str:
-        """The mission's file as the robot's file names it."""
+        """The mission's file as named in the robot's file."""
         return os.path.relpath(f"missions/{self.name}.yaml", self.robot.parent)
 
 
@@ -67,13 +67,13 @@ def mission_files(answers: MissionAnswers) -> dict[str, str]:
 
 
 def _timeout(answers: MissionAnswers) -> int:
-    """Return a time in which the robot gets from any of its places to any other [s]."""
+    """Return a time in which the robot can drive from any of its places to any other [s]."""
     ways = [math.hypot(one.x - other.x, one.y - other.y) for one, other in combinations(answers.places, 2)]
     return 10 * math.ceil((2 * max(ways, default=0.0) / answers.speed + 20) / 10)
 
 
 def with_entry(text: str, answers: MissionAnswers) -> str | None:
-    """Return a robot's text with an entry for the mission, every other byte as it was; None if there is no safe place.
+    """Return a robot's text with an entry for the mission, all else unchanged; None if there is no safe place for it.
 
     The entry becomes the first one below `missions:`; a text without that section gets one at its end.
     """

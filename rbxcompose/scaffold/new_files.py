@@ -1,4 +1,4 @@
-"""Writing new files: all of them or none, and never in the place of one that is there."""
+"""Writing new files: all of them or none, and never over an existing one."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ leaves nothing behind.
 
 
 def write_new(folder: Path, files: Mapping[str, str]) -> Finding | None:
-    """Write texts by their paths below `folder`; return why it could not be done, and then leave nothing behind."""
+    """Write texts by their paths below `folder`; if that fails, leave nothing behind and return the reason."""
     try:
         with ExitStack() as undo:
             waiting = [_prepare(folder / name, text, undo) for name, text in files.items()]
             for temporary, path in waiting:
-                os.link(temporary, path)  # unlike a rename, it fails if the file is there
+                os.link(temporary, path)  # unlike a rename, it fails if the file exists
                 undo.callback(path.unlink)
             undo.pop_all()
     except FileExistsError as error:
@@ -48,13 +48,13 @@ def write_new(folder: Path, files: Mapping[str, str]) -> Finding | None:
         message = f"'{plain(str(error.filename or folder))}' cannot be written: {error.strerror}"
         return NOT_WRITTEN.at(None, message, help="nothing was written")
     for temporary, _ in waiting:
-        with suppress(OSError):  # all is written; one more name of it does no harm
+        with suppress(OSError):  # everything is written; one more name of it does no harm
             temporary.unlink()
     return None
 
 
 def _prepare(path: Path, text: str, undo: ExitStack) -> tuple[Path, Path]:
-    """Write the text beside its place under a name of its own."""
+    """Write the text to a temporary file beside its destination."""
     if os.path.lexists(path):
         raise FileExistsError(0, "", str(path))
     for folder in _missing_folders(path):
@@ -74,5 +74,5 @@ def _missing_folders(path: Path) -> Iterator[Path]:
 
 
 def _remove_if_empty(folder: Path) -> None:
-    with suppress(OSError):  # somebody else has put something into it
+    with suppress(OSError):  # somebody else has put a file into it
         folder.rmdir()

@@ -1,4 +1,4 @@
-"""A new part: something with arguments that robots include, and a test with two instances of it in one robot."""
+"""A new part: a file with arguments that robots include, and a test with two instances of it in one robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A new robot: a base with a battery, places to go to, a mission that goes there, and a test of all of it."""
+"""A new robot: a base with a battery, places, a mission that visits them, and a test of it all."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ PLACES = (Place("table", 2.0, 0.0, 0.0), Place("window", 2.0, 1.5, math.pi / 2))
 MOST_PLACES = 20
 
 _SPEED = 0.3  # [m/s] of the template
-_USED = ("battery", "place", "pose", "low", "go_to", "recharge")  # by the robot and its mission
+_USED = ("battery", "place", "pose", "low", "go_to", "recharge")  # names used by the robot and its mission
 _WORDS = ("and", "or", "not", "in", "is", "lambda", "do", "else", "then")
 
 
 @dataclass(frozen=True, slots=True)
 class RobotAnswers:
-    """What must be known of a new robot; the dock is always at the origin."""
+    """What must be known about a new robot; the dock is always at the origin."""
 
     name: str
     about: str = ABOUT
@@ -49,7 +49,7 @@ def robot_files(answers: RobotAnswers) -> dict[str, str]:
     places = [DOCK, *answers.places]
     longest = max(math.hypot(one.x - other.x, one.y - other.y) for one, other in combinations(places, 2)) / _SPEED
     timeout = 10 * math.ceil((2 * longest + 20) / 10)  # [s], with time to turn
-    minutes = max(10, math.ceil(8 * longest / 60))  # so that the last third is enough for the way home
+    minutes = max(10, math.ceil(8 * longest / 60))  # so that the last third of the charge is enough for the way home
     names = [place.name for place in answers.places]
     said = {"name": answers.name, "timeout": f"{timeout} s"}
     return {
@@ -76,7 +76,7 @@ def read_places(texts: Sequence[str]) -> tuple[Place, ...]:
     """Return the places that are written as `NAME=X,Y` or `NAME=X,Y,HEADING`.
 
     Raises:
-        AnswerError: if one is written otherwise, cannot have its name, or stands where another is; if they are many.
+        AnswerError: if one has another form, an invalid name, or the position of another one; if there are too many.
     """
     found: list[Place] = []
     for text in texts:
@@ -85,7 +85,7 @@ def read_places(texts: Sequence[str]) -> tuple[Place, ...]:
 
 
 def read_next_place(text: str, before: Sequence[Place]) -> Place:
-    """Return one more place than those before it, as `read_places` does."""
+    """Return the place that follows those before it, as `read_places` does."""
     taken = {DOCK.name, *_USED, *_WORDS, *modifier_keys(), *kinds(), *FUNCTIONS, *(place.name for place in before)}
     place = read_place(text, taken)
     for other in (DOCK, *before):
@@ -100,7 +100,7 @@ def read_base(name: str) -> str:
     """Return a component type that can be the base: it drives by `cmd_vel` and needs no settings.
 
     Raises:
-        AnswerError: if there is no such type, or it is none.
+        AnswerError: if there is no such type, or it cannot be the base.
     """
     if name not in component_names():
         help_text = suggest(name, component_names(), "component types")
@@ -122,7 +122,7 @@ def read_base(name: str) -> str:
 
 
 def _drives(base: type[Component[Config]]) -> Drives | None:
-    """Return how a component drives by `cmd_vel` with the settings that it has by itself; None if it does not.
+    """Return how a component drives by `cmd_vel` with its default settings; None if it does not.
 
     Raises:
         ValidationError: if it needs settings.

@@ -1,4 +1,4 @@
-"""Texts from templates. Jinja2 writes files that are new; it never touches a manifest that is read."""
+"""Texts from templates. Jinja2 only writes new files; it never touches a manifest that is read."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def render(template: str, **answers: object) -> str:
 
 
 def yaml_text(text: str) -> str:
-    """Write a text as a YAML scalar of a Robot or Mission file: in quotes where it needs them, its dollars doubled."""
+    """Return a text as a YAML scalar of a Robot or Mission file: in quotes where needed, with dollars doubled."""
     text = text.replace("$", "$$")
     if _PLAIN_TEXT.fullmatch(text) and text.lower() not in _WORDS:
         return text
@@ -33,13 +33,13 @@ def yaml_text(text: str) -> str:
 
 
 def yaml_pose(place: Place) -> str:
-    """Write a pose as it stands behind a place's name."""
+    """Return a pose as written after the name of a place."""
     x, y = format_quantity(place.x, LENGTH), format_quantity(place.y, LENGTH)
     return f"{{x: {x}, y: {y}, heading: {format_quantity(place.heading, ANGLE)}}}"
 
 
 def class_name(name: str) -> str:
-    """Return a name in the way in which Python's classes are written."""
+    """Return a name in the style of Python classes."""
     return "".join(word.capitalize() for word in name.split("_"))
 
 

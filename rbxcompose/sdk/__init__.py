@@ -1,4 +1,4 @@
-"""All that the author of a plug-in imports."""
+"""Everything that the author of a plug-in imports."""
 
 from rbxcompose.config import (
     Acceleration,

@@ -1,4 +1,4 @@
-"""What ports are on a running component: the runtime binds them to the bus, tests to whatever they like."""
+"""The ports of a running component: the runtime binds them to the bus, tests to whatever they like."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ class Sender(Protocol[M_contra]):
 
 
 class OrderSender(Sender[M_contra], Protocol[M_contra]):
-    """Sends orders, and knows who carries them out."""
+    """Sends orders, and knows which components carry them out."""
 
     @property
     def listeners(self) -> frozenset[bytes]:
-        """Return who would get an order now, each by a name of its own; who has been restarted has another name."""
+        """Return the components that would receive an order now, each by a unique name that changes at a restart."""
         ...
 
     def watch(self, changed: Callable[[], None], /) -> None:
-        """Have `changed` called whenever a subscriber comes or goes."""
+        """Call `changed` whenever a subscriber appears or disappears."""
         ...
 
 
@@ -47,25 +47,25 @@ class Latest(Protocol[M_co]):
 
     @property
     def value(self) -> M_co | None:
-        """Return the newest message, or None before the first."""
+        """Return the newest message, or None before the first one."""
         ...
 
     @property
     def age(self) -> float:
-        """Return the time since the newest message arrived [s], infinite before the first."""
+        """Return the time since the newest message arrived [s]; infinite before the first one."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Reply(Generic[R]):
-    """How a call ended: with a response, or without one and why."""
+    """The end of a call: a response, or the reason for having none."""
 
     response: R | None
     error: str = ""
 
 
 class Caller(Protocol[Q_contra, R]):
-    """Asks a service; the reply comes later, on the same thread."""
+    """Calls a service; the reply arrives later, on the same thread."""
 
     @property
     def is_available(self) -> bool:
@@ -73,7 +73,7 @@ class Caller(Protocol[Q_contra, R]):
         ...
 
     def __call__(self, request: Q_contra, then: Callable[[Reply[R]], None], /, *, timeout: float = 5.0) -> None:
-        """Send `request`; `then` gets the reply, or an error after `timeout` [s]."""
+        """Send `request`; `then` is called with the reply, or with an error after `timeout` [s]."""
         ...
 
 
@@ -89,7 +89,7 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Ended(Generic[R]):
-    """The end of a goal as its client sees it; `result` is None if none came."""
+    """The end of a goal as its client sees it; `result` is None if none arrived."""
 
     outcome: Outcome
     result: R | None = None
@@ -101,7 +101,7 @@ class ServedGoal(Protocol[G_co, R_contra, F_contra]):
 
     @property
     def request(self) -> G_co:
-        """Return the goal as it was sent."""
+        """Return the goal as sent."""
         ...
 
     @property
@@ -111,28 +111,28 @@ class ServedGoal(Protocol[G_co, R_contra, F_contra]):
 
     @property
     def is_paused(self) -> bool:
-        """Return whether the goal must be held as it is, until it continues or is cancelled."""
+        """Return whether the goal is paused: hold it as it is until it continues or is cancelled."""
         ...
 
     def feedback(self, message: F_contra, /) -> None:
-        """Send the client feedback."""
+        """Send feedback to the client."""
         ...
 
     def succeeded(self, result: R_contra | None = None, /) -> None:
-        """End the goal well; without a result its zero value is sent."""
+        """End the goal as succeeded; without a result its zero value is sent."""
         ...
 
     def aborted(self, reason: str = "", result: R_contra | None = None, /) -> None:
-        """End the goal badly; the reason goes to the log."""
+        """End the goal as failed; the reason goes to the log."""
         ...
 
     def canceled(self, result: R_contra | None = None, /) -> None:
-        """End the goal because its client or a stop asked for it."""
+        """End the goal because its client or a stop requested it."""
         ...
 
 
 class ActionServer(Protocol[G_co, R_contra, F_contra]):
-    """The goal that a server carries out."""
+    """The server of an action, with its current goal."""
 
     @property
     def current(self) -> ServedGoal[G_co, R_contra, F_contra] | None:
@@ -144,7 +144,7 @@ class SentGoal(Protocol):
     """A goal as its client sees it."""
 
     def cancel(self) -> None:
-        """Ask the server to end it; `Ended` still comes."""
+        """Request the server to end the goal; `Ended` still follows."""
         ...
 
 
@@ -159,12 +159,12 @@ class ActionCaller(Protocol[G_contra, R, F_co]):
     def __call__(
         self, goal: G_contra, then: Callable[[Ended[R]], None], feedback: Callable[[F_co], None] | None = None, /
     ) -> SentGoal:
-        """Send `goal`; `then` gets its end exactly once."""
+        """Send `goal`; `then` is called with its end exactly once."""
         ...
 
 
 class Window(Protocol):
-    """Tells tools outside what is new."""
+    """Publishes updates to tools outside."""
 
     @property
     def is_watched(self) -> bool:

@@ -1,7 +1,7 @@
-"""Capabilities: what the compiler and the tools need to know of a component, as the component itself declares it.
+"""Capabilities: what the compiler and the tools need to know about a component, as declared by the component itself.
 
-No rule knows a component by its type's name: a battery, base or driver from elsewhere counts as much as ours. A text in
-a capability is the name of a port of the component; everything else is a `Setting`. Quantities are in SI.
+No rule identifies a component by the name of its type: a battery, base or driver from elsewhere is equal to ours. A
+text in a capability is the name of a port of the component; everything else is a `Setting`. Quantities are in SI.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ T_co = TypeVar("T_co", covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class Setting(Generic[T_co]):
-    """A value and the field of the configuration that it is from: `Setting(config.max_speed, "max_speed")`.
+    """A value and its field in the configuration: `Setting(config.max_speed, "max_speed")`.
 
-    Findings point at that field in the manifest. A field of a field is written with a dot; a value that cannot be
+    Findings point at that field in the manifest. A nested field is written with a dot; a value that cannot be
     configured has no field.
     """
 
@@ -34,7 +34,7 @@ class Capability:
 
 @dataclass(frozen=True, slots=True)
 class Drives(Capability):
-    """A base: it moves the robot as the velocities at its input `commands` say."""
+    """A base: it moves the robot at the velocities from its input `commands`."""
 
     commands: str
     odometry: str = ""
@@ -55,7 +55,7 @@ class Drives(Capability):
 
 @dataclass(frozen=True, slots=True)
 class CommandsMotion(Capability):
-    """It sends velocities for a base at its output `commands`, at most these."""
+    """It sends velocities for a base at its output `commands`, up to these limits."""
 
     commands: str
     max_speed: Setting[float] | None = None
@@ -66,7 +66,7 @@ class CommandsMotion(Capability):
 
 @dataclass(frozen=True, slots=True)
 class Navigates(Capability):
-    """It takes the robot to the pose that the main argument of the skill at its port `goals` tells."""
+    """It drives the robot to the pose in the main argument of the skill at its port `goals`."""
 
     goals: str
     tolerance: Setting[float] | None = None
@@ -77,7 +77,7 @@ class Navigates(Capability):
 
 @dataclass(frozen=True, slots=True)
 class Drains(Capability):
-    """A battery: its output `level` tells its charge, by the only field of the message and in the unit of the port."""
+    """A battery: its output `level` publishes its charge in the only field of the message, in the unit of the port."""
 
     level: str
     runtime: Setting[float] | None = None
@@ -90,7 +90,7 @@ class Drains(Capability):
 
 @dataclass(frozen=True, slots=True)
 class Charges(Capability):
-    """It charges the robot's battery, as the skill at its port `goals`."""
+    """It charges the robot's battery, by the skill at its port `goals`."""
 
     goals: str
     place: Setting[Place] | None = None
@@ -103,7 +103,7 @@ class Charges(Capability):
 
 @dataclass(frozen=True, slots=True)
 class Forwards(Capability):
-    """A mux: what leaves at `output` is what came in at one of `inputs`."""
+    """A mux: it forwards messages from one of `inputs` to `output`."""
 
     inputs: tuple[str, ...]
     output: str
@@ -111,7 +111,7 @@ class Forwards(Capability):
 
 @dataclass(frozen=True, slots=True)
 class WritesFrame(Capability):
-    """Its output `transforms` tells the pose of frame `child` in frame `parent`."""
+    """Its output `transforms` publishes the pose of frame `child` in frame `parent`."""
 
     transforms: str
     parent: Setting[str]
@@ -120,7 +120,7 @@ class WritesFrame(Capability):
 
 @dataclass(frozen=True, slots=True)
 class RunsMissions(Capability):
-    """It runs the robot's missions: its skills are those that are there, and values may come from outside."""
+    """It runs the robot's missions: its skills are those of the robot, and values may come from outside."""
 
 
 def settings_of(capability: Capability) -> Iterator[Setting[Any]]:

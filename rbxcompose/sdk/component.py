@@ -21,7 +21,7 @@ C = TypeVar("C", bound=Config)
 
 
 class Context(Protocol):
-    """What the runtime gives to a component besides its ports."""
+    """What the runtime provides to a component besides its ports."""
 
     clock: Clock
 
@@ -39,7 +39,7 @@ class Context(Protocol):
         ...
 
     def wake_at(self, time: float) -> None:
-        """Call the component's `wake` at robot time `time` [s]; an earlier wish is kept as well."""
+        """Call the component's `wake` at robot time `time` [s]; earlier requests remain."""
         ...
 
     def notify(self, event: RobotEvent) -> None:
@@ -47,11 +47,11 @@ class Context(Protocol):
         ...
 
     def repeat(self, requests: Sequence[Command]) -> None:
-        """Have the component told these again, and none of before, after it was restarted."""
+        """Send these, instead of earlier ones, to the component again after it was restarted."""
         ...
 
     def window(self, path: str, question: Query[Any]) -> Window:
-        """Open a window for tools outside at `path`; who asks there gets the component's answer to `question`."""
+        """Open a window for tools outside at `path`; queries there get the component's answer to `question`."""
         ...
 
 
@@ -60,16 +60,16 @@ class Component(Generic[C]):
 
     The runtime calls one method at a time. Time comes from `now`, never from Python's clocks.
 
-    A component that is `blocking` is called in its own thread, so that it delays nothing else. Meanwhile its messages
-    wait, as many as their class of quality allows; goals and commands are refused. `is_at_rest`, `occupation` and
-    `summary` are asked for at any time, also during a call: let them read plain attributes.
+    A `blocking` component is called in its own thread, so that it delays nothing else. During a call its messages wait,
+    as many as their quality class allows; goals and commands are refused. `is_at_rest`, `occupation` and `summary` are
+    read at any time, even during a call: they should only read plain attributes.
     """
 
     rate: ClassVar[float] = 0.0  # [Hz] of `step`; 0: no steps
     process: ClassVar[str] = "robot"  # default process group
-    blocking: ClassVar[bool] = False  # may wait or compute for long: runs in a thread of its own
+    blocking: ClassVar[bool] = False  # may wait or compute for a long time: runs in a thread of its own
     simulated: ClassVar[bool] = False  # exists only in simulation
-    made_by: ClassVar[str] = ""  # tells which section makes it, for a type that users do not list themselves
+    made_by: ClassVar[str] = ""  # says which section creates it, for a type that users do not list themselves
     type_name: ClassVar[str] = ""  # set by the decorator
 
     def __init__(self, name: str, config: C, context: Context) -> None:
@@ -90,13 +90,13 @@ class Component(Generic[C]):
 
     @classmethod
     def ports(cls, config: C) -> dict[str, Port[Any]]:
-        """Return all ports by name; override and add those that depend on the configuration."""
-        here: Any = cls  # for mypy, classes of a generic are not hashable
+        """Return all ports by name; override to add those that depend on the configuration."""
+        here: Any = cls  # mypy considers classes of a generic not hashable
         return dict(_declared_ports(here))
 
     @classmethod
     def capabilities(cls, config: C) -> tuple[Capability, ...]:
-        """Return what checks and commands should know of a component with this configuration."""
+        """Return what checks and commands should know about a component with this configuration."""
         return ()
 
     @property
@@ -111,17 +111,17 @@ class Component(Generic[C]):
 
     @property
     def is_at_rest(self) -> bool:
-        """Return whether nothing that this component moves is moving."""
+        """Return whether everything that this component moves is at rest."""
         return True
 
     @property
     def occupation(self) -> str:
-        """Return what it is at that a restart would cut off, such as `mission patrol runs`; empty if nothing."""
+        """Return the work that a restart would cut off, such as `mission patrol runs`; empty if none."""
         return ""
 
     @property
     def claims(self) -> bool:
-        """Return whether its occupation claims what moves the robot."""
+        """Return whether its occupation claims parts that move the robot."""
         return False
 
     def info(self, text: str) -> None:
@@ -129,7 +129,7 @@ class Component(Generic[C]):
         self.context.log(Level.OK, text)
 
     def warn(self, text: str) -> None:
-        """Log something that a person should look at."""
+        """Log a warning that a person should look at."""
         self.context.log(Level.WARN, text)
 
     def status(self, level: Level, message: str, /, **values: object) -> None:
@@ -140,10 +140,10 @@ class Component(Generic[C]):
         """Prepare: import heavy packages, build the core, open devices. Nothing moves yet."""
 
     def reconfigure(self, old: C) -> None:
-        """Follow `config`, of which a field that is marked `Live` has changed since it was `old`.
+        """Apply `config`, which differs from `old` in fields that are marked `Live`.
 
         Raises:
-            Refused: if it cannot be done now, with the reason; `config` is `old` again then.
+            Refused: if this cannot be done now, with the reason; `config` is then `old` again.
         """
 
     def take_over(self, old: Self) -> None:
@@ -162,42 +162,42 @@ class Component(Generic[C]):
         """Advance by `dt` [s], `rate` times per second."""
 
     def received(self, port: str, message: Any) -> None:
-        """Take a message of an input that has no method `on_<port>` of its own."""
+        """Handle a message of an input that has no method `on_<port>` of its own."""
 
     def wake(self) -> None:
-        """Do what `context.wake_at` was called for."""
+        """Do the work for which `context.wake_at` was called."""
 
     def start(self) -> None:
-        """Begin what waits for the whole robot to be active."""
+        """Start everything that waits for the whole robot to be active."""
 
     def stop(self) -> None:
         """Hold everything that moves until `release`: someone pressed stop."""
 
     def release(self) -> None:
-        """Allow motion again; start none."""
+        """Allow motion again, without starting any."""
 
     def hold(self) -> None:
-        """Command only a stop until `go_on`: robot time stands still, and so do all deadlines."""
+        """Command only a stop until `go_on`: robot time and all deadlines stand still."""
 
     def go_on(self) -> None:
-        """Command again: robot time runs again. Earlier commands no longer count."""
+        """Resume commands: robot time runs again. Earlier commands no longer count."""
 
     def brake(self) -> None:
         """Stop for good: the robot is going down."""
 
     def lost(self, names: tuple[str, ...], cause: str) -> None:
-        """Learn that these components are lost."""
+        """Handle the loss of these components."""
 
     @classmethod
     def requests(cls) -> Requests:
-        """Return the requests that it takes: those of its methods that are marked with `answers`."""
+        """Return the requests that it takes: those whose methods are marked with `answers`."""
         return requests(*answering(cls))
 
     def handle(self, request: Request[A]) -> A:
         """Return the answer to a request of a person or a tool.
 
         Raises:
-            Refused: if it cannot be carried out, with the reason.
+            Refused: if the request cannot be carried out, with the reason.
         """
         method = answering(type(self)).get(type(request))
         if method is None:
@@ -206,7 +206,7 @@ class Component(Generic[C]):
         return answer
 
     def summary(self) -> dict[str, str]:
-        """Return facts for the summary at the end, by their label."""
+        """Return facts for the summary at the end, by label."""
         return {}
 
 

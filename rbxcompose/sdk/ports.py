@@ -1,6 +1,6 @@
 """Ports: what a component publishes and subscribes to, declared in its class so that `check` can prove the wiring.
 
-On a class, a port is its declaration; on a component, it is the live thing that the runtime has bound to it.
+On a class, a port is its declaration; on a component, it is the live object that the runtime has bound to it.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ B = TypeVar("B")  # what the port is on a component
 
 
 class HasPorts(Protocol):
-    """A component, as its ports see it."""
+    """A component as its ports see it."""
 
-    bound: dict[str, Any]  # what each port is on it, by name
+    bound: dict[str, Any]  # the live object of each port, by name
 
 
 class Port(Generic[B]):
@@ -48,12 +48,12 @@ class Port(Generic[B]):
         return self if component is None else self.of(component)
 
     def of(self, component: HasPorts) -> B:
-        """Return what this port is on `component` (for ports that depend on its configuration)."""
+        """Return the live object of this port on `component` (for ports that depend on its configuration)."""
         bound: B = component.bound[self.name]
         return bound
 
     def named(self, name: str) -> Self:
-        """Give a name to a port that is not an attribute of a class."""
+        """Set the name of a port that is not an attribute of a class."""
         self.name = name
         return self
 
@@ -83,10 +83,10 @@ class In(Port[Latest[M]]):
         is_open: bool = False,
         max_rate: float | None = None,
     ) -> None:
-        """Take `is_open` for an input that may well be fed from outside the robot.
+        """Take `is_open` for an input that may also be fed from outside the robot.
 
-        At most `max_rate` messages a second are taken from each publisher of another process [Hz]; a command has a
-        bound anyway.
+        At most `max_rate` messages per second are taken from each publisher of another process [Hz]; commands are
+        always limited.
         """
         super().__init__(topic)
         self.interface, self.qos, self.unit, self.is_open, self.max_rate = message, Qos(qos), unit, is_open, max_rate
@@ -95,19 +95,19 @@ class In(Port[Latest[M]]):
 class ServesTopic(In[M]):
     """Takes orders, each one a message; it is a skill of every mission under its topic's name.
 
-    The method `on_<port>` begins to carry an order out, and a newer one replaces it. The fields of the message are the
+    The method `on_<port>` begins to carry out an order, and a newer one replaces it. The fields of the message are the
     arguments of the skill; `claims`, `restartable` and `outcomes` are as in `ServesAction`.
 
-    `ends` is the output of the same component that tells how an order ended: by its flag `success`, perhaps an
-    `outcome`, and a `message` with the reason. Without it the skill has succeeded as soon as the order was sent.
-    `halts` is the input to which an empty message comes when an order is given up: by a pause, a stop, a deadline, an
-    interrupt, the end of the mission. Without it nothing can be taken back. No order can be held: one that a pause has
-    given up is sent again at the resume.
+    `ends` is the output of the same component that reports how an order ended: by its flag `success`, perhaps an
+    `outcome`, and a `message` with the reason. Without it the skill succeeds as soon as the order is sent. `halts` is
+    the input that receives an empty message when an order is aborted: by a pause, a stop, a deadline, an interrupt or
+    the end of the mission. Without it no order can be taken back. No order can be held: one aborted by a pause is sent
+    again at the resume.
 
-    Orders have no numbers. So of those whose ends are told at one output, one is under way at most: a newer one of a
-    mission gives the older one up, which has failed then. One that was given up, or that a stop of the robot has
-    ended, should tell no end. If it tells one within 0.2 s, that is known to be late; a later one would end the next
-    order. Nor is an order told apart that somebody else sends meanwhile.
+    Orders have no numbers. So of all orders whose ends are reported at one output, at most one is active: a newer one
+    of a mission aborts the older one, which then fails. An order that was aborted, or ended by a stop of the robot,
+    should report no end. A report within 0.2 s is known to be late; a later one would end the next order. Orders that
+    somebody else sends meanwhile cannot be distinguished, either.
     """
 
     kind = "serves_topic"
@@ -125,10 +125,10 @@ class ServesTopic(In[M]):
         qos: Qos | str = Qos.EVENT,
         max_rate: float | None = None,
     ) -> None:
-        """Declare it.
+        """Declare the port.
 
         Raises:
-            ValueError: if `ends` cannot tell an end, or what is declared could never be told or halted.
+            ValueError: if `ends` cannot report an end, or if `halts` or `outcomes` could never be used.
         """
         super().__init__(message, topic, qos=qos, is_open=True, max_rate=max_rate)
         end: type[Message] | None = ends.interface if ends is not None else None
@@ -140,13 +140,13 @@ class ServesTopic(In[M]):
             raise ValueError("an order without 'ends' is over once it is sent: nothing can report an outcome")
         _require_outcomes(outcomes, end)
         if halts is not None:
-            halts.is_open = True  # whether a mission feeds it depends on what the robot's missions use
+            halts.is_open = True  # whether a mission feeds it depends on the skills that the robot's missions use
         self.ends, self.halts = ends, halts
         self.claims, self.restartable, self.outcomes = claims, restartable, outcomes
 
 
 class SendsOrders(Out[M]):
-    """Sends orders to the components `servers`, and knows whether they listen. Missions have it for their skills."""
+    """Sends orders to the components `servers`, and knows whether they listen. Missions use it for their skills."""
 
     def __init__(self, message: type[M], topic: str, *, servers: Collection[str], qos: Qos | str = Qos.EVENT) -> None:
         super().__init__(message, topic, qos=qos)
@@ -174,12 +174,12 @@ class Calls(Port[Caller[Q, R]]):
 
 
 class ServesAction(Port[ActionServer[G, R, F]]):
-    """Carries out goals, one at a time; a newer one replaces it. It is a skill of every mission under its topic's name.
+    """Carries out one goal at a time; a newer one replaces it. It is a skill of every mission under its topic's name.
 
-    `claims` names what of the robot a goal needs for itself (`base`, `arm`, `head`, `voice`). `outcomes` are ends
-    beyond success and failure, each with which of the two it counts as; the result tells them in its text field
-    `outcome`. One that is `pausable` minds `current.is_paused`: goals are held by the service `<topic>/pause`. The
-    optional method `accept_<port>` may refuse a goal by returning the reason.
+    `claims` names the parts of the robot that a goal needs exclusively (`base`, `arm`, `head`, `voice`). `outcomes` are
+    ends besides success and failure, each with which of the two it counts as; the result names them in its text field
+    `outcome`. A `pausable` one respects `current.is_paused`: the service `<topic>/pause` holds goals. The optional
+    method `accept_<port>` may refuse a goal by returning the reason.
     """
 
     kind = "serves_action"
@@ -194,10 +194,10 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         pausable: bool = False,
         outcomes: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        """Declare it.
+        """Declare the port.
 
         Raises:
-            ValueError: if there are outcomes, but no field of the result for them, or one counts as something else.
+            ValueError: if there are outcomes but the result has no field for them, or one counts as something else.
         """
         super().__init__(topic)
         _require_outcomes(outcomes, action.Result)

@@ -1,4 +1,4 @@
-"""Component types by name; only those that a manifest uses are imported."""
+"""Component types by name; only the types that a manifest uses are imported."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _TYPES: dict[str, type[Component[Any]]] = {}
 
 
 def component(name: str) -> Callable[[T], T]:
-    """Register a component class under its type's name.
+    """Register a component class under the name of its type.
 
     Raises:
         TypeError: if it is not a subclass of `Component`.
-        ValueError: if another class has this name, or one of its ports belongs to a port that it does not have.
+        ValueError: if another class has this name, or one of its ports refers to a port that it does not have.
     """
 
     def register(cls: T) -> T:
@@ -42,7 +42,7 @@ def component(name: str) -> Callable[[T], T]:
 
 
 def _require_ends(cls: type[Component[Any]]) -> None:
-    """Raise ValueError if orders end or are halted at a port that the class does not have."""
+    """Raise ValueError if orders are reported or halted at a port that the class does not have."""
     ports = [port for _, port in inspect.getmembers(cls) if isinstance(port, Port)]
     for port in ports:
         for word in ("ends", "halts") if isinstance(port, ServesTopic) else ():
@@ -53,16 +53,16 @@ def _require_ends(cls: type[Component[Any]]) -> None:
 
 
 def component_names() -> list[str]:
-    """Return the names of all types, sorted; nothing is imported for it."""
+    """Return the names of all types, sorted, without importing any."""
     return sorted({*PLUGINS.names(), *_TYPES})
 
 
 def component_type(name: str) -> type[Component[Any]]:
-    """Import a type's file, if that is still to be done, and return its class.
+    """Return the class of a type, importing its file if necessary.
 
     Raises:
         KeyError: if no type has this name.
-        BrokenPluginError: if it is that of another package and cannot be used.
+        BrokenPluginError: if it belongs to another package and cannot be used.
     """
     if name not in _TYPES:
         _load(name)
@@ -75,14 +75,14 @@ def declared(name: str, config: Config, kind: type[K]) -> list[K]:
 
 
 def usable_names() -> list[str]:
-    """Import all types and return their names, sorted, but for those of other packages that are broken."""
+    """Import all types and return their names, sorted, without broken ones of other packages."""
     return [name for name in component_names() if _is_usable(name)]
 
 
 def _is_usable(name: str) -> bool:
     try:
         component_type(name)
-    except BrokenPluginError:  # told when a manifest uses it
+    except BrokenPluginError:  # reported when a manifest uses it
         return False
     return True
 
@@ -91,7 +91,7 @@ def _load(name: str) -> None:
     try:
         is_there = PLUGINS.load(name)
     except BrokenPluginError:
-        _TYPES.pop(name, None)  # it may have come as far as that
+        _TYPES.pop(name, None)  # it may have got that far
         raise
     if is_there and name not in _TYPES:
         raise PLUGINS.broken(name, f"its module declares no class by @component({name!r})")

@@ -1,6 +1,6 @@
-"""Skills in Python: a function, or a class for what takes time; each is one file and one decorator.
+"""Skills in Python: a function, or a class for a skill that takes time; each is one file and one decorator.
 
-They run in the process of missions, so a call has 5 ms; what computes or waits longer is a component with an action.
+They run in the process of missions, so a call has 5 ms; for longer work or waits, use a component with an action.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rbxcompose.plugins import BrokenPluginError, Plugins
 from rbxcompose.units import NUMBER
 
 PLUGINS = Plugins("skill", "rbxcompose.skills")
-Told = bool | str | Mapping[str, object]  # how a skill ended: well or not, with an outcome, or well and what it found
+Told = bool | str | Mapping[str, object]  # how a skill ended: success or not, an outcome, or success with results
 
 F = TypeVar("F", bound=Callable[..., Any])
 _SKILLS: dict[str, SkillType] = {}
@@ -33,23 +33,24 @@ _TYPES: Mapping[Any, Type] = {
 
 
 class Activity:
-    """A skill that takes time: one object for each time that it is started.
+    """A skill that takes time: one object per start.
 
-    `start` takes the arguments. `step` is called `rate` times a second, the first time at once, with the robot time
-    [s], until it returns how it ended. Who can be paused defines `pause` and `resume`, and is declared as `pausable`.
+    `start` takes the arguments. `step` is called `rate` times per second, first immediately, with the robot time [s],
+    until it returns how the skill ended. One that can be paused defines `pause` and `resume`, and is declared as
+    `pausable`.
     """
 
     rate: ClassVar[float] = 20.0  # [Hz] of `step`
 
     def step(self, now: float) -> Told | None:
-        """Continue; return None while it is not done."""
+        """Continue; return None until the skill ends."""
         raise NotImplementedError
 
     def halt(self) -> None:
-        """Stop at once: nothing waits for it any more."""
+        """Stop immediately: nothing waits for the skill any more."""
 
     def pause(self, now: float) -> None:
-        """Hold, at robot time `now` [s]; no steps come until `resume`."""
+        """Hold, at robot time `now` [s]; `step` is not called until `resume`."""
 
     def resume(self, now: float) -> None:
         """Continue, at robot time `now` [s]."""
@@ -70,12 +71,12 @@ class SkillType:
 
     @property
     def main(self) -> str:
-        """Return the argument that a single value is."""
+        """Return the argument that a single value means."""
         return next(iter(self.arguments), "")
 
     @property
     def is_activity(self) -> bool:
-        """Return whether it may take time."""
+        """Return whether the skill may take time."""
         return inspect.isclass(self.make)
 
 
@@ -89,9 +90,9 @@ def skill(
 ) -> Callable[[F], F]:
     """Declare a skill: a function with typed arguments, or an `Activity` whose `start` has them.
 
-    It ends with True, False, one of its `outcomes` (each counts as `success` or `failure`), or a map of what it found
-    out; a function that returns nothing has succeeded. What it raises is a failure. `claims` is the part of the robot
-    that it needs for itself.
+    It ends with True, False, one of its `outcomes` (each counts as `success` or `failure`), or a map of results; a
+    function that returns nothing has succeeded. Any exception is a failure. `claims` is the part of the robot that it
+    needs exclusively.
 
     Raises:
         TypeError: if an argument has no type that a mission can write, or an activity cannot be used.
@@ -112,16 +113,16 @@ def skill(
 
 
 def skill_names() -> list[str]:
-    """Return the names of all skills in Python, sorted; nothing is imported for it."""
+    """Return the names of all skills in Python, sorted, without importing any."""
     return sorted({*PLUGINS.names(), *_SKILLS})
 
 
 def skill_type(name: str) -> SkillType:
-    """Import a skill's file, if that is still to be done, and return the skill.
+    """Return a skill, importing its file if necessary.
 
     Raises:
-        KeyError: if there is none of this name.
-        BrokenPluginError: if it is that of another package and cannot be used.
+        KeyError: if no skill has this name.
+        BrokenPluginError: if it belongs to another package and cannot be used.
     """
     if name not in _SKILLS:
         try:
@@ -139,7 +140,7 @@ def _place(made: Callable[..., Any]) -> str:
 
 
 def _arguments(made: Callable[..., Any]) -> tuple[dict[str, Type], frozenset[str]]:
-    """Return the arguments with their types, and those that have no default."""
+    """Return the arguments with their types, and the required ones."""
     function: Callable[..., Any] = made
     if inspect.isclass(made):
         if not issubclass(made, Activity) or not callable(getattr(made, "start", None)):

@@ -9,7 +9,7 @@ from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
 
 MOST_STEP = 0.05  # [s] by which the wall clock may move against the monotonic one while we look
-MOST_AHEAD, MOST_BEHIND = 0.05, 1.0  # [s] of a sender's stamps; behind they are also by what the way takes
+MOST_AHEAD, MOST_BEHIND = 0.05, 1.0  # [s] of a sender's stamps; those behind also include the transport time
 
 WRONG_CLOCK = kind(
     "RBX9404",
@@ -40,7 +40,7 @@ _HELP = "let a time server set it: timedatectl set-ntp true"
 
 @examination
 def clocks(facts: HostFacts) -> Iterator[str | Finding]:
-    """Compare the wall clock with what must be, with the monotonic clock, and with the stamps of others."""
+    """Compare the wall clock with a time surely past, with the monotonic clock, and with the stamps of others."""
     clock = facts.clocks
     if clock.wall < clock.oldest:
         yield WRONG_CLOCK.at(

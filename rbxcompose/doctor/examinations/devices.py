@@ -31,7 +31,7 @@ Good: `port: /dev/serial/by-id/...`, and `sudo usermod -aG dialout $USER`
 
 @examination
 def devices(facts: HostFacts) -> Iterator[str | Finding]:
-    """Look whether each device is there and may be opened."""
+    """Check that each device exists and may be opened."""
     named = {device: (robot, component) for robot in facts.robots for component, device in _named(robot)}
     for device, (robot, component) in sorted(named.items()):
         place = robot.component_span(component)

@@ -1,4 +1,4 @@
-"""What this user's processes may have."""
+"""Resource limits of this user's processes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Good: `docker run --shm-size=256m`, `ulimit -n 4096`
 
 @examination
 def limits(facts: HostFacts) -> Iterator[str | Finding]:
-    """Report the limits, and which are too low."""
+    """Report the limits and which of them are too low."""
     has = facts.limits
     if has.open_files is not None and has.open_files < FEWEST_FILES:
         words = f"a process may have only {has.open_files} open files"

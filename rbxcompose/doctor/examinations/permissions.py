@@ -29,7 +29,7 @@ Good: `chmod 700 /run/user/1000/rbxcompose`, `chmod 600 secrets/token`
 
 @examination
 def permissions(facts: HostFacts) -> Iterator[str | Finding]:
-    """Look at the folders of robots and at the secrets of their projects."""
+    """Check the folders of robots and the secrets of their projects."""
     folders = [path for path in (facts.base, *(one.folder.path for one in facts.running)) if path.exists()]
     secrets = [path for folder in _secret_folders(facts) if folder.is_dir() for path in sorted(folder.iterdir())]
     wrong = [*_wrong(folders, "700"), *_wrong(secrets, "600")]
@@ -48,7 +48,7 @@ def _wrong(paths: list[Path], mode: str) -> Iterator[Finding]:
         try:
             found = path.lstat()
         except FileNotFoundError:
-            continue  # it went while we looked
+            continue  # removed meanwhile
         name = plain(shown_name(path))
         if found.st_uid != os.getuid():
             yield OPEN_TO_OTHERS.at(None, f"'{name}' belongs to another user", help=f"chown $USER {name}")

@@ -38,7 +38,7 @@ Good: `rbxcompose down`, then `rbxcompose up`
 
 @examination
 def ports(facts: HostFacts) -> Iterator[str | Finding]:
-    """Look at the routers of robots that are up, and at the port that the named robot wants."""
+    """Check the routers of robots that are up, and the port that the named robot needs."""
     for one in facts.running:
         yield from _router(one, facts)
     names = {one.name for one in facts.running}

@@ -24,7 +24,7 @@ Good: `pip install -r requirements.lock`
 
 @examination
 def versions(facts: HostFacts) -> Iterator[str | Finding]:
-    """Compare what is installed with what is locked, if there is a lock."""
+    """Compare the installed versions with the locked ones, if there is a lock file."""
     wrong = [one for one in facts.versions if _is_wrong(one)]
     for one in wrong:
         there = f"{one.name} {one.installed} is installed" if one.installed else f"{one.name} is not installed"

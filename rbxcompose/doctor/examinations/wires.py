@@ -28,7 +28,7 @@ _MOST = 8  # names
 
 @examination
 def wires(facts: HostFacts) -> Iterator[str | Finding]:
-    """Report which ends of wires are alone on the bus of each robot."""
+    """Report the ends of wires that have no partner on the bus of each robot."""
     for one in facts.running:
         if one.bus is not None:
             yield from _of(one, [topic for topic in one.bus.graph.topics if not topic.is_hidden])

@@ -20,7 +20,7 @@ from rbxcompose.msgs import registry
 
 
 class CallTask(Leaf):
-    """Asks the world, and returns its answer."""
+    """Sends a request to the world, and returns its response."""
 
     __slots__ = ("message",)
 
@@ -29,7 +29,7 @@ class CallTask(Leaf):
         self.message = step.message
 
     def begin(self) -> int:
-        """Ask."""
+        """Send the request."""
         return self.ask()
 
     def ask(self) -> int:
@@ -71,7 +71,7 @@ class CallStep(LeafStep):
         return cls(reader.message(reader.key, "request"))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that the service may refuse."""
+        """Return that it may fail: the service may refuse."""
         return ANY
 
     def text(self, node: MissionNode) -> str:

@@ -18,7 +18,7 @@ from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
 
 
 class CheckTask(Task):
-    """Asks once."""
+    """Evaluates the condition once."""
 
     __slots__ = ("condition",)
 
@@ -27,7 +27,7 @@ class CheckTask(Task):
         self.condition = step.condition
 
     def begin(self) -> int:
-        """Ask."""
+        """Evaluate the condition."""
         return SUCCESS if holds(self.condition, self.scope) else FAILURE
 
 
@@ -56,5 +56,5 @@ class CheckStep(LeafStep):
         return cls(reader.condition(reader.key))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that either may come out."""
+        """Return that it may succeed or fail."""
         return ANY

@@ -1,4 +1,4 @@
-"""`choose`: one of several nodes, by a value."""
+"""`choose`: one of several nodes, depending on a value."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rbxcompose.missions.program.statuses import SKIPPED
 
 
 class ChooseTask(Task):
-    """Does what it has chosen."""
+    """Runs the chosen case."""
 
     __slots__ = ("choice", "chosen", "index")
     saved = ("index",)
@@ -28,16 +28,16 @@ class ChooseTask(Task):
         super().__init__(site)
         self.choice = step.choice
         self.chosen = site.children
-        self.index = -1  # of the child that was chosen
+        self.index = -1  # of the chosen child
 
     def begin(self) -> int:
-        """Choose, and start what was chosen."""
+        """Choose a case and start it."""
         if not (self.engine.places.kept and self.engine.places.take_up(self)):
             self.index = self._choose()
         return SKIPPED if self.index < 0 else self.proceed()
 
     def proceed(self) -> int:
-        """Continue with what was chosen."""
+        """Continue with the chosen case."""
         return self.advance(self.chosen[self.index])
 
     def _choose(self) -> int:
@@ -68,7 +68,7 @@ class ChooseStep(Choosing):
             log: Nothing to do in $room
     """
 
-    choice: BranchChoice = field()  # `else` is the child behind those of its cases
+    choice: BranchChoice = field()  # `else` is the child after those of the cases
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
@@ -81,10 +81,10 @@ class ChooseStep(Choosing):
 
     @property
     def ways(self) -> tuple[str, ...]:
-        """Return the cases, and what is done for all other values."""
+        """Return the cases, and `else` for all other values."""
         return (*(f"case {case.expression.text}" for case in self.choice.cases), "else")
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return what any case may do; a value that is not there is a failure."""
+        """Return the outcomes of all cases; a missing value is a failure."""
         found = ALWAYS_SUCCEEDS.both(either(map(endings.of, node.children)))
         return found.both(ALWAYS_FAILS) if node.asked else found

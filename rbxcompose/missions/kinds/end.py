@@ -26,7 +26,7 @@ class EndTask(Task):
         self.step = step
 
     def begin(self) -> int:
-        """End it; the run of the mission sees to that as soon as this tick is done."""
+        """Request the end of the run, which takes effect at the end of this tick."""
         message = self.run.filled(self.step.message, self.scope) if self.step.message else ""
         status = SUCCESS if self.step.result == SUCCEEDS else FAILURE
         if self.run.ending is None or (status, self.run.ending) == (FAILURE, SUCCESS):
@@ -65,7 +65,7 @@ class EndStep(Deed):
         return cls(result, reader.template("message") if reader.has("message") else None)
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that it never ends: the mission does."""
+        """Return no outcomes: the node never ends, the mission does."""
         return NEVER
 
     @property

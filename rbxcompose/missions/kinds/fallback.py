@@ -15,7 +15,7 @@ from rbxcompose.missions.program.statuses import SUCCESS
 
 
 class FallbackTask(InTurnTask):
-    """A list that a success ends."""
+    """A list that ends at the first success."""
 
     __slots__ = ()
     decides = SUCCESS

@@ -35,7 +35,7 @@ ALL, ANY = "all", "any"
 
 
 class ForTask(Task):
-    """Does the body with one item after the other."""
+    """Runs the body for one item after the other."""
 
     __slots__ = ("body", "did", "done", "failed", "left", "step", "taken", "view")
     saved = ("did", "done", "failed", "left", "taken")
@@ -47,14 +47,14 @@ class ForTask(Task):
         self.body = site.children[0]
         self.view: ItemScope = site.item
         self.step = step
-        self.left: list[Value] = []  # items that have not been taken
-        self.taken: Value = None  # the item that is being done
+        self.left: list[Value] = []  # items that have not been taken yet
+        self.taken: Value = None  # the current item
         self.done: list[Value] = []
         self.failed: list[Value] = []
         self.did = SKIPPED
 
     def begin(self) -> int:
-        """Read the list and begin with its first item, or with the one in which it was halted."""
+        """Read the list and begin with its first item, or with the one at which it was halted."""
         if self.engine.places.kept and self.engine.places.take_up(self):
             self.view.item = self.taken
             return self.proceed()
@@ -68,7 +68,7 @@ class ForTask(Task):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Continue with this item; the next one is for another tick."""
+        """Continue with this item; the next one starts in another tick."""
         status = self.advance(self.body)
         if status == RUNNING:
             return RUNNING
@@ -82,7 +82,7 @@ class ForTask(Task):
         return RUNNING
 
     def restart(self, target: Target) -> bool:
-        """Let the round of this loop begin again, if that is what is named."""
+        """Restart the current round of this loop, if that is the target."""
         if self.number == target.number and target.is_round:
             if self.current is not None:
                 body, self.current = self.current, None
@@ -91,7 +91,7 @@ class ForTask(Task):
         return super().restart(target)
 
     def restored(self) -> None:
-        """Show the item to the body."""
+        """Make the item visible to the body."""
         self.view.item = self.taken
 
     def result(self) -> Value:
@@ -99,7 +99,7 @@ class ForTask(Task):
         return {"done": list(self.done), "failed": list(self.failed)}
 
     def _decides(self, status: int) -> bool:
-        """Note the result of an item, and return whether it is that of the loop."""
+        """Record the result of an item, and return whether it decides the result of the loop."""
         if status == FAILURE:
             self.failed.append(self.taken)
             self.did = FAILURE
@@ -159,7 +159,7 @@ class ForTask(Task):
 )
 @dataclass(frozen=True, slots=True)
 class ForStep(Loop):
-    """Do the body for each item, which the body sees as `$item`.
+    """Do the body for each item of a list; the body reads the item by its `$name`.
 
     Example:
         do:
@@ -182,7 +182,7 @@ class ForStep(Loop):
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
-        """Read the item's name, `in`, `do` and what results mean."""
+        """Read the item's name, `in`, `do` and the options."""
         reader.item_name()
         items = reader.items("in")
         reader.child("do")
@@ -195,7 +195,7 @@ class ForStep(Loop):
         )
 
     def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
-        """Return the item, with the type that all items have."""
+        """Return the item's name, with the type that all items have."""
         if not node.item:
             return {}
         if isinstance(self.items, tuple):
@@ -205,34 +205,34 @@ class ForStep(Loop):
         return {node.item: TEXT if found.kind is TypeKind.MAP else found.entry}
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that it fails with its body, and may fail to read its list."""
+        """Return that it fails if its body fails or its list cannot be read."""
         if self.order == NEAREST or self.removes_done or not node.children or not self._is_read(endings.program):
             return ANYHOW
         return Outcomes(fails=endings.of(node.children[0]).plain.fails)
 
     def _is_read(self, program: Program) -> bool:
-        """Return whether what it goes through is there whatever happens."""
+        """Return whether its list can always be read."""
         if isinstance(self.items, tuple):
             return not any(item.names for item in self.items)
         written = self.items.tree.name if isinstance(self.items.tree, Variable) else ""
         return isinstance(constants_of(program, {}).get(written), list | tuple | Mapping)
 
     def endless(self, ends: Outcomes) -> None:
-        """Say nothing: every list has an end."""
+        """Return no advice: every list has an end."""
 
     def text(self, node: MissionNode) -> str:
-        """Return the item and what it goes through."""
+        """Return the item's name and the list."""
         items = ", ".join(asked.scalar.text for asked in node.asked[: node.own])
         return f"{node.item} in {items}" if items else node.item
 
     @property
     def reads(self) -> frozenset[str]:
-        """Return that the nearest item depends on where the robot is."""
+        """Return the robot's pose, if the nearest item comes first."""
         return frozenset({POSE}) if self.order == NEAREST else NOTHING
 
     @property
     def effects(self) -> NodeEffects:
-        """Return the data that it takes its items from, if it removes those that are done."""
+        """Return the data that holds its items, if it removes those that are done."""
         if not self.removes_done:
             return NO_EFFECTS
         tree = None if isinstance(self.items, tuple) else self.items.tree

@@ -1,4 +1,4 @@
-"""`if`: one node or another, by a condition."""
+"""`if`: one node or another, depending on a condition."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rbxcompose.missions.program.statuses import SKIPPED
 
 
 class IfTask(Task):
-    """Does what it has chosen."""
+    """Runs the chosen branch."""
 
     __slots__ = ("branches", "condition", "index")
     saved = ("index",)
@@ -27,16 +27,16 @@ class IfTask(Task):
         super().__init__(site)
         self.condition = step.condition
         self.branches = site.children
-        self.index = 0  # of the one that was chosen
+        self.index = 0  # of the chosen branch
 
     def begin(self) -> int:
-        """Choose, and start what was chosen."""
+        """Choose a branch and start it."""
         if not (self.engine.places.kept and self.engine.places.take_up(self)):
             self.index = 0 if holds(self.condition, self.scope) else 1
         return self.proceed() if self.index < len(self.branches) else SKIPPED
 
     def proceed(self) -> int:
-        """Continue with what was chosen."""
+        """Continue with the chosen branch."""
         return self.advance(self.branches[self.index])
 
 
@@ -69,6 +69,6 @@ class IfStep(Choosing):
         return cls(condition)
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return what either may do; a condition that cannot be asked is a failure."""
+        """Return the outcomes of both branches; a condition that cannot be evaluated is a failure."""
         found = ALWAYS_SUCCEEDS.both(either(map(endings.of, node.children)))
         return found if is_simple(node) else found.both(ALWAYS_FAILS)

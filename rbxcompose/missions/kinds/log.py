@@ -19,7 +19,7 @@ from rbxcompose.missions.program.statuses import SUCCESS
 
 
 class LogTask(Task):
-    """Says one line."""
+    """Writes one line."""
 
     __slots__ = ("step",)
 
@@ -28,7 +28,7 @@ class LogTask(Task):
         self.step = step
 
     def begin(self) -> int:
-        """Say it."""
+        """Write it."""
         self.engine.say(Logged(self.step.level, self.run.filled(self.step.template, self.scope)))
         return SUCCESS
 
@@ -55,5 +55,5 @@ class LogStep(Deed):
         return cls(reader.template(reader.key), reader.choice("level", LEVELS))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that only what it reads can fail."""
+        """Return that it fails only if it cannot read a value."""
         return ALWAYS_SUCCEEDS if is_sure(node, endings.program) else ANY

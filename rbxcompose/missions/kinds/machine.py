@@ -25,7 +25,7 @@ from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SKIPPE
 
 
 class MachineTask(WithHistory):
-    """Is in one of its states."""
+    """Runs one of its states at a time."""
 
     __slots__ = ("index", "is_first", "leads", "machine", "states")
     saved = ("index", "is_first")
@@ -37,10 +37,10 @@ class MachineTask(WithHistory):
         self.states = site.children
         self.leads = [site.engine.program.nodes[child].step.leads_to for child in site.node.children]
         self.index = 0
-        self.is_first = True  # it has not begun yet: it may be told in which state to do so
+        self.is_first = True  # it has not begun yet: a start state may be given to it
 
     def begin(self) -> int:
-        """Enter the first state, or the one in which it was halted."""
+        """Enter the start state, or the one in which it was halted."""
         if not (self.engine.places.kept and self.engine.places.take_up(self)):
             start = self.machine.start
             if self.is_first:
@@ -51,7 +51,7 @@ class MachineTask(WithHistory):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Continue with the state; the next one is for another tick."""
+        """Continue with the state; the next one starts in another tick."""
         self.engine.outcome = ""
         status = self.advance(self.states[self.index])
         if status == RUNNING:
@@ -75,7 +75,7 @@ class MachineTask(WithHistory):
         return SUCCESS if ends[to] == NAMES[SUCCESS] else FAILURE
 
     def _next(self, state: str, outcome: str, counts_as: str) -> str:
-        """Return where an outcome leads to: its own transition, else that of what it counts as."""
+        """Return the target of an outcome: of its own transition, else of the one for the result it counts as."""
         leads = self.leads[self.index]
         for key in (outcome, counts_as, "") if leads else ():
             if leads and key in leads.to:
@@ -117,7 +117,7 @@ class MachineStep(Loop):
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
-        """Read the states and what stands beside them."""
+        """Read the states and the keys beside them."""
         return cls(*read_machine(reader))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
@@ -128,7 +128,7 @@ class MachineStep(Loop):
         return Outcomes(FINISHED in reached, FAILED in reached, named)
 
     def endless(self, ends: Outcomes) -> Advice | None:
-        """Say what a machine without an end needs."""
+        """Return advice on a machine without an end."""
         advice = Advice("this machine never ends and never waits", "put a 'wait' into a state, or lead to an end")
         return None if ends.words else advice
 
@@ -145,7 +145,7 @@ class MachineStep(Loop):
 
 
 class StateTask(Task):
-    """The body of a state; its modifiers and hooks stand around it."""
+    """The body of a state; its modifiers and hooks surround it."""
 
     __slots__ = ("body",)
 
@@ -162,14 +162,14 @@ class StateTask(Task):
         return self.advance(self.body)
 
     def result(self) -> Value:
-        """Return what `save` keeps of the body."""
+        """Return the result of the body, which `save` keeps."""
         return self.body.result()
 
 
 @kind(STATE, StateTask, is_inner=True)
 @dataclass(frozen=True, slots=True)
 class StateStep(Straight):
-    """A state of a machine: its body, and where it leads to (None: its body never ends)."""
+    """A state of a machine: its body and its transitions (None: its body never ends)."""
 
     leads_to: Next | None = field()
 
@@ -179,9 +179,9 @@ class StateStep(Straight):
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
-        """Read the body and where it leads to."""
+        """Read the body and the transitions."""
         return cls(read_state(reader))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return how the body may end."""
+        """Return the outcomes of the body."""
         return endings.of(node.children[0]) if node.children else ANY

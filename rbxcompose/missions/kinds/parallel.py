@@ -23,7 +23,7 @@ PLAIN = {SUCCEEDS: SUCCEEDS, FAILS: FAILS}
 
 
 class ParallelTask(Task):
-    """Ticks all branches that have not ended, then judges."""
+    """Ticks all branches that have not ended, then decides the result."""
 
     __slots__ = ("branches", "children", "names", "results", "runs", "waits_for_all", "wanted")
     saved = ("names", "results", "runs", "wanted")
@@ -39,7 +39,7 @@ class ParallelTask(Task):
         self.wanted = (0, 0)  # how many must succeed, how many must fail; 0 for all
 
     def begin(self) -> int:
-        """Start all branches; after a deep history those that had not ended."""
+        """Start all branches; with a deep history, only those that had not ended."""
         if not (self.engine.places.kept and self.engine.places.take_up(self)):
             self.results = [IDLE] * len(self.children)
             self.names = [""] * len(self.children)
@@ -52,7 +52,7 @@ class ParallelTask(Task):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Tick every branch that has not ended, then judge."""
+        """Tick every branch that has not ended, then decide the result."""
         results, runs, engine = self.results, self.runs, self.engine
         for index, child in enumerate(self.children):
             if results[index] > RUNNING:
@@ -86,7 +86,7 @@ class ParallelTask(Task):
         return False
 
     def restart(self, target: Target) -> bool:
-        """Let what is named begin again in the branches that run."""
+        """Restart the target, if it is in a branch that runs."""
         for index, child in enumerate(self.children):
             if not self.runs[index]:
                 continue
@@ -115,7 +115,7 @@ class ParallelTask(Task):
         return SUCCESS if succeeded >= to_succeed else RUNNING
 
     def _name_outcome(self) -> None:
-        """Find the outcome by the conditions; without them it is that of the branch it ends with, or the plain one."""
+        """Set the outcome by the conditions; without any, take that of the `ends_with` branch, or the plain one."""
         branches = self.branches
         self.engine.outcome = self.names[branches.names.index(branches.ends_with)] if branches.ends_with else ""
         if not branches.outcomes:
@@ -129,7 +129,7 @@ class ParallelTask(Task):
         raise NodeFailed("none of its outcomes holds")
 
     def _many(self, written: Expression | str, what: str) -> int:
-        """Return the number of branches that is asked for; 0 for all of them."""
+        """Return the required number of branches; 0 for all of them."""
         if isinstance(written, str):
             return 0 if written == ALL else 1
         number = self.count_of(written, what)
@@ -151,7 +151,7 @@ class ParallelTask(Task):
 )
 @dataclass(frozen=True, slots=True)
 class ParallelStep(Straight):
-    """Do several nodes at the same time. Each tick ticks all that have not ended, then decides the result.
+    """Do several nodes at the same time. Each tick ticks those that have not ended, then decides the result.
 
     Example:
         do:
@@ -171,7 +171,7 @@ class ParallelStep(Straight):
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
-        """Read the branches, and what decides."""
+        """Read the branches, and the options that decide the result."""
         names = reader.branches()
         ends_with = reader.branch("ends_with", names) if reader.has("ends_with") else ""
         succeed_when = reader.count_or("succeed_when", (ALL, ANY)) if reader.has("succeed_when") else ALL
@@ -187,7 +187,7 @@ class ParallelStep(Straight):
         return frozenset(name.name for one in conditions for name in one.names).difference(self.branches.names)
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return the outcomes by conditions, else those of the branch it ends with, else the plain ones."""
+        """Return the outcomes by conditions, else those of the `ends_with` branch, else the plain ones."""
         branches = self.branches
         if branches.outcomes:
             return Outcomes(False, False, {one.name: PLAIN.get(one.name, "") for one in branches.outcomes})

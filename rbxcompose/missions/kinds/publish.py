@@ -53,7 +53,7 @@ class PublishStep(Deed):
         return cls(reader.message(reader.key, "message"))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that a value may be missing or may not fit."""
+        """Return that it may fail: a value may be missing or not fit."""
         return ANY
 
     def text(self, node: MissionNode) -> str:

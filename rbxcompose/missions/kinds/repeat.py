@@ -1,4 +1,4 @@
-"""`repeat`: the same again, a number of times or for ever."""
+"""`repeat`: the same node, a number of times or for ever."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCC
 
 
 class RepeatTask(Task):
-    """Does one round after the other."""
+    """Runs one round after the other."""
 
     __slots__ = ("body", "did", "due", "is_between", "left", "period", "step")
     saved = ("did", "due", "is_between", "left", "period")
@@ -54,7 +54,7 @@ class RepeatTask(Task):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Continue with this round; the next one is for another tick."""
+        """Continue with this round; the next one starts in another tick."""
         if self.is_between:
             if not self.engine.is_due(self.due):
                 return RUNNING
@@ -117,29 +117,29 @@ class RepeatStep(Loop):
         return cls(rounds, until, reader.duration("every") if reader.has("every") else None)
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that a loop for ever ends with a failure only."""
+        """Return the outcomes; an endless loop can only fail."""
         body = endings.of(node.children[0]).plain if node.children else ANY
         if self.rounds is None and self.until is None:
             return Outcomes(succeeds=False, fails=body.fails)
         return Outcomes(fails=body.fails) if self._is_counted(node) else ANY
 
     def _is_counted(self, node: MissionNode) -> bool:
-        """Return whether the number of rounds and the time of one are written out, and `until` can always be asked."""
+        """Return whether the number of rounds and their period are literals, and `until` can always be evaluated."""
         if not any(asked.expression.names for asked in node.asked):
             return True
         return is_simple(node) and all(one is None or isinstance(one.tree, Number) for one in (self.rounds, self.every))
 
     def endless(self, ends: Outcomes) -> Advice | None:
-        """Say what a loop for ever needs."""
+        """Return advice on an endless loop."""
         advice = Advice("this loop never waits", "give it 'every: 1 s', or a 'wait' in its body")
         return advice if self.rounds is None else None
 
     @property
     def waits(self) -> bool:
-        """Return that it waits between its rounds if they have a period."""
+        """Return whether it waits between its rounds, which takes a period."""
         return takes_time(self.every)
 
     @property
     def numbers(self) -> tuple[Counted, ...]:
-        """Return the number of rounds and the time of each."""
+        """Return the number of rounds and their period."""
         return Counted("'repeat'", self.rounds, 1), Counted("'every'", self.every, 0)

@@ -1,4 +1,4 @@
-"""`run`: a node that the mission's data hold."""
+"""`run`: a node stored in the mission's data."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rbxcompose.missions.program.results import NodeFailed
 
 
 class RunTask(Task):
-    """Does the node that its expression gives."""
+    """Runs the node that its expression yields."""
 
     __slots__ = ("children", "expression", "index", "keys")
     saved = ("index",)
@@ -32,7 +32,7 @@ class RunTask(Task):
         self.children = site.children
         nodes = site.engine.program.nodes
         self.keys = {nodes[child].held: index for index, child in enumerate(site.node.children)}
-        self.index = 0  # of the child that is done
+        self.index = 0  # of the child that runs
 
     def begin(self) -> int:
         """Look the node up, and start it."""
@@ -44,7 +44,7 @@ class RunTask(Task):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Continue with it."""
+        """Continue with the node."""
         return self.advance(self.children[self.index])
 
 
@@ -73,11 +73,11 @@ class RunStep(Straight):
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
-        """Read the expression; the nodes that it may give are read from the data."""
+        """Read the expression, and the nodes in the data that it may yield."""
         expression = reader.expression(reader.key, UNKNOWN, "data that hold a node, such as '$chore'")
         reader.held(expression)
         return cls(expression)
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return what any of the nodes in the data may do; it fails where there is none."""
+        """Return the outcomes of all these nodes; it fails if the data have no node there."""
         return either([ALWAYS_FAILS, *map(endings.of, node.children)]) if node.children else ANY

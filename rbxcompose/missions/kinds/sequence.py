@@ -11,7 +11,7 @@ from rbxcompose.missions.program.statuses import FAILURE
 
 
 class SequenceTask(InTurnTask):
-    """A list that a failure ends."""
+    """A list that ends at the first failure."""
 
     __slots__ = ()
     decides = FAILURE

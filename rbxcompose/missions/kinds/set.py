@@ -19,7 +19,7 @@ from rbxcompose.missions.program.statuses import SUCCESS
 
 
 class SetTask(Task):
-    """Sets once."""
+    """Sets the data once."""
 
     __slots__ = ("assignments",)
 
@@ -28,7 +28,7 @@ class SetTask(Task):
         self.assignments = step.assignments
 
     def begin(self) -> int:
-        """Set."""
+        """Set the data."""
         assign(self.assignments, self)
         return SUCCESS
 
@@ -56,14 +56,14 @@ class SetStep(Deed):
         return cls(reader.assignments(reader.key))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that only what it reads can fail."""
+        """Return that it fails only if it cannot read a value."""
         return ALWAYS_SUCCEEDS if is_sure(node, endings.program) else ANY
 
     def text(self, node: MissionNode) -> str:
-        """Return what is set."""
+        """Return the assignments as text."""
         return ", ".join(f"{one.name} = {one.asked.scalar.text}" for one in self.assignments)
 
     @property
     def effects(self) -> NodeEffects:
-        """Return what is set."""
+        """Return the assignments."""
         return NodeEffects(assignments=self.assignments)

@@ -25,7 +25,7 @@ from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SUCCES
 
 
 class SkillTask(Leaf):
-    """A leaf that asks a skill of the robot."""
+    """A leaf that runs a skill of the robot."""
 
     __slots__ = ("arguments", "getters", "skill", "started")
     saved = (*Leaf.saved, "arguments", "started")
@@ -41,12 +41,12 @@ class SkillTask(Leaf):
         self.started = 0.0  # [s] of robot time
 
     def begin(self) -> int:
-        """Compute the arguments and ask."""
+        """Compute the arguments and start the skill."""
         self.arguments = {name: get(self) for name, get in self.getters.items()}
         return self.ask()
 
     def ask(self) -> int:
-        """Start the skill; it is asked again after a pause."""
+        """Start the skill; this happens again after a pause."""
         self.started, self.status = self.engine.now, RUNNING
         self.engine.say(SkillStarted(self.number, self.skill.name, self.arguments))
         self.is_asked = True
@@ -64,7 +64,7 @@ class SkillTask(Leaf):
         self.say_ended(self.outcome or NAMES[self.status], message)
 
     def judged(self, result: Result) -> tuple[int, str, str]:
-        """Return what the outcome counts as; one that the skill did not declare is a failure."""
+        """Return what the outcome counts as; an undeclared one is a failure."""
         outcome = result.outcome
         if outcome in ("", SUCCEEDS, FAILS):
             return super().judged(result)
@@ -89,13 +89,13 @@ class SkillTask(Leaf):
         return any(one.number <= self.number < nodes[one.number].end for one in self.engine.restarting)
 
     def stop(self) -> None:
-        """Stop what the world is at."""
+        """Stop the skill in the world."""
         if self.is_asked:
             self.say_ended("halted", self.engine.because)
         super().stop()
 
     def say_ended(self, result: str, message: str) -> None:
-        """Say how it ended, and how long it took."""
+        """Report how it ended and how long it took."""
         self.engine.say(SkillEnded(self.number, self.skill.name, result, self.engine.now - self.started, message))
 
 
@@ -124,7 +124,7 @@ class SkillStep(LeafStep):
         return self.skill
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return what the robot declares."""
+        """Return the outcomes that the robot declares."""
         skill = endings.robot.skills.get(self.skill)
         return Outcomes(named=skill.outcomes) if skill else ANY
 

@@ -40,7 +40,7 @@ class UseTask(WithHistory):
         self.getters = {one.name: getter(one.value, inputs[one.name].type) for one in step.arguments}
 
     def begin(self) -> int:
-        """Start the mission; with a deep history, with its data and at its place."""
+        """Start the mission; with a deep history, restore its data and continue where it was."""
         self.outputs = {}
         if self.engine.places.kept and self.engine.places.take_up(self) and self.inner.begun:
             self.inner.begin_again()
@@ -60,14 +60,14 @@ class UseTask(WithHistory):
         return status
 
     def halt(self) -> None:
-        """Stop the mission; with `last` its main node keeps its place, and the mission begins with fresh data."""
+        """Stop the mission; with `last` its main node keeps its place, and the next start has fresh data."""
         super().halt()
         if self.history == LAST:
             self.engine.places.kept.discard(self)
             self.engine.places.kept.update(self.inner.main_tasks())
 
     def halt_below(self) -> None:
-        """Stop what runs in the mission."""
+        """Stop all that runs in the mission."""
         self.inner.halt()
 
     def suspend(self, from_start: bool) -> bool:
@@ -76,7 +76,7 @@ class UseTask(WithHistory):
         return False
 
     def restart(self, target: Target) -> bool:
-        """Nothing in another mission can be named."""
+        """Return false: no node of another mission can be named."""
         return False
 
     def result(self) -> Value:
@@ -109,7 +109,7 @@ class UseTask(WithHistory):
 class UseStep(Straight):
     """Run another mission of the robot; its outputs can be kept with `save`.
 
-    It sees the robot's values and places, and of this mission only what `with` gives it.
+    It sees the robot's values and places, but of this mission only the values in `with`.
 
     Example:
         do:
@@ -138,9 +138,9 @@ class UseStep(Straight):
         return cls(name, arguments, read_history(reader))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return how the mission may end."""
+        """Return the outcomes of the mission."""
         return endings.of_mission(self.uses.text)
 
     def text(self, node: MissionNode) -> str:
-        """Return the mission."""
+        """Return the name of the mission."""
         return self.uses.text

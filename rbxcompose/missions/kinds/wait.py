@@ -34,14 +34,14 @@ class WaitTask(Task):
         return self.proceed()
 
     def proceed(self) -> int:
-        """See whether the time has come."""
+        """Succeed once the deadline has come."""
         return SUCCESS if self.engine.is_due(self.deadline) else RUNNING
 
 
 @kind("wait", WaitTask)
 @dataclass(frozen=True, slots=True)
 class WaitStep(LeafStep):
-    """Succeed after a time; after an interrupt it continues with the rest.
+    """Succeed after a time; after an interrupt, only the rest of it remains.
 
     Example:
         do:
@@ -62,10 +62,10 @@ class WaitStep(LeafStep):
         return cls(reader.duration(reader.key))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that a time that is written out can be waited for."""
+        """Return that it always succeeds if the duration is a literal."""
         return ALWAYS_SUCCEEDS if isinstance(self.lasts.tree, Number) else ANY
 
     @property
     def numbers(self) -> tuple[Counted, ...]:
-        """Return its time."""
+        """Return the duration."""
         return (Counted("a wait", self.lasts, 0),)

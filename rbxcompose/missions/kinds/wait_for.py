@@ -20,7 +20,7 @@ from rbxcompose.missions.program.statuses import IDLE, RUNNING, SUCCESS
 
 
 class WaitForTask(Task):
-    """Asks whenever the answer may have changed."""
+    """Evaluates the condition whenever its value may have changed."""
 
     __slots__ = ("watched",)
 
@@ -29,18 +29,18 @@ class WaitForTask(Task):
         self.watched = Watched.of(step.condition)
 
     def begin(self) -> int:
-        """Ask for the first time."""
+        """Evaluate the condition for the first time."""
         return self.proceed()
 
     def proceed(self) -> int:
-        """Ask again."""
+        """Evaluate the condition again."""
         if holds(self.watched.condition, self.scope):
             return SUCCESS
         self.engine.watch(self.watched)
         return RUNNING
 
     def suspend(self, from_start: bool) -> bool:
-        """There is nothing to stop; after an interrupt it starts again."""
+        """Return whether it starts again; there is nothing to stop."""
         if from_start:
             self.statuses[self.number] = IDLE
         return from_start
@@ -71,5 +71,5 @@ class WaitForStep(LeafStep):
         return cls(reader.condition(reader.key))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that only a condition which cannot be asked is a failure."""
+        """Return that it succeeds; only a condition that cannot be evaluated is a failure."""
         return ALWAYS_SUCCEEDS if is_simple(node) else ANY

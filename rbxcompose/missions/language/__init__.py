@@ -1,1 +1,1 @@
-"""The language of missions: places of its grammar, and from the located tree to a program."""
+"""The language of missions: the places of its grammar, and reading a located tree into a program."""

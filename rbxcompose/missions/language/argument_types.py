@@ -1,4 +1,4 @@
-"""Whether what was written for a typed argument or input can be of that type."""
+"""Checks that the value of a typed argument or input can be of that type."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rbxcompose.missions.language.spans import expression_of, inner_span
 
 
 def check_written(view: View, scalar: ScalarNode, wanted: Type, kind: FindingKind) -> Iterator[Finding]:
-    """Yield what is wrong with a value for a type; one of the wrong type is of the given kind."""
+    """Yield the findings on a value that must have a type; a wrong type is a finding of the given kind."""
     try:
         if wanted.kind is not TypeKind.TEXT:
             yield from view.typed(expression_of(scalar), wanted, scalar, kind)

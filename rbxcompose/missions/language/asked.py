@@ -1,4 +1,4 @@
-"""The contents of a node as written: expressions with their types, what is set, what is given."""
+"""The contents of a node as written: expressions with their types, assignments, arguments."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from rbxcompose.manifest.tree import ScalarNode, TreeNode
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """An expression of a node, the type that its value must have, and the scalar that it stands in.
+    """An expression of a node, the type that its value must have, and the scalar that contains it.
 
-    One that is assigned must have the type of its datum.
+    If its value is assigned, it must have the type of the datum.
     """
 
     expression: Expression
@@ -34,7 +34,7 @@ class Assignment:
 
 @dataclass(frozen=True, slots=True)
 class WrittenArgument:
-    """An argument of a skill or a mission as written; what it means depends on that. The main one has no name."""
+    """An argument of a skill or a mission as written; its type depends on these. The main one has no name."""
 
     name: str
     value: TreeNode

@@ -1,4 +1,4 @@
-"""The places of a mission's grammar: what may be at each, for the slips that are recognised there."""
+"""The places of a mission's grammar: what each takes, for the slips that are recognised there."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import NamedTuple
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import BROKEN, Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 
-LEVELS = 40  # of steps within steps
-LIST = "sequence"  # what a list is
-EACH = "*"  # stands for every key of a map and every item of a list
+LEVELS = 40  # of nested steps
+LIST = "sequence"  # the kind of a bare list
+EACH = "*"  # means every key of a map and every item of a list
 
 
 class Takes(StrEnum):
@@ -40,14 +40,14 @@ class Takes(StrEnum):
 
 
 class KeySlot(NamedTuple):
-    """What the value of a key takes; `choices` are words that may stand in its place."""
+    """What a key takes as its value; `choices` are words that it takes instead."""
 
     takes: Takes
     choices: tuple[str, ...] = ()
 
 
 STEP = KeySlot(Takes.STEP)
-# What stands below each place, by its key. What the keys of a step take, its kind and its modifiers tell.
+# What each place takes below it, by key. What the keys of a step take is up to its kind and its modifiers.
 BELOW: Mapping[Takes, Mapping[str, KeySlot]] = {
     Takes.MISSION: {"do": STEP, "machine": KeySlot(Takes.MACHINE), "interrupts": KeySlot(Takes.INTERRUPTS)},
     Takes.INTERRUPTS: {EACH: KeySlot(Takes.INTERRUPT)},
@@ -64,30 +64,30 @@ BELOW: Mapping[Takes, Mapping[str, KeySlot]] = {
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """The words that mean something in a mission: of the language, and the skills of the robot as far as known."""
+    """The words with a meaning in a mission: those of the language, and the robot's skills as far as known."""
 
-    kinds: Mapping[str, Mapping[str, KeySlot]]  # what the keys of each kind of step take, its own word among them
-    modifiers: Mapping[str, KeySlot]  # of any step, `name` among them
+    kinds: Mapping[str, Mapping[str, KeySlot]]  # what the keys of each kind of step take, including its word
+    modifiers: Mapping[str, KeySlot]  # of any step, including `name`
     skills: Collection[str] = ()
 
     def is_step(self, word: str) -> bool:
-        """Return whether a word is that of a kind, or a skill of the robot."""
+        """Return whether a word is that of a kind or the name of a skill of the robot."""
         return word in self.kinds or word in self.skills
 
     def is_option(self, key: str) -> bool:
-        """Return whether some kind has a key of this name beside its word."""
+        """Return whether any kind has a key of this name beside its word."""
         return bool(self.owners(key))
 
     def owners(self, key: str) -> str:
-        """Return, for people, the kinds that have such a key beside their word; nothing if there are none."""
+        """Return in words the kinds that have such a key beside their word; empty if there are none."""
         return " and ".join(f"'{kind}'" for kind, slots in self.kinds.items() if key in slots and key != kind)
 
     def own(self, step: MappingNode) -> list[str]:
-        """Return the keys of a step that not every step may have."""
+        """Return the keys of a step except those that every step may have."""
         return [key for key in step.entries if key not in self.modifiers]
 
     def kind_of(self, step: MappingNode) -> str:
-        """Return the word of the kind of a step; nothing for a skill. `if` beside another step is no step."""
+        """Return the word of a step's kind; empty for a skill. `if` beside another step is no step."""
         own = self.own(step)
         found = (key for key in own if key in self.kinds and (key != "if" or "then" in step or own[0] == key))
         return next(found, "")
@@ -95,7 +95,7 @@ class Words:
 
 @dataclass(frozen=True, slots=True)
 class GrammarPlace:
-    """A place of the grammar: what it takes, and the key behind which it stands."""
+    """A place of the grammar: what it takes, and the key in front of it."""
 
     takes: Takes
     key: ScalarNode
@@ -120,18 +120,18 @@ def is_empty(node: TreeNode) -> bool:
 
 
 def told(span: Span) -> ScalarNode:
-    """Return what stands for a value of which all was said."""
+    """Return a placeholder for a value that needs no further finding."""
     return ScalarNode("", span, filled=BROKEN)
 
 
 def without_word(step: MappingNode, words: Words) -> MappingNode:
-    """Return a step of whose word all was said: what is left of it are its modifiers."""
+    """Return a step reduced to its modifiers; its word needs no further finding."""
     left = {key: entry for key, entry in step.entries.items() if key in words.modifiers}
     return MappingNode({"": Entry(told(step.span), told(step.span)), **left}, step.span)
 
 
 def is_told(node: TreeNode | None) -> bool:
-    """Return whether all was said of a value, or of the word of a step."""
+    """Return whether a value, or the word of a step, needs no further finding."""
     if isinstance(node, MappingNode) and "" in node:
         node = node.entries[""].key
     return isinstance(node, ScalarNode) and node.filled is BROKEN

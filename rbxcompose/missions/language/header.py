@@ -1,4 +1,4 @@
-"""What a mission has besides its nodes: its inputs, its data, its rate."""
+"""The parts of a mission besides its nodes: its inputs, its data, its rate."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def read_inputs(node: TreeNode | None, report: Report) -> dict[str, Input]:
 
 
 def read_rate(node: TreeNode | None, report: Report) -> float:
-    """Return how often conditions are asked that nothing announces [Hz]."""
+    """Return how often conditions are evaluated whose changes nothing announces [Hz]."""
     rate = _value(node, TYPES["frequency"], "'rate'", report) if node else None
     if not rate or not isinstance(rate.value, float):
         return RATE
@@ -43,7 +43,7 @@ def read_rate(node: TreeNode | None, report: Report) -> float:
 
 
 def _named(node: TreeNode | None, section: str, report: Report) -> dict[str, Entry]:
-    """Return the entries of a section whose names may stand in expressions."""
+    """Return the entries of a section whose names may be used in expressions."""
     if node is None or (isinstance(node, ScalarNode) and node.plain and not node.text):
         return {}
     if not isinstance(node, MappingNode):
@@ -111,7 +111,7 @@ def _number(datum: Datum | None) -> float | None:
 
 
 def range_trouble(declared: Input, given: Datum) -> str:
-    """Return why a value is out of the range of its input, in words after its name; else nothing."""
+    """Return why a value is out of the range of its input, as words that follow its name; else nothing."""
     value = given.value
     if not isinstance(value, float):
         return ""

@@ -1,4 +1,4 @@
-"""Which key of a step says what it is: the word of a kind, or the name of a skill."""
+"""Finds the key that says what a step is: the word of a kind, or the name of a skill."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def anywhere() -> tuple[str, ...]:
 
 
 def find_key(step: MappingNode, nodes: Nodes) -> tuple[str, StepType | None]:
-    """Return the key of a step and its kind; None for a skill, an empty key and a finding if there is neither."""
+    """Return the key of a step and its kind, None for a skill; if there is neither, an empty key, with a finding."""
     if is_told(step):
         return "", None
     own = [key for key in step.entries if key not in anywhere()]

@@ -1,4 +1,4 @@
-"""What the keys of steps take: runs the code that reads a kind on a reader that records what it reads."""
+"""What the keys of steps take, found by running the code that reads each kind on a recording reader."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rbxcompose.missions.program.registry import StepType, kinds
 
 
 class Nobody:
-    """Takes what a reader would hand on: there is nothing to be read."""
+    """Ignores whatever a reader hands on: there is nothing to read."""
 
     def child(self, node: TreeNode, step: str, parent: int) -> int:
         """Give every node the same number."""
@@ -29,48 +29,48 @@ class Nobody:
         """Note nothing."""
 
     def held(self, expression: Expression, parent: int) -> list[int]:
-        """Find nothing."""
+        """Return no nodes."""
         return []
 
     def add(self, finding: Finding) -> None:
-        """Drop it: an empty mapping lacks everything."""
+        """Drop the finding: an empty mapping lacks everything."""
 
 
 class _Asking(NodeReader):
-    """A reader that has every key and no value, and keeps what each would take."""
+    """A reader that claims to have every key but has no values, and records what each key takes."""
 
     def __init__(self, key: str) -> None:
         super().__init__(MappingNode(), key, 0, Nobody())
         self.slots: dict[str, KeySlot] = {}
 
     def has(self, key: str) -> bool:
-        """Say yes, so that everything is asked for."""
+        """Return true, so that every key is requested."""
         return True
 
     def take(self, key: str, takes: Takes = Takes.OTHER, choices: tuple[str, ...] = ()) -> TreeNode | None:
-        """Note what a key takes; what it is asked for first says most of it."""
+        """Record what a key takes; the first request says the most."""
         self.slots.setdefault(key, KeySlot(takes, choices))
         return None
 
 
 def words(skills: frozenset[str] = frozenset()) -> Words:
-    """Return the words that mean something in the missions of a robot with these skills."""
+    """Return the words with a meaning in the missions of a robot with these skills."""
     return _words(_known(), skills)
 
 
 def step_slots(kind: str) -> Mapping[str, KeySlot]:
-    """Return what the keys of a step of a kind take, with its modifiers; of a skill, if it is of none."""
+    """Return what the keys of a step of this kind take, modifiers included; for no kind, those of a skill."""
     return _step_slots(_known(), kind)
 
 
 def _known() -> tuple[StepType, ...]:
-    """Return the kinds there are now: tests add some and take them out again."""
+    """Return the kinds that exist now: tests add some and remove them again."""
     return tuple(kinds().values())
 
 
 @cache
 def _kind_slots(known: tuple[StepType, ...]) -> Mapping[str, Mapping[str, KeySlot]]:
-    """Return what the keys of each kind of step take, its word among them."""
+    """Return what the keys of each kind of step take, including its word."""
     found = {}
     for kind in known:
         asking = _Asking(kind.name)
@@ -81,7 +81,7 @@ def _kind_slots(known: tuple[StepType, ...]) -> Mapping[str, Mapping[str, KeySlo
 
 @cache
 def _modifier_slots() -> Mapping[str, KeySlot]:
-    """Return what the keys of all modifiers take, those of states among them."""
+    """Return what the keys of all modifiers take, including those of states."""
     found: dict[str, KeySlot] = {"name": KeySlot(Takes.OTHER)}
     for name, cls in modifiers().items():
         asking = _Asking(name)
@@ -102,5 +102,5 @@ def _step_slots(known: tuple[StepType, ...], kind: str) -> Mapping[str, KeySlot]
 
 @cache
 def state_slots() -> Mapping[str, KeySlot]:
-    """Return what the keys of a state take, with its modifiers."""
+    """Return what the keys of a state take, modifiers included."""
     return {**_modifier_slots(), **BELOW[Takes.STATE]}

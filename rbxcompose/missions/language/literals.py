@@ -1,4 +1,4 @@
-"""Values that are written down in a manifest: free ones (data) and ones of a declared type (inputs)."""
+"""Literal values in a manifest: of any type (data) and of a declared type (inputs)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rbxcompose.units import NUMBER, Quantity, UnitError, parse_quantity, to_si
 
 
 class WrongValue(ValueError):  # noqa: N818 - a user's mistake, told apart from errors of ours
-    """Raised when a value is not of its type; `label` says what it is instead, `help` what to do."""
+    """Raised when a value does not have its type; `label` says what it is instead, `help` what to do."""
 
     def __init__(self, message: str, *, label: str = "", help: str = "") -> None:
         super().__init__(message)
@@ -34,7 +34,7 @@ class WrongValue(ValueError):  # noqa: N818 - a user's mistake, told apart from 
 
 
 def literal(node: TreeNode) -> Datum:
-    """Return what a node writes down: a number in SI, a flag, a text, a list or a map of these."""
+    """Return the literal in a node: a number in SI, a flag, a text, a list or a map of these."""
     match node:
         case MappingNode(entries=entries):
             values = {name: literal(entry.value) for name, entry in entries.items()}
@@ -48,10 +48,10 @@ def literal(node: TreeNode) -> Datum:
 
 
 def typed(node: TreeNode, wanted: Type) -> Datum:
-    """Return what a node writes down, as a value of the type `wanted`; places stay texts.
+    """Return the literal in a node as a value of the type `wanted`; places stay texts.
 
     Raises:
-        WrongValue: if it is none.
+        WrongValue: if it does not have that type.
     """
     if wanted.kind in (TypeKind.LIST, TypeKind.MAP):
         found = literal(node)

@@ -21,7 +21,7 @@ RESULTS = (NAMES[SUCCESS], NAMES[FAILURE])
 
 
 def read_machine(reader: NodeReader) -> tuple[MachineStates, str]:
-    """Read the map below `machine`: the first state, the states and ends; and the history."""
+    """Read the map below `machine`: the start state, the states and ends, and the history."""
     value = reader.map_of(reader.key, "'start' and 'states' below it", Takes.MACHINE)
     if value is None:
         return MachineStates(), NO_HISTORY
@@ -48,7 +48,7 @@ def read_machine(reader: NodeReader) -> tuple[MachineStates, str]:
 
 
 def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:
-    """Read the ends with what each counts as; `finished` and `failed` are always there."""
+    """Read the ends and what each counts as; `finished` and `failed` always exist."""
     value = inner.mapping.get("ends")
     if value is None:
         return ENDS
@@ -71,7 +71,7 @@ def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:
 
 
 def read_state(reader: NodeReader) -> Next | None:
-    """Read the body of a state and where it leads to."""
+    """Read the body of a state and return its transitions."""
     bodies = [key for key in BODIES if reader.has(key)]
     if len(bodies) == len(BODIES):
         reader.add(codes.WRONG_SHAPE.at(reader.key_span("machine"), "a state has 'do' or 'machine', not both"))
@@ -90,7 +90,7 @@ def _next(reader: NodeReader) -> Next | None:
     if value is None:
         return None
     if is_told(value):
-        return Next(dict(zip(RESULTS, ENDS, strict=True)))  # so that nothing else is said of where it leads
+        return Next(dict(zip(RESULTS, ENDS, strict=True)))  # so that there are no further findings on its transitions
     if isinstance(value, ScalarNode) and value.text:
         return Next({"": value.text}, {"": value.span})
     if not isinstance(value, MappingNode) or not value.entries:
@@ -112,5 +112,5 @@ def _next(reader: NodeReader) -> Next | None:
 
 
 def as_state(entry: Entry) -> MappingNode:
-    """Return the mapping of a state, also if it was written wrongly."""
+    """Return the mapping of a state, even if it was written wrongly."""
     return entry.value if isinstance(entry.value, MappingNode) else MappingNode({}, entry.key.span)

@@ -1,4 +1,4 @@
-"""Names in missions: what may be one, and what to write in the place of a text that may not."""
+"""Names in missions: which texts are valid, and what to write instead of an invalid one."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _BETWEEN = re.compile(r"[\s-]+")
 
 
 def cure(text: str) -> str:
-    """Return the name that a text was meant to be: `go_home` for `Go home`; nothing if that is not clear."""
+    """Return the name that a text was meant to be, `go_home` for `Go home`; empty if that is not clear."""
     meant = _BETWEEN.sub("_", text.strip()).lower()
     return meant if NAME.fullmatch(meant) else ""
 
 
 def no_name(scalar: ScalarNode, fix: Fix | None = None) -> Finding:
-    """Return the finding about a text that stands where a name should."""
+    """Return the finding on a text that is not a valid name."""
     meant = cure(scalar.text)
     help_text = f"write '{meant}': names have lower-case letters, digits and underscores" if meant else NAME_HELP
     return codes.WRONG_SHAPE.at(scalar.span, f"'{scalar.text}' is not a valid name", help=help_text, fix=fix)

@@ -1,4 +1,4 @@
-"""Reads the values and options of one mission node; each kind reads what belongs to it."""
+"""Reads the values and options of one mission node; each kind reads its own."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rbxcompose.missions.program.moments import DEEDS, LEVELS, OPTIONS, Deeds, M
 
 
 class NodeReader(ValueReader):
-    """One mapping of a mission, being read, with the nodes below it."""
+    """Reads one mapping of a mission, with the nodes below it."""
 
     def __init__(self, mapping: MappingNode, key: str, number: int, nodes: Nodes) -> None:
         super().__init__(mapping, key, nodes)
@@ -29,7 +29,7 @@ class NodeReader(ValueReader):
         self.item = ""
 
     def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> MappingNode | None:
-        """Return an option that must be a map with entries; None, and a finding, if it is not."""
+        """Return an option that must be a map with entries; None, with a finding, if it is not."""
         value = self.take(key, takes)
         if isinstance(value, MappingNode) and value.entries:
             return value
@@ -38,7 +38,7 @@ class NodeReader(ValueReader):
         return None
 
     def inside(self, mapping: MappingNode, keys: Iterable[str], what: str) -> NodeReader:
-        """Return a reader of a map below this node; keys that do not belong to it are findings."""
+        """Return a reader of a map below this node; unknown keys are findings."""
         for key, entry in mapping.entries.items():
             if key not in keys:
                 message, of = f"unknown key '{key}' in {what}", f"keys of {what}"
@@ -47,7 +47,7 @@ class NodeReader(ValueReader):
         return NodeReader(mapping, self.key, self.number, self.nodes)
 
     def child_node(self, node: TreeNode, step: str) -> None:
-        """Read a node that belongs to this one."""
+        """Read a child of this node."""
         self.children.append(self.nodes.child(node, step, self.number))
 
     def state(self, name: str, entry: Entry) -> None:
@@ -55,11 +55,11 @@ class NodeReader(ValueReader):
         self.children.append(self.nodes.state(name, entry, self.number))
 
     def held(self, expression: Expression) -> None:
-        """Read the nodes in the data that an expression may give."""
+        """Read the nodes in the data that an expression may yield."""
         self.children.extend(self.nodes.held(expression, self.number))
 
     def branches(self) -> tuple[str, ...]:
-        """Read the branches of a parallel: a list, or a map, of which the names are returned."""
+        """Read the branches of a parallel, a list or a map, and return the names in a map."""
         value = self.take(self.key, Takes.BRANCHES)
         if not isinstance(value, MappingNode):
             self._list(value)
@@ -82,17 +82,17 @@ class NodeReader(ValueReader):
             if expression is not None:
                 read.append(Asked(expression, UNKNOWN, entry.key))
                 self.child_node(entry.value, name)
-        self.asked.extend(asked for asked in read if asked.expression.names)  # a bare word need be no place
+        self.asked.extend(asked for asked in read if asked.expression.names)  # a bare word need not be a place
         return tuple(read)
 
     def asked_later(self, mapping: MappingNode, key: str) -> Asked | None:
-        """Read a condition whose names only its kind knows, so that the kind has to check it."""
+        """Read a condition whose names only the kind knows; the kind has to check it."""
         reader = NodeReader(mapping, key, self.number, self.nodes)
         reader.condition(key)
         return reader.asked[0] if reader.asked else None
 
     def message(self, target: str, body: str) -> MessageTemplate:
-        """Read where a message goes, and what is in it."""
+        """Read the target and the contents of a message."""
         scalar = self.scalar(target, "the name of a topic or a service")
         value = self.mapping.get(body)
         shape = None if value is None else self._shape(value)
@@ -100,7 +100,7 @@ class NodeReader(ValueReader):
         return MessageTemplate(scalar or ScalarNode("", self.key_span(target)), shape, keys)
 
     def moments(self, keys: Iterable[str]) -> Moments:
-        """Read hooks: what is set, logged or published at some moments."""
+        """Read hooks: what is set, logged or published at these moments."""
         return Moments({key: self._deeds(key) for key in keys if self.has(key)})
 
     def _deeds(self, key: str) -> Deeds:
@@ -141,7 +141,7 @@ class NodeReader(ValueReader):
             return Template(scalar.text, (scalar.text,))
 
     def child(self, key: str) -> None:
-        """Read the node under a key, which must be there."""
+        """Read the node under a key, which is required."""
         value = self.take(key, Takes.STEP)
         if value is None or (isinstance(value, ScalarNode) and value.plain and not value.text):
             span = self.key_span(key) if value else self.span
@@ -161,13 +161,13 @@ class NodeReader(ValueReader):
             self.add(codes.MISSING.at(value.span, f"'{self.key}' needs at least one step"))
 
     def item_name(self) -> None:
-        """Read the name that the nodes below give to a loop's item."""
+        """Read the name under which the nodes below see a loop's item."""
         scalar = self.scalar(self.key, "a name for the item", Takes.ITEM_NAME)
         if scalar and self.check_name(scalar):
             self.item = scalar.text
 
     def items(self, key: str) -> Expression | tuple[Expression, ...]:
-        """Read a list that is written out, or an expression that gives one (of a map: its keys)."""
+        """Read a literal list, or an expression that yields one (for a map: its keys)."""
         value = self.take(key, Takes.ITEMS)
         if not isinstance(value, SequenceNode):
             expression = self.expression(key, UNKNOWN, "a list")

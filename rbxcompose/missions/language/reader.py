@@ -31,10 +31,10 @@ INTERRUPT_KEYS = ("when", "do", "afterwards")
 
 
 def read_program(root: MappingNode, report: Report, skills: Collection[str] = ()) -> Program | None:
-    """Return the program of a mission file, None if it has nothing to do; `skills` are the robot's, if known.
+    """Return the program of a mission file, None if it has no body; `skills` are the robot's, if known.
 
-    What could not be read is left out of the program, so that the rest can be checked; it may run only if the report
-    has no errors.
+    Parts that could not be read are missing from the program, so that the rest can be checked; it may run only if the
+    report has no errors.
     """
     repairs = Repairs.of(report, skills)
     whole, root = root, repairs.mission(root)
@@ -68,7 +68,7 @@ def read_program(root: MappingNode, report: Report, skills: Collection[str] = ()
 
 
 def _body(root: MappingNode, report: Report) -> TreeNode | None:
-    """Return what a mission does: the node under `do`, or a machine."""
+    """Return the body of a mission: the node under `do`, or a machine."""
     bodies = [key for key in BODIES if root.get(key) is not None]
     if not bodies:
         report.add(codes.MISSING.at(root.span, "a mission needs 'do' (or 'machine'): what to do"))
@@ -88,18 +88,18 @@ def _text(root: MappingNode, key: str) -> str:
 
 
 class _Reader:
-    """Numbers the nodes in the order of the text, and keeps where it is."""
+    """Numbers the nodes in the order of the text, and keeps track of its position."""
 
     def __init__(self, report: Report, root: MappingNode, repairs: Repairs) -> None:
         self.report = report
         self.repairs = repairs
         data = root.get("data")
         self.data = {name: entry.value for name, entry in data.entries.items()} if isinstance(data, MappingNode) else {}
-        self.patterns: dict[str, PathPattern] = {}  # where in the data the items of loops stand
+        self.patterns: dict[str, PathPattern] = {}  # where in the data the items of loops are
         self.found: dict[tuple[str, ...], TreeNode] = {}  # the nodes in the data
         self.nodes: list[program.MissionNode | None] = []
         self.names: dict[str, Span] = {}
-        self.paths: list[str] = []  # of the nodes that are being read, from the outside in
+        self.paths: list[str] = []  # of the nodes being read, outermost first
 
     def add(self, finding: Finding) -> None:
         """Keep a finding."""
@@ -141,13 +141,13 @@ class _Reader:
         return number
 
     def loop(self, item: str, expression: Expression) -> None:
-        """Note where in the data the item of a loop stands."""
+        """Note where in the data the item of a loop is."""
         pattern = pattern_of(expression, self.patterns)
         if pattern:
             self.patterns[item] = (*pattern, ITEM)
 
     def held(self, expression: Expression, parent: int) -> list[int]:
-        """Read the nodes in the data that an expression may give."""
+        """Read the nodes in the data that an expression may yield."""
         pattern = pattern_of(expression, self.patterns)
         found = list(matching(self.data, pattern)) if pattern else []
         numbers = []
@@ -177,7 +177,7 @@ class _Reader:
         return read
 
     def path_of(self, step: str, word: str, is_name: bool) -> str:
-        """Return the path of a node from the one around it; names stand alone, and `do` only at the beginning."""
+        """Return the path of a node below the one around it; named items have no index, and `do` only comes first."""
         if not self.paths:
             return f"{step}.{word}" if step else word
         if step.isdigit():
@@ -240,7 +240,7 @@ class _Reader:
             self.add(codes.WRONG_SHAPE.at(node.span, "'interrupts' needs names below it, each with 'when' and 'do'"))
             return ()
         read = [self.interrupt(name, entry) for name, entry in node.entries.items()]
-        # A restart may name what stands in the reaction of a later interrupt, which it may cut: all are read by now.
+        # A restart may name a node in the reaction of a later interrupt, which it may cut short: all are read by now.
         return tuple(replace(one, targets=self.targets(one.restarts)) for one in read if one)
 
     def interrupt(self, name: str, entry: Entry) -> Interrupt | None:
@@ -269,7 +269,7 @@ class _Reader:
         return Interrupt(name, reader.asked[0], root, afterwards, entry.key.span, restarts)
 
     def afterwards(self, reader: NodeReader) -> tuple[str, ScalarNode | None]:
-        """Read what comes after a reaction: a word, or `restart` with the name of what starts again."""
+        """Read what follows a reaction: a word, or `restart` with the name of what starts again."""
         value = reader.take("afterwards", Takes.AFTERWARDS)
         if not isinstance(value, MappingNode):
             return reader.choice("afterwards", AFTERWARDS), None
@@ -277,7 +277,7 @@ class _Reader:
         return RESTART, inner.scalar(RESTART, "the name of a step, a state or a loop's item")
 
     def targets(self, named: ScalarNode | None) -> tuple[Target, ...]:
-        """Return all nodes, states and loops over an item with a name; nothing if none is named."""
+        """Return all nodes, states and loops over an item that have this name; nothing without a name."""
         if named is None:
             return ()
         nodes = [node for node in self.nodes if node]

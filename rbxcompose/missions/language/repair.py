@@ -25,23 +25,23 @@ from rbxcompose.slips import repaired
 
 @dataclass(frozen=True, slots=True)
 class Repairs:
-    """The slips of one mission, place by place from the outside in."""
+    """Repairs the slips of one mission, place by place from the outside in."""
 
     report: Report
     words: Words
 
     @classmethod
     def of(cls, report: Report, skills: Collection[str]) -> Repairs:
-        """Return what repairs a mission of a robot with these skills, as far as they are known."""
+        """Return the repairs for a mission of a robot with these skills, as far as they are known."""
         return cls(report, words(frozenset(skills)))
 
     def mission(self, root: MappingNode) -> MappingNode:
-        """Return the tree of a mission without slips."""
+        """Return the tree of a mission with its slips repaired."""
         found = self._node(KeySlot(Takes.MISSION), ScalarNode("", root.span), root, 0)
         return found if isinstance(found, MappingNode) else root
 
     def step(self, node: TreeNode, depth: int) -> TreeNode:
-        """Return a step without slips that stands within `depth` others."""
+        """Return a step at nesting depth `depth` with its slips repaired."""
         return self._node(KeySlot(Takes.STEP), ScalarNode("", node.span), node, depth)
 
     def _node(self, slot: KeySlot, key: ScalarNode, node: TreeNode, depth: int) -> TreeNode:
@@ -63,7 +63,7 @@ class Repairs:
         return with_children(node, below) if slots else node
 
     def _below(self, takes: Takes, node: TreeNode) -> Mapping[str, KeySlot]:
-        """Return what stands below a node, by key."""
+        """Return what a node takes below it, by key."""
         if takes is Takes.STATE:
             return state_slots()
         if takes is Takes.STEP and isinstance(node, MappingNode):

@@ -12,7 +12,7 @@ from rbxcompose.units import NUMBER, Quantity
 def inner_span(scalar: ScalarNode, start: int, end: int) -> Span:
     """Return the place of the characters `start` to `end` of a scalar.
 
-    Where the text in the file is another one (folded lines, escapes, what was filled in), it is the whole scalar.
+    If the text in the file differs (folded lines, escapes, filled-in values), it is the whole scalar.
     """
     span = scalar.span
     quotes = 0 if scalar.plain else 1
@@ -23,10 +23,10 @@ def inner_span(scalar: ScalarNode, start: int, end: int) -> Span:
 
 
 def expression_of(scalar: ScalarNode) -> Expression:
-    """Return the expression that a scalar holds; what `${...}` gave it is a value already.
+    """Return the expression in a scalar; one filled in by `${...}` is a value already.
 
     Raises:
-        ExpressionError: if it is none.
+        ExpressionError: if it is no expression.
     """
     end = len(scalar.text)
     match scalar.filled:
@@ -43,7 +43,7 @@ def expression_of(scalar: ScalarNode) -> Expression:
 
 
 def _parsed(scalar: ScalarNode) -> Expression:
-    # Quotes round a whole word are meant: people write 'hello' for a text, and YAML takes the quotes away.
+    # Quotes round a whole word are intended: people write 'hello' for a text, and YAML removes the quotes.
     expression = parse(scalar.text)
     if not scalar.plain and isinstance(expression.tree, Word):
         return Expression(scalar.text, Text(0, len(scalar.text), expression.tree.name))

@@ -20,12 +20,12 @@ from rbxcompose.units import NUMBER, TIME
 FOREVER = "forever"
 WORDS = "it can be"
 
-# Stands for an expression that could not be read, so that the rest is read all the same.
+# Replaces an expression that could not be read, so that the rest can be read nevertheless.
 UNREADABLE = Expression("", Number(0, 0, 0.0, NUMBER))
 
 
 class Nodes(Protocol):
-    """Who reads the nodes below, and keeps the findings."""
+    """The reader of the nodes below, which also keeps the findings."""
 
     def child(self, node: TreeNode, step: str, parent: int) -> int:
         """Read a node below `parent` and return its number; `step` is the next part of its path."""
@@ -36,11 +36,11 @@ class Nodes(Protocol):
         ...
 
     def loop(self, item: str, expression: Expression) -> None:
-        """Note what the item of a loop is that goes through the value of an expression."""
+        """Note the item of a loop over the value of an expression."""
         ...
 
     def held(self, expression: Expression, parent: int) -> list[int]:
-        """Read the nodes in the data that an expression may give, below `parent`, and return their numbers."""
+        """Read the nodes in the data that an expression may yield, below `parent`, and return their numbers."""
         ...
 
     def add(self, finding: Finding) -> None:
@@ -49,7 +49,7 @@ class Nodes(Protocol):
 
 
 def read_expression(scalar: ScalarNode, nodes: Nodes) -> Expression | None:
-    """Return the expression in a scalar; None, and a finding, if there is none."""
+    """Return the expression in a scalar; None, with a finding, if there is none."""
     try:
         return expression_of(scalar)
     except ExpressionError as error:
@@ -82,11 +82,11 @@ class ValueReader:
         return entry.key.span if entry else self.mapping.span
 
     def take(self, key: str, takes: Takes = Takes.OTHER, choices: tuple[str, ...] = ()) -> TreeNode | None:
-        """Return the value of a key, at which the grammar takes this, or one of some words."""
+        """Return the value of a key; `takes` and `choices` are what the grammar allows there."""
         return self.mapping.get(key)
 
     def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> ScalarNode | None:
-        """Return an option that must be one word, number or text; None, and a finding, if it is not."""
+        """Return an option that must be one word, number or text; None, with a finding, if it is not."""
         value = self.take(key, takes)
         if is_told(value):
             return None
@@ -114,12 +114,12 @@ class ValueReader:
         return self.expression(key, quantity_of(TIME), "a duration, such as '5 s'")
 
     def count_or_forever(self, key: str) -> Expression | None:
-        """Read a whole number; None stands for `forever`."""
+        """Read a whole number; None means `forever`."""
         read = self.count_or(key, (FOREVER,))
         return None if isinstance(read, str) else read
 
     def count_or(self, key: str, words: tuple[str, ...]) -> Expression | str:
-        """Read a whole number, or one of some words."""
+        """Read a whole number or one of the words."""
         value = self.take(key, Takes.COUNT, words)
         if isinstance(value, ScalarNode) and value.text in words:
             return value.text
@@ -134,7 +134,7 @@ class ValueReader:
         return value is True
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
-        """Read one of some words; the first one is the default."""
+        """Read one of the choices; the first one is the default."""
         if not self.has(key):
             return choices[0]
         scalar = self.scalar(key, " or ".join(f"'{choice}'" for choice in choices))
@@ -164,12 +164,12 @@ class ValueReader:
         self.nodes.add(finding)
 
     def name(self, key: str, what: str) -> ScalarNode:
-        """Read a name; one without text, and a finding, if there is none."""
+        """Read a name; if there is none, return one without text, with a finding."""
         scalar = self.scalar(key, what)
         return scalar if scalar and self.check_name(scalar) else ScalarNode("", self.key_span(key))
 
     def check_name(self, scalar: ScalarNode) -> bool:
-        """Return whether a word may be a name; a finding says it if not."""
+        """Return whether a word is a valid name; add a finding if not."""
         if not NAME.fullmatch(scalar.text):
             self.add(no_name(scalar))
             return False

@@ -1,4 +1,4 @@
-"""From an argument as it was written to what computes its value."""
+"""From an argument as written to the function that computes its value."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PLACED = (TypeKind.PLACE, TypeKind.POSE)
 
 
 def getter(value: TreeNode, wanted: Type) -> Getter:
-    """Return what computes an argument of the type `wanted` from what was written."""
+    """Return the function that computes an argument of the type `wanted` from its written value."""
     if not isinstance(value, ScalarNode):
         constant = literal(value).value
         return lambda task: constant
@@ -35,7 +35,7 @@ def getter(value: TreeNode, wanted: Type) -> Getter:
 
 
 def place(task: Task, value: Value) -> Value:
-    """Return the place that a text names; a place or a pose as it is."""
+    """Return the place that a text names; return a place or a pose as it is."""
     found = task.engine.robot.places.get(value, value) if isinstance(value, str) else value
     if isinstance(found, str):
         raise NodeFailed(f"there is no place '{found}'")
@@ -43,5 +43,5 @@ def place(task: Task, value: Value) -> Value:
 
 
 def _word(value: Value) -> Value:
-    """Return a choice as text, also where a place has the same name."""
+    """Return a choice as text, even if a place has the same name."""
     return value.name if isinstance(value, NamedPose) else value

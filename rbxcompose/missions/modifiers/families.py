@@ -1,4 +1,4 @@
-"""What modifiers of a family have in common, so that each answers only for itself."""
+"""What the modifiers of a family have in common, so that each only defines what is its own."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ class Plain(Modifier):
     serves = ModifierScope.ALL
 
     def changed(self, inner: Outcomes) -> Outcomes:
-        """Return what is inside."""
+        """Return the outcomes of the node inside."""
         return inner
 
 
 class Skipping(Modifier):
-    """A modifier that may keep its node from starting: it is skipped then, which fails nothing."""
+    """A modifier that may keep its node from starting: the node is then skipped, which is no failure."""
 
     __slots__ = ()
     may_skip = True

@@ -19,7 +19,7 @@ _ON: Mapping[int, str] = {SUCCESS: ON_SUCCESS, FAILURE: ON_FAILURE}
 
 
 class HooksTask(Decorator):
-    """Hears when its node starts, ends or is halted."""
+    """Runs the hooks when its node starts, ends or is halted."""
 
     __slots__ = ("moments",)
 
@@ -28,24 +28,24 @@ class HooksTask(Decorator):
         self.moments = options.moments
 
     def begin(self) -> int:
-        """Do what belongs to the start."""
+        """Run the hook of the start, and start."""
         act(self.moments, ON_START, self)
         return self.proceed()
 
     def proceed(self) -> int:
-        """Continue, and do what belongs to the end."""
+        """Continue, and run the hook of the result at the end."""
         status = self.advance(self.inner)
         if status in _ON:
             act(self.moments, _ON[status], self)
         return status
 
     def halt(self) -> None:
-        """Stop what runs, and do what belongs to that."""
+        """Stop the node, and run the hook of a halt."""
         super().halt()
         act_safely(self.moments, ON_HALT, self)
 
     def suspend(self, from_start: bool) -> bool:
-        """A node that starts again is halted."""
+        """Suspend the node; if it is to start again, that is a halt."""
         starts_over = super().suspend(from_start)
         if starts_over:
             act_safely(self.moments, ON_HALT, self)
@@ -85,5 +85,5 @@ class Hooks(Plain):
 
     @classmethod
     def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read the hooks that are there."""
+        """Read the hooks that are present."""
         return cls(reader.moments((key, *cls.keys)))

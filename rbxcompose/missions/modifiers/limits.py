@@ -1,4 +1,4 @@
-"""Modifiers that cut a node short, or try it again."""
+"""Modifiers that cut a node short or retry it."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, SUCCEEDS, Outcome
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING
 from rbxcompose.units import TIME, format_quantity
 
-SHORTEST = 1e-6  # [s] of a timeout with a meaning
+SHORTEST = 1e-6  # [s] of a meaningful timeout
 
 
 class Cutting(Modifier):
-    """A modifier that may end its node in a failure."""
+    """A modifier that may make its node fail."""
 
     __slots__ = ()
     may_skip = False
@@ -36,7 +36,7 @@ class Cutting(Modifier):
 
 
 class AsLongAsTask(Decorator):
-    """Asks at each tick."""
+    """Evaluates its condition at each tick."""
 
     __slots__ = ("watched",)
 
@@ -45,11 +45,11 @@ class AsLongAsTask(Decorator):
         self.watched = Watched.of(options.value)
 
     def begin(self) -> int:
-        """Ask for the first time."""
+        """Evaluate the condition for the first time."""
         return self.proceed()
 
     def proceed(self) -> int:
-        """Evaluate it, then continue."""
+        """Evaluate the condition, then continue."""
         if not holds(self.watched.condition, self.scope):
             self.cut(f"not as long as {self.watched.condition.text}")
             return FAILURE
@@ -62,7 +62,7 @@ class AsLongAsTask(Decorator):
 @modifier("as_long_as", AsLongAsTask)
 @dataclass(frozen=True, slots=True)
 class AsLongAs(Cutting):
-    """Fail as soon as the condition does not hold; what runs is halted.
+    """Fail as soon as the condition does not hold, and halt the node.
 
     Example:
         do:
@@ -109,7 +109,7 @@ class TimeoutTask(Decorator):
 @modifier("timeout", TimeoutTask)
 @dataclass(frozen=True, slots=True)
 class Timeout(Cutting):
-    """Fail when the node takes longer, counting all attempts; a result of the same instant is in time.
+    """Fail when the node takes longer, counting all attempts; a result at that very instant is in time.
 
     Example:
         do:
@@ -136,7 +136,7 @@ class Timeout(Cutting):
 
 
 class AttemptsTask(Decorator):
-    """Starts what is inside again after a failure."""
+    """Starts the task inside again after a failure."""
 
     __slots__ = ("deadline", "is_between", "left", "tries")
     saved = ("deadline", "is_between", "left")
@@ -204,16 +204,16 @@ class Attempts(Modifier):
           attempt_pause: 2 s
     """
 
-    value: Expression | None = field()  # how often at most; None: for ever
-    timeout: Expression | None = None  # of each
-    pause: Expression | None = None  # between two
+    value: Expression | None = field()  # the maximum number; None: for ever
+    timeout: Expression | None = None  # of each attempt
+    pause: Expression | None = None  # between two attempts
 
     may_skip = False
     repeats = True
 
     @classmethod
     def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read a count or `forever`, and what belongs to it."""
+        """Read a count or `forever`, and the other settings of attempts."""
         timeout, pause = (
             reader.duration(one) if reader.has(one) else None for one in ("attempt_timeout", "attempt_pause")
         )
@@ -224,22 +224,22 @@ class Attempts(Modifier):
         return cls(reader.count_or_forever(key), timeout, pause)
 
     def changed(self, inner: Outcomes) -> Outcomes:
-        """Return that what is tried for ever ends in success, unless an attempt is cut short."""
+        """Return that endless attempts end in success, unless each has a timeout."""
         return inner.of(SUCCEEDS) if self.value is None and not self.timeout else inner
 
     @property
     def serves(self) -> ModifierScope:
-        """Return those that may fail; an attempt that may be cut short always may."""
+        """Return the nodes that may fail; with a timeout for each attempt, any may."""
         return ModifierScope.ALL if self.timeout else ModifierScope.FAILING
 
     @property
     def said(self) -> str:
-        """Return its numbers."""
+        """Return its settings."""
         return ", ".join(one.text for one in (self.value, self.timeout, self.pause) if one)
 
     @property
     def endless(self) -> Advice | None:
-        """Say what attempts for ever need."""
+        """Return advice on endless attempts."""
         advice = Advice("this retries for ever without waiting", "give it a number of attempts, or an 'attempt_pause'")
         return advice if self.value is None and not takes_time(self.pause) else None
 

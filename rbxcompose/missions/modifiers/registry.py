@@ -1,4 +1,4 @@
-"""How a modifier is declared, and in which order modifiers surround a node."""
+"""How a modifier is declared, and the order in which modifiers surround a node."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from typing import TypeVar
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.program.modifier import Modifier
 
-# From the outside in, whatever the order in the text: a rule of the language.
+# Outermost first, whatever the order in the text: a rule of the language.
 MODULES = ("state_hooks", "start_conditions", "results", "hooks", "limits", "kept_results")
 
 
 class Decorator(Task):
-    """A task around another one of the same node; what happens to the inner one happens to it."""
+    """A task around another task of the same node; it shares the fate of the inner one."""
 
     __slots__ = ("inner",)
 
@@ -49,12 +49,12 @@ def modifier(
     *,
     only_states: bool = False,
 ) -> Callable[[type[M]], type[M]]:
-    """Register a modifier under its key, inside of those of its module that were registered before.
+    """Register a modifier under its key, inside those that its module registered before.
 
-    `keys` are those that it reads beside its own, each with what it is for.
+    `keys` are those that it reads besides its own, each with its description.
 
     Raises:
-        TypeError: if the modifier leaves something unanswered that every modifier answers.
+        TypeError: if the modifier does not implement all abstract members.
     """
 
     def register(cls: type[M]) -> type[M]:
@@ -80,7 +80,7 @@ def decorator_of(options: Modifier, site: Site, inner: Task) -> Task:
 
 @cache
 def modifiers() -> Mapping[str, type[Modifier]]:
-    """Return all modifiers by their key, from the outside in."""
+    """Return all modifiers by key, outermost first."""
     found: dict[str, type[Modifier]] = {}
     for module in MODULES:
         name = importlib.import_module(f"rbxcompose.missions.modifiers.{module}").__name__
@@ -90,6 +90,6 @@ def modifiers() -> Mapping[str, type[Modifier]]:
 
 @cache
 def modifier_keys() -> Mapping[str, type[Modifier]]:
-    """Return every key that modifiers of nodes read, with the modifier that it belongs to."""
+    """Return every key that modifiers of nodes read, with its modifier."""
     found = ((key, cls) for name, cls in modifiers().items() for key in (name, *cls.keys) if not cls.only_states)
     return dict(found)

@@ -1,4 +1,4 @@
-"""Modifiers that turn a result round."""
+"""Modifiers that change a result."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
 
 
 class TurningTask(Decorator):
-    """Gives another result for some; the outcome's own name is then gone."""
+    """Replaces some results by others, and then drops the name of the outcome."""
 
     __slots__ = ("turned",)
 
@@ -28,7 +28,7 @@ class TurningTask(Decorator):
         return self.proceed()
 
     def proceed(self) -> int:
-        """Continue, and turn the result."""
+        """Continue, and replace the result."""
         status = self.advance(self.inner)
         turned = self.turned.get(status, status)
         if turned != status:
@@ -38,13 +38,13 @@ class TurningTask(Decorator):
 
 @dataclass(frozen=True, slots=True)
 class Turning(Modifier):
-    """May be switched off."""
+    """A modifier that replaces results; it may be switched off."""
 
     is_on: bool
 
     may_skip = False
     value = None
-    turns: ClassVar[dict[int, int]]  # what becomes of which result
+    turns: ClassVar[dict[int, int]]  # replacements by result
 
     @classmethod
     def read(cls, reader: NodeReader, key: str) -> Self:
@@ -67,19 +67,19 @@ class Optional(Turning):
     turns = {FAILURE: SUCCESS}
 
     def changed(self, inner: Outcomes) -> Outcomes:
-        """Return that a failure is a success."""
+        """Return the outcomes with failure as success."""
         if not self.is_on or not inner.counting_as(FAILS):
             return inner
         return inner.of(SUCCEEDS).both(ALWAYS_SUCCEEDS)
 
     @property
     def serves(self) -> ModifierScope:
-        """Return those that may fail."""
+        """Return the nodes that may fail."""
         return ModifierScope.FAILING if self.is_on else ModifierScope.ALL
 
     @property
     def forgives(self) -> bool:
-        """Return that it may: one that could not be read is not held against its node."""
+        """Return true, even for one that could not be read: no finding blames the node then."""
         return True
 
 
@@ -99,5 +99,5 @@ class Invert(Turning):
     serves = ModifierScope.ALL
 
     def changed(self, inner: Outcomes) -> Outcomes:
-        """Return that each is the other."""
+        """Return the outcomes with success and failure swapped."""
         return Outcomes(inner.counting_as(FAILS), inner.counting_as(SUCCEEDS)) if self.is_on else inner

@@ -1,4 +1,4 @@
-"""Modifiers that decide whether a node starts at all; one that does not is skipped."""
+"""Modifiers that decide whether a node starts; if not, it is skipped."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rbxcompose.missions.program.statuses import RUNNING, SKIPPED
 
 
 class ConditionalTask(Decorator):
-    """Asks a condition once, before the node starts."""
+    """Evaluates a condition once, before the node starts."""
 
     __slots__ = ("condition",)
     skips_if: ClassVar[bool]
@@ -26,19 +26,19 @@ class ConditionalTask(Decorator):
         self.condition = options.value
 
     def begin(self) -> int:
-        """Ask the condition once."""
+        """Evaluate the condition once."""
         return SKIPPED if holds(self.condition, self.scope) == self.skips_if else self.advance(self.inner)
 
 
 class OnlyIfTask(ConditionalTask):
-    """Continues if it holds."""
+    """Continues if the condition holds."""
 
     __slots__ = ()
     skips_if = False
 
 
 class SkipIfTask(ConditionalTask):
-    """Continues if it does not hold."""
+    """Continues if the condition does not hold."""
 
     __slots__ = ()
     skips_if = True
@@ -46,7 +46,7 @@ class SkipIfTask(ConditionalTask):
 
 @dataclass(frozen=True, slots=True)
 class Conditional(Skipping):
-    """Has a condition."""
+    """A modifier with a condition."""
 
     value: Expression = field()
 
@@ -85,7 +85,7 @@ class SkipIf(Conditional):
 
 
 class CountingTask(Decorator):
-    """Knows when its node ended within this run of the mission; a halt is no end."""
+    """Records when its node ended within this run of the mission; a halt is no end."""
 
     __slots__ = ("ended_at", "ended_in")
     saved = ("ended_at", "ended_in")
@@ -110,7 +110,7 @@ class CountingTask(Decorator):
 
 
 class OnceTask(CountingTask):
-    """Skips its node once that has ended."""
+    """Skips its node once it has ended."""
 
     __slots__ = ("is_on",)
 
@@ -148,12 +148,12 @@ class Once(Skipping):
 
     @property
     def serves(self) -> ModifierScope:
-        """Return those that come again."""
+        """Return the nodes that are repeated."""
         return ModifierScope.REPEATED if self.is_on else ModifierScope.ALL
 
 
 class CooldownTask(CountingTask):
-    """Skips its node for a time after that has ended."""
+    """Skips its node for a time after it has ended."""
 
     __slots__ = ("duration",)
 
@@ -162,7 +162,7 @@ class CooldownTask(CountingTask):
         self.duration = options.value
 
     def begin(self) -> int:
-        """Start if that time has gone by, or if it has not ended yet."""
+        """Start if that time has passed, or if the node has not ended yet."""
         is_cooling = self.has_ended and not self.engine.has_gone_by(self._seconds(), self.ended_at)
         return SKIPPED if is_cooling else self.proceed()
 

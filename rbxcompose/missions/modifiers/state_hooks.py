@@ -17,7 +17,7 @@ ON_ENTER, ON_EXIT = "on_enter", "on_exit"
 
 
 class EnteringTask(Decorator):
-    """Hears when a state is entered and left."""
+    """Runs the hooks when a state is entered and left."""
 
     __slots__ = ("moments",)
 
@@ -26,25 +26,25 @@ class EnteringTask(Decorator):
         self.moments = options.moments
 
     def begin(self) -> int:
-        """Do what belongs to entering."""
+        """Run the hook of entering, and start."""
         act(self.moments, ON_ENTER, self)
         return self.proceed()
 
     def proceed(self) -> int:
-        """Continue, and do what belongs to leaving."""
+        """Continue, and run the hook of leaving at the end."""
         status = self.advance(self.inner)
         if status != RUNNING:
             act(self.moments, ON_EXIT, self)
         return status
 
     def suspend(self, from_start: bool) -> bool:
-        """An interrupt halts leaves, not states: the state stays entered, what is in it starts again."""
+        """Suspend the body: an interrupt halts leaves, not states; the state stays entered, its body starts again."""
         if self.current is not None and self.inner.suspend(from_start):
             self.current = None
         return False
 
     def halt(self) -> None:
-        """Stop what runs, and leave, unless the mission as a whole is ended from outside."""
+        """Stop the body, and run the hook of leaving unless the whole mission is ended from outside."""
         super().halt()
         if not self.engine.is_aborting:
             act_safely(self.moments, ON_EXIT, self)
@@ -57,7 +57,7 @@ class EnteringTask(Decorator):
 class Entering(Plain):
     """Act when a state is entered and left: `set`, `log` or `publish`.
 
-    Leaving also counts when something inside the mission halts the state, entering also when its history brings the
+    A state is also left when something inside the mission halts it, and also entered when its history brings the
     machine back to it.
 
     Example:
@@ -82,5 +82,5 @@ class Entering(Plain):
 
     @classmethod
     def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read what is there of the two."""
+        """Read those of the two that are present."""
         return cls(reader.moments((key, *cls.keys)))

@@ -1,6 +1,6 @@
 """The slips of missions, one file each: what is written at a place of the grammar, what to say, and what was meant.
 
-Each is a function of a `GrammarPlace` and the node there under `@slip(PLACES)`; it returns None for what is no slip.
+Each is a function of a `GrammarPlace` and the node there, under `@slip(PLACES)`; it returns None if there is no slip.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A condition below `next`, which only leads on."""
+"""A condition below `next`, which takes only transitions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _ASKING = ("if", "then", "else", "when", "check", "choose", "cases")
 
 @slip(Takes.NEXT)
 def asking_next(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise words that ask."""
+    """Recognise words that begin a condition."""
     asking = (
         [entry.key for word, entry in node.entries.items() if word in _ASKING] if isinstance(node, MappingNode) else []
     )

@@ -20,7 +20,7 @@ _EXAMPLE = "'name: value'"
 
 @slip(Takes.ASSIGNMENTS)
 def assigned_in_line(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise a text below `set`; what is no assignment at all is told as well, and nothing else is said of it."""
+    """Recognise a text below `set`; one that is no assignment is reported, too, and gets no further findings."""
     if not isinstance(node, ScalarNode):
         return None
     key = place.key

@@ -25,7 +25,7 @@ _TIMES = re.compile(r"(?P<digits>\d+)\s*(times?|x|rounds?|attempts?|tries)")
 
 @slip(Takes.COUNT)
 def count_in_words(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise what people say for a number, and for no end where that may stand."""
+    """Recognise words for a number, and words for no end where `forever` is allowed."""
     if not isinstance(node, ScalarNode) or node.text in place.choices:
         return None
     key, forever = place.key.text, ENDLESS.get(node.text, "")

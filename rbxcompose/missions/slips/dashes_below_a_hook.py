@@ -15,7 +15,7 @@ _DASH = "- "
 
 @slip(Takes.HOOK, before=(steps_below_a_hook,))
 def dashes_below_a_hook(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise a list of maps; where all that it holds are steps, its dashes are not what is wrong."""
+    """Recognise a list of maps; if it contains only steps, its dashes are not the mistake."""
     hook = place.key.text
     items = node.items if isinstance(node, SequenceNode) else ()
     maps = [item for item in items if isinstance(item, MappingNode) and item.entries]

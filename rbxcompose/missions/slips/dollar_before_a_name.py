@@ -1,4 +1,4 @@
-"""`$` before the name of a loop's item, where the name is given."""
+"""`$` before the name of a loop's item, where the name is defined."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rbxcompose.slips import Repair
 
 @slip(Takes.ITEM_NAME)
 def dollar_before_a_name(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise a name as it is written where it is used."""
+    """Recognise a name written as in an expression that uses it."""
     bare = node.text[1:] if isinstance(node, ScalarNode) and node.text.startswith("$") else ""
     if not NAME.fullmatch(bare) or not isinstance(node, ScalarNode):
         return None

@@ -16,9 +16,9 @@ MACHINE = "machine"
 
 @slip(Takes.MISSION, Takes.STEP, Takes.STATE)
 def keys_outside_their_machine(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise keys beside their machine, and those of any machine at the very left of a mission.
+    """Recognise a machine's keys beside it, and those of any machine at the very left of a mission.
 
-    The latter go to the machine that they may belong to, if there is one only.
+    The latter are moved to the machine that they may belong to, if there is only one.
     """
     if not isinstance(node, MappingNode) or not any(key in node for key in MACHINE_KEYS):
         return None
@@ -42,7 +42,7 @@ def keys_outside_their_machine(place: GrammarPlace, node: TreeNode) -> Repair[Tr
 
 
 def _machine_of(node: TreeNode) -> MappingNode | None:
-    """Return the machine that stands in a map; only one with states is taken for one."""
+    """Return the machine in a map; it must have states to count as one."""
     machine = node.get(MACHINE) if isinstance(node, MappingNode) else None
     return machine if isinstance(machine, MappingNode) and "states" in machine else None
 
@@ -58,7 +58,7 @@ def _machines(root: MappingNode) -> Iterator[tuple[MappingNode, MappingNode]]:
 
 
 def _with(node: TreeNode, added: dict[int, dict[str, Entry]]) -> TreeNode:
-    """Return a tree in which each machine has what is added to it."""
+    """Return a tree with the additions to each machine."""
     new = with_children(node, lambda _, below: _with(below, added))
     more = added.get(id(node), {})
     return MappingNode({**new.entries, **more}, new.span, new.tag) if more and isinstance(new, MappingNode) else new

@@ -1,4 +1,4 @@
-"""A list to go through that was written without its brackets: `in: dock, kitchen`."""
+"""A list of items written without its brackets: `in: dock, kitchen`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rbxcompose.slips import Repair
 
 @slip(Takes.ITEMS)
 def list_without_brackets(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise several items; a single one may be a name of data."""
+    """Recognise several items; a single one may be the name of a datum."""
     found = without_brackets(node)
     if len(found) < 2 or not isinstance(node, ScalarNode):
         return None

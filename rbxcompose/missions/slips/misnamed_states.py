@@ -1,4 +1,4 @@
-"""States with invalid names: each is read under the name that was meant, wherever its machine names it."""
+"""States with invalid names: each is read under the intended name, wherever its machine names it."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ def _no_name(name: str, places: list[ScalarNode], meant: str) -> Finding:
 
 
 class _Meant:
-    """What a word that leads to a state stands for."""
+    """The states that words in transitions mean."""
 
     def __init__(self, meant: Mapping[str, str], known: Collection[str]) -> None:
         self.meant = meant
         self.known = known
 
     def of(self, node: TreeNode) -> TreeNode:
-        """Return a word with the name of the state that it means, also if that name was only nearly written."""
+        """Return a word replaced by the name of the state that it means, even if it is slightly misspelt."""
         if not isinstance(node, ScalarNode):
             return node
         near = nearest(node.text, self.meant) if node.text not in self.known else [node.text]
@@ -68,7 +68,7 @@ def _renamed(machine: MappingNode, states: MappingNode, meant: _Meant) -> Mappin
 
 
 def _leading(state: TreeNode, meant: _Meant) -> TreeNode:
-    """Return a state whose `next` leads to states by their names."""
+    """Return a state whose `next` has the intended names of states."""
 
     def leads(key: Key, to: TreeNode) -> TreeNode:
         if key != "next":
@@ -79,7 +79,7 @@ def _leading(state: TreeNode, meant: _Meant) -> TreeNode:
 
 
 def _ways(machine: MappingNode, states: MappingNode) -> Iterator[ScalarNode]:
-    """Yield all words that lead to a state."""
+    """Yield all words that name the state to enter."""
     leads = [machine.get("start")]
     for entry in states.entries.values():
         to = entry.value.get("next") if isinstance(entry.value, MappingNode) else None

@@ -16,7 +16,7 @@ _DASH = "- "
 
 @slip(Takes.STEPS, Takes.BRANCHES)
 def missing_dashes(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise a `sequence` or another list of steps that is none."""
+    """Recognise the value of a `sequence` or another list of steps that is no list."""
     if isinstance(node, SequenceNode) or (isinstance(node, MappingNode) and place.takes is Takes.BRANCHES):
         return None
     key = place.key
@@ -34,7 +34,7 @@ def missing_dashes(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | No
 
 
 def _steps(value: MappingNode, words: Words) -> Iterator[MappingNode]:
-    """Yield the steps that the keys of a map were meant to be; a setting belongs to the step above it."""
+    """Yield the steps that were meant by the keys of a map; a setting belongs to the step above it."""
     entries: dict[str, Entry] = {}
     for name, entry in value.entries.items():
         if entries and name not in words.modifiers and not words.is_option(name):
@@ -45,7 +45,7 @@ def _steps(value: MappingNode, words: Words) -> Iterator[MappingNode]:
 
 
 def _dashed(value: MappingNode, words: Words) -> Fix | None:
-    """Return the fix that puts a dash before each step, if each is one known word with a value on its line."""
+    """Return the fix that puts a dash before each step, if each is one known word with its value on the same line."""
     entries = list(value.entries.items())
     lines = [entry.key.span.line for _, entry in entries]
     is_plain = all(
@@ -57,7 +57,7 @@ def _dashed(value: MappingNode, words: Words) -> Fix | None:
         and entry.value.span.end_line == entry.key.span.line
         for name, entry in entries
     )
-    # A key that is written twice is not in the map: its line, here the last one, would stay without a dash.
+    # The map has only one of two equal keys: the line of the other, here the last one, would not get a dash.
     behind = value.span.end_line - lines[-1], value.span.end_column
     is_whole = behind[0] <= 0 or (behind[0] == 1 and behind[1] < entries[0][1].key.span.column)
     if not is_plain or not is_whole or lines != list(range(lines[0], lines[0] + len(lines))):

@@ -1,4 +1,4 @@
-"""The word of a kind, misspelt, beside a key that belongs to kinds: `repeet: 3` with `do`."""
+"""A misspelt word of a kind beside an option of kinds: `repeet: 3` with `do`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rbxcompose.slips import Repair
 
 @slip(Takes.STEP, after=(tight_dashes,))
 def misspelt_kind(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise a step of no kind with an option of some kind, and a word near to that of a kind."""
+    """Recognise a step of no kind that has an option of some kind and a word similar to that of a kind."""
     words = place.words
     if not isinstance(node, MappingNode) or words.kind_of(node):
         return None

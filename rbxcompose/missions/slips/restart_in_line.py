@@ -34,7 +34,7 @@ def restart_in_line(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | N
 
 
 def _on_a_line_below(key: ScalarNode, value: ScalarNode, meant: str) -> Fix:
-    """Return the fix, which applies to a key with nothing before it on its line: within `{}` lines mean nothing."""
+    """Return the fix, which applies only to a key that begins its line: inside `{}`, lines mean nothing."""
     span, indent = key.span, " " * (key.span.column - 1)
     before = span._replace(column=1, end_line=span.line, end_column=span.column)
     place = value.span._replace(line=span.line, column=span.column)

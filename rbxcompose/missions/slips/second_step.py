@@ -40,7 +40,7 @@ def _missing_dash(step: MappingNode, first: str, second: str, words: Words) -> F
 
 
 def _dash_before(step: MappingNode, key: str, words: Words) -> Fix | None:
-    """Return the fix that makes a key of a list's item the next item, if nothing behind it may belong to either."""
+    """Return the fix that turns a key of a list item into the next item, unless a later key may belong to either."""
     first, second = next(iter(step.entries.values())).key.span, step.entries[key].key.span
     if first.column != second.column or second.line == first.line:
         return None

@@ -13,7 +13,7 @@ from rbxcompose.slips import Repair
 
 @slip(Takes.STEP, after=(unknown_settings,))
 def settings_among_branches(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise branches that are named like settings, and look like them."""
+    """Recognise branches that are named like settings and look like them."""
     kind = place.words.kind_of(node) if isinstance(node, MappingNode) else ""
     if not kind or not isinstance(node, MappingNode):
         return None
@@ -44,7 +44,7 @@ def _among(parallel: ScalarNode, setting: Entry, *, is_last: bool) -> Finding:
 
 
 def _moved_left(entry: Entry, parallel: ScalarNode) -> Fix | None:
-    """Return the fix that puts a key on a line of its own into the column of `parallel`."""
+    """Return the fix that moves a key on a line of its own into the column of `parallel`."""
     span, column = entry.key.span, parallel.span.column
     if entry.value.span.end_line != span.line or column >= span.column:
         return None

@@ -1,4 +1,4 @@
-"""Steps below a hook, which can do nothing that takes time."""
+"""Steps below a hook, which cannot do anything that takes time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _CURES: Mapping[str, str] = {
 
 @slip(Takes.HOOK)
 def steps_below_a_hook(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise words of steps in the line of a hook or below it; what else stands there is read."""
+    """Recognise words of steps on the line of a hook or below it; the other keys there are read."""
     if isinstance(node, ScalarNode):
         word = node.text.partition(" ")[0] if node.plain else ""
         if not is_step(word, place.words):
@@ -40,7 +40,7 @@ def steps_below_a_hook(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] 
 
 
 def is_step(word: str, words: Words) -> bool:
-    """Return whether a word below a hook is a step; without the skills of a robot, any odd one may be."""
+    """Return whether a word below a hook is a step; if the robot's skills are unknown, any unknown word may be."""
     if word in _KEYS or not word:
         return False
     return words.is_step(word) if words.skills else word in words.kinds or not nearest(word, _KEYS)

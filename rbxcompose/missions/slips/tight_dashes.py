@@ -22,7 +22,7 @@ def tight_dashes(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None
     tight = [entry.key for key, entry in entries.items() if _TIGHT.match(key)]
     if not tight or not isinstance(node, MappingNode):
         return None
-    is_list = len(tight) == len(entries)  # else something stands there that is no item of a list
+    is_list = len(tight) == len(entries)  # else there is something that is no item of a list
     message = "a space is missing after this dash"
     findings = (
         codes.WRONG_SHAPE.at(key.span, message, help=f"write '- {key.text[1:]}'", fix=_spaced(key) if is_list else None)
@@ -32,7 +32,7 @@ def tight_dashes(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None
 
 
 def _spaced(key: ScalarNode) -> Fix:
-    """Return the fix that puts a space behind a dash; it applies to a line of its own only."""
+    """Return the fix that puts a space after a dash; it applies only to a line of its own."""
     span = key.span
     before = span._replace(column=span.column - len(_INDENT), end_line=span.line, end_column=span.column)
     meant = f"- {key.text[1:]}"

@@ -1,4 +1,4 @@
-"""Keys beside a step that are not among its settings: words of another language, and settings of other steps."""
+"""Keys beside a step that are none of its settings: words of other languages, and settings of other steps."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ FOREIGN: Mapping[str, str] = {
     "while": "as_long_as",
 }
 """Words of other languages, each with ours: a setting of a step, or a step of its own."""
-STEPS = ("wait",)  # of our words, those that are a step
+STEPS = ("wait",)  # those of our words that are steps
 
 
 @slip(Takes.STEP)
 def unknown_settings(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise keys that are no settings of this step, and look less like a second step than like a setting."""
+    """Recognise keys that are no settings of this step, but look more like a setting than a second step."""
     unknown = unknown_in(node, place.words) if isinstance(node, MappingNode) else set()
     if not unknown or not isinstance(node, MappingNode):
         return None
@@ -58,7 +58,7 @@ def unknown_in(step: MappingNode, words: Words) -> set[str]:
 
 
 def _is_stray(step: MappingNode, key: str, settings: Iterable[str], words: Words) -> bool:
-    """Return whether a key beside a step is a setting that there is not, rather than a second step."""
+    """Return whether a key beside a step is an unknown setting rather than a second step."""
     if key in words.skills or (key in words.kinds and key not in FOREIGN):
         return False
     return key in FOREIGN or bool(nearest(key, settings)) or is_setting(step.entries[key].value)
@@ -69,7 +69,7 @@ def _is_only_option(key: str, words: Words) -> bool:
 
 
 def _finding(step: MappingNode, kind: str, key: str, words: Words) -> Finding:
-    """Return the finding about a key that is no setting, with the one that was meant."""
+    """Return the finding on a key that is no setting, with the setting that was meant."""
     beside = f"'{kind}'" if kind else "a skill"
     span, message = step.entries[key].key.span, f"unknown key '{key}' beside {beside}"
     if not kind and words.is_option(key):
@@ -87,7 +87,7 @@ def _finding(step: MappingNode, kind: str, key: str, words: Words) -> Finding:
 
 
 def is_setting(node: TreeNode) -> bool:
-    """Return whether a value looks like that of a setting: a number, a flag, a quantity or something with `$`."""
+    """Return whether a value looks like that of a setting: a number, a flag, a quantity or a text with `$`."""
     if not isinstance(node, ScalarNode) or not node.plain or not node.text:
         return False
     if not isinstance(plain_value(node), str) or "$" in node.text:

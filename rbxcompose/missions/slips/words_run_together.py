@@ -1,4 +1,4 @@
-"""A skill and its value without what belongs between them: `go_to:dock`, `say hello`, or no colon above settings."""
+"""A skill and its value without the colon or space between them: `go_to:dock`, `say hello`, no colon above settings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _TIGHT_COLON = re.compile(r"[a-z][a-z0-9_]*:[^\s:/].*")
 
 @slip(Takes.STEP, after=(unknown_settings,))
 def words_run_together(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
-    """Recognise a word of a step that is several."""
+    """Recognise a step whose word is several words."""
     own = place.words.own(node) if isinstance(node, MappingNode) else []
     if not own or not isinstance(node, MappingNode):
         return None

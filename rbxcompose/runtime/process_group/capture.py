@@ -1,4 +1,4 @@
-"""What code prints, or sends to Python's `logging`, becomes lines of the robot's log."""
+"""Turns what code prints, or sends to Python's `logging`, into lines of the robot's log."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import TextIO
 
 from rbxcompose.levels import Level
 
-Told = Callable[[Level, str, str], None]  # level, text, detail; called by whichever thread printed
+Told = Callable[[Level, str, str], None]  # level, text, detail; called in the thread that printed
 
 _OUTPUT = Path("/proc/self/fd/1")
 
@@ -52,7 +52,7 @@ class Capture:
 
     def _tell(self, level: Level, text: str, detail: str = "") -> None:
         if getattr(self._is_telling, "now", False):
-            os.write(2, f"{text}\n{detail}".encode(errors="backslashreplace"))  # the log itself has something to say
+            os.write(2, f"{text}\n{detail}".encode(errors="backslashreplace"))  # the log itself reports something
             return
         self._is_telling.now = True
         try:
@@ -62,7 +62,7 @@ class Capture:
 
 
 class _Lines(io.TextIOBase):
-    """A stream of whole lines; what a thread has not ended yet waits for the rest."""
+    """A stream of whole lines; the unfinished line of a thread waits for its rest."""
 
     def __init__(self, raw: TextIO | None, told: Callable[[str], None]) -> None:
         self._raw, self._told = raw, told
@@ -86,7 +86,7 @@ class _Lines(io.TextIOBase):
         return len(text)
 
     def end(self) -> None:
-        """Log what was started and will not be ended."""
+        """Log lines that were begun and will not be finished."""
         while self._begun:
             self._say(self._begun.popitem()[1])
 
@@ -105,7 +105,7 @@ class _Handler(logging.Handler):
             text, detail = f"{record.name}: {record.getMessage()}", ""
             if record.exc_info:
                 detail = logging.Formatter().formatException(record.exc_info)
-        except Exception:  # arguments that do not fit their text: this is how logging itself tells it
+        except Exception:  # arguments that do not fit their text: logging itself reports it like this
             self.handleError(record)
             return
         self._told(_level_of(record.levelno), text, detail)
@@ -118,7 +118,7 @@ def _level_of(number: int) -> Level:
 
 
 def take_printed() -> list[str]:
-    """Return the lines that came to the file behind standard output past Python, such as from C, and empty it."""
+    """Return the lines written past Python to the file of standard output, such as from C, and empty it."""
     about = os.fstat(1)
     if not stat.S_ISREG(about.st_mode) or not about.st_size:
         return []

@@ -1,4 +1,4 @@
-"""Opening the bus of a process, over a session that is opened again when it is stuck."""
+"""Opens the bus of a process, over a session that is reopened when it is stuck."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """The bus of a process and what watches over its session."""
+    """The bus of a process, and the watch over its session."""
 
     bus: Bus
     lifeline: Lifeline

@@ -1,4 +1,4 @@
-"""What is wrong with the messages that a process takes: refused ones, silent and misfit publishers."""
+"""Faults in the messages that a process receives: refused messages, silent and mismatched publishers."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from rbxcompose.levels import Level
 from rbxcompose.runtime.process_group.statuses import Statuses
 from rbxcompose.scheduler import Scheduler
 
-PERIOD = 1.0  # [s] between two looks
+PERIOD = 1.0  # [s] between two checks
 
 
 class Deliveries:
-    """Looks at each subscription once a second; one that is not well has a status `component: topic`."""
+    """Checks each subscription once a second; an unhealthy one has a status `component: topic`."""
 
     def __init__(self, owner: str, bus: Bus, scheduler: Scheduler, clock: Clock, statuses: Statuses) -> None:
         self._bus, self._clock, self._statuses = bus, clock, statuses
         self._every: Callable[[], object] = lambda: scheduler.every(PERIOD, owner, lambda dt: self._look())
         self._writers = bus.watch_writers(owner)
         self._started = 0.0  # [s]
-        self._told: set[str] = set()  # names of statuses that are not well
+        self._told: set[str] = set()  # names of unhealthy statuses
 
     def start(self) -> None:
-        """Begin to look: the whole robot is active, and whoever has something to say may do so."""
+        """Begin to check: the whole robot is active, and all publishers may publish."""
         self._started = self._clock.now()
         self._every()
 

@@ -13,20 +13,20 @@ from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.scheduler import Scheduler
 
 BEAT = 0.25  # [s] of real time between signs of life
-EARLY = 0.02  # [s] by which one may come too early: a process that is awake need not be woken again for it
-LOOK = 0.1  # [s] of real time between looks whether outside time still goes
-SLICE = 0.05  # [s] of real time for catching up with outside time, before messages are heard again
+EARLY = 0.02  # [s] by which a sign of life may be early: a process that is awake need not wake up again for it
+LOOK = 0.1  # [s] of real time between checks whether outside time still runs
+SLICE = 0.05  # [s] of real time for catching up with outside time, before messages are received again
 
 
 class Driven(Protocol):
-    """What a driver drives: it hears messages and is asked after each round whether it goes on."""
+    """What a driver drives: it handles messages, and says after each round whether it continues."""
 
     def handle(self, message: ChannelMessage) -> None:
         """Carry out a message from the supervisor."""
         ...
 
     def orphaned(self) -> None:
-        """Hear that the supervisor has gone."""
+        """Handle the loss of the supervisor."""
         ...
 
     def beat(self) -> None:
@@ -34,7 +34,7 @@ class Driven(Protocol):
         ...
 
     def settle(self) -> None:
-        """Look at where things stand, after everything that was due has run."""
+        """Check the state, after everything that was due has run."""
         ...
 
     @property
@@ -44,17 +44,17 @@ class Driven(Protocol):
 
 
 class Driver:
-    """Waits for channel and inbox, and lets what is driven hear them; subclasses say how time goes."""
+    """Waits for channel and inbox, and passes their messages on; subclasses define how time advances."""
 
     def __init__(self, scheduler: Scheduler, inbox: CallbackInbox, channel: Channel, driven: Driven) -> None:
         self._scheduler, self._inbox, self._channel, self._driven = scheduler, inbox, channel, driven
-        self._selector = selectors.SelectSelector()  # microseconds, where epoll rounds up to milliseconds
+        self._selector = selectors.SelectSelector()  # its timeouts have microseconds; epoll rounds up to milliseconds
         self._selector.register(inbox, selectors.EVENT_READ)
         self._selector.register(channel, selectors.EVENT_READ)
         self._next_beat = 0.0  # [s] on the monotonic clock
 
     def run(self) -> None:
-        """Run until what is driven is over."""
+        """Run until the driven process is over."""
         with self._selector:
             while not self._driven.is_over:
                 self._listen(self._pause())
@@ -62,7 +62,7 @@ class Driver:
                 self._driven.settle()
 
     def _pause(self) -> float:
-        """Return how long the next event may be waited for [s], if nothing comes."""
+        """Return how long to wait for the next event [s], if nothing arrives."""
         raise NotImplementedError
 
     def _advance(self) -> None:
@@ -87,7 +87,7 @@ class Driver:
     def _hear(self, messages: Sequence[ChannelMessage]) -> None:
         for message in messages:
             self._driven.handle(message)
-            self._run_present()  # one message after the other, however they were bundled on their way
+            self._run_present()  # one message after the other, however they were bundled in transit
         if not self._channel.is_open:
             self._selector.unregister(self._channel)
             self._driven.orphaned()
@@ -114,10 +114,10 @@ class RealTimeDriver(Driver):
 
 
 class SteppedDriver(Driver):
-    """Robot time stands still until it is let `go`, then jumps from event to event, and stands still after `halt`.
+    """Robot time stands still until `go`, then jumps from event to event, and stands still again after `halt`.
 
-    `rate` is robot seconds per real second; None is as fast as it goes. What comes from outside is heard between two
-    instants; if nothing comes, the order of events is the same in every run.
+    `rate` is robot seconds per real second; None is as fast as possible. Input from outside is handled between two
+    instants; without any, the order of events is the same in every run.
     """
 
     def __init__(
@@ -133,8 +133,8 @@ class SteppedDriver(Driver):
         super().__init__(scheduler, inbox, channel, driven)
         self._clock, self._rate = clock, rate
         self._is_running = False
-        self._deadline: float | None = None  # [s] of robot time, beyond which it does not go
-        self._origin = (0.0, 0.0)  # [s] robot time and real time that belong together
+        self._deadline: float | None = None  # [s] of robot time, where it ends
+        self._origin = (0.0, 0.0)  # [s] robot time and the corresponding real time
 
     def go(self, deadline: float | None = None) -> None:
         """Let time run, at most until `deadline` [s] of robot time."""
@@ -142,11 +142,11 @@ class SteppedDriver(Driver):
         self._origin = (self._clock.now(), time.monotonic())
 
     def hurry(self) -> None:
-        """Do not pace time any more."""
+        """Stop pacing time."""
         self._rate = None
 
     def halt(self) -> None:
-        """Let time stand still for good."""
+        """Stop time for good."""
         self._is_running = False
 
     def _next(self) -> float | None:
@@ -175,9 +175,9 @@ class SteppedDriver(Driver):
 
 
 class ExternalDriver(Driver):
-    """Robot time follows `hear`, event by event, so that a step is run for each instant at which it was due.
+    """Robot time follows `hear`, event by event, so that a step runs for each instant at which it was due.
 
-    `turned` is told when that time stands still, goes, or has jumped.
+    `turned` is called when outside time stops, runs again or has jumped.
     """
 
     def __init__(
@@ -191,14 +191,14 @@ class ExternalDriver(Driver):
     ) -> None:
         super().__init__(scheduler, inbox, channel, driven)
         self._clock, self._turned = clock, turned
-        self._real: Clock | None = None  # since it follows
+        self._real: Clock | None = None  # counts from `follow` on
 
     def follow(self, real: Clock) -> None:
-        """Begin to listen: from now on `hear` is called, or time stands still. `real` counts from now."""
+        """Begin to follow: from now on `hear` is called, or time stands still. `real` counts from now."""
         self._real = real
 
     def hear(self, outside: int) -> None:
-        """Take outside time [ns]."""
+        """Receive outside time [ns]."""
         if self._real is not None:
             self._tell(self._clock.hear(outside, real=self._real.now()))
 

@@ -30,8 +30,9 @@ class Lookup:
 class Frames:
     """Feeds a transform tree from `/tf` and `/tf_static`.
 
-    Poses are told often and asked for rarely. In real time no process is woken for each of them: they are taken when
-    somebody looks. On any other clock they are, so that all that happens at an instant has the same order in each run.
+    Poses are published often and looked up rarely. In real time, the process is not woken for each of them: they are
+    taken when somebody looks one up. On any other clock it is, so that the order of events at an instant is the same in
+    each run.
     """
 
     def __init__(self, owner: str, bus: Bus, clock: Clock, *, is_patient: bool) -> None:
@@ -46,7 +47,7 @@ class Frames:
         return self.tree.lookup(target, source)
 
     def hurry(self) -> None:
-        """Take each pose when it comes, since another thread looks, which must not take it."""
+        """Take each pose when it arrives: another thread looks them up and must not take them itself."""
         self._moving.hurry()
 
     def _fix(self, message: TFMessage) -> None:

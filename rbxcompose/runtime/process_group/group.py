@@ -1,4 +1,4 @@
-"""The main of a process group: its scheduler, clock, bus, host and driver, led by the supervisor's messages."""
+"""The main of a process group: its scheduler, clock, bus, host and driver, controlled by the supervisor's messages."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 LONGEST_CONFIGURE = 30.0  # [s]
 LONGEST_CLOSE = 1.0  # [s] to deactivate, clean up and leave the bus
-REST_BOUND = 1.0  # [s] of robot time to come to rest when the supervisor has gone
+REST_BOUND = 1.0  # [s] of robot time to come to rest when the supervisor is gone
 STEPPED_REST_BOUND = 2.0  # [s] of robot time to come to rest on a stepped clock
 CLOCK_TOPIC = "/clock"
 CLOCK_STATUS = "bus.clock"  # what diagnostics call it: no component has a dot in its name
@@ -59,7 +59,7 @@ _TOLD = {
 
 
 class ProcessGroup:
-    """One process group, from `Configure` to `Shutdown`. It stops by itself when the supervisor has gone."""
+    """One process group, from `Configure` to `Shutdown`. It stops by itself when the supervisor is gone."""
 
     def __init__(
         self,
@@ -87,13 +87,13 @@ class ProcessGroup:
         self._host: Host | None = None
         self._driver = self._made_driver()
         self._has_begun = False  # something has been activated, and may move
-        self._is_ending = False  # nothing is to come any more; brake at the end of this instant
+        self._is_ending = False  # nothing more will come; brake at the end of this instant
         self._is_orphaned = False
         self._rest_deadline: float | None = None  # [s] of robot time; None: not braking
         self._is_settled = False  # at rest for good
 
     def run(self) -> None:
-        """Run until the supervisor says so or has gone."""
+        """Run until the supervisor ends it or is gone."""
         signal.signal(signal.SIGTERM, self._on_sigterm)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGTERM])
         try:
@@ -105,7 +105,7 @@ class ProcessGroup:
             if self._taping is not None:
                 self._taping.finish()
 
-    # What the driver asks
+    # What the driver calls
 
     def handle(self, message: say.ChannelMessage) -> None:
         """Carry out a message from the supervisor."""
@@ -140,12 +140,12 @@ class ProcessGroup:
                 raise RuntimeError(f"not a message for a process group: {message}")
 
     def _stop_by_bus(self) -> None:
-        """Hold everything that moves: the supervisor, which may not run, hears of it when it does."""
+        """Hold everything that moves; the supervisor may be suspended and is informed when it runs."""
         self._made_host().stop()
         self._channel.send(say.StoppedByBus())
 
     def orphaned(self) -> None:
-        """Come to rest and end: the supervisor has gone."""
+        """Come to rest and end: the supervisor is gone."""
         self._is_orphaned = self._is_ending = True
         self._is_settled = self._is_settled or self._host is None
 
@@ -157,7 +157,7 @@ class ProcessGroup:
         if not self._options.is_stepped:  # its log must be the same in each run
             for line in take_printed():
                 self._printed(Level.WARN, line, "")
-        if self._lifeline is not None and not self._options.is_stepped:  # then all is in this process
+        if self._lifeline is not None and not self._options.is_stepped:  # then everything is in this process
             self._lifeline.beat()
         if self._host is not None:
             self._host.look_at_workers()
@@ -167,7 +167,7 @@ class ProcessGroup:
             self._channel.send(say.Alive(self._clock.now(), moves, runs))
 
     def settle(self) -> None:
-        """Look whether the run is to end, whether it has come to rest, and whether nobody leads it any more."""
+        """Check whether the run must end, whether it has come to rest, and whether the supervisor is gone."""
         if self._time_is_up():
             self._is_ending = True
             self._channel.send(say.TimeIsUp())
@@ -222,7 +222,7 @@ class ProcessGroup:
 
     def _start(self) -> None:
         gc.collect()
-        gc.freeze()  # what lives now lives until the end: later collections need not look at it
+        gc.freeze()  # what lives now lives until the end: later collections need not inspect it
         self._made_host().start()
         if isinstance(self._driver, SteppedDriver):
             self._driver.go(self._options.duration)
@@ -251,7 +251,7 @@ class ProcessGroup:
 
     def _shutdown(self) -> None:
         if not self._options.is_stepped:
-            faulthandler.dump_traceback_later(LONGEST_CLOSE, exit=True)  # nothing moves any more: a hang is cut off
+            faulthandler.dump_traceback_later(LONGEST_CLOSE, exit=True)  # nothing moves any more: end a hang by force
         if self._host is not None:
             if self._rest_deadline is None:
                 self._host.brake()  # the order to brake came together with this one
@@ -267,7 +267,7 @@ class ProcessGroup:
     # Coming to rest
 
     def _time_is_up(self) -> bool:
-        # In real time the supervisor counts; on a stepped clock it could only be late.
+        # In real time the supervisor watches the duration; on a stepped clock it would be late.
         duration = self._options.duration
         is_counting = self._options.is_stepped and not self._is_ending and duration is not None
         return is_counting and duration is not None and self._clock.now() >= duration
@@ -292,7 +292,7 @@ class ProcessGroup:
     # Time from outside
 
     def _follow(self, driver: ExternalDriver, host: Host) -> None:
-        """Take robot time from the bus; until it goes, everything is held."""
+        """Take robot time from the bus; until it runs, everything is held."""
         host.hold()
         host.bus.subscribe(
             host.owner,
@@ -300,12 +300,12 @@ class ProcessGroup:
             ClockMessage,
             Qos.COMMAND,
             lambda message: driver.hear(to_nanoseconds(message.clock)),
-            max_rate=math.inf,  # it is counted in robot time, which might stand still until this brings it on
+            max_rate=math.inf,  # a limit counts in robot time, which might stand still until this message advances it
         )
         driver.follow(MonotonicClock())
 
     def _turned(self, turn: Turn) -> None:
-        """Hold or continue, with a time from outside; one process logs it for all."""
+        """Hold or continue as outside time stops or runs; one process logs it for all."""
         if self._host is None:
             return
         if turn is not Turn.GOES:
@@ -338,17 +338,17 @@ class ProcessGroup:
         return self._host
 
     def _notify(self, notice: Notice) -> None:
-        if isinstance(notice, MissionWaits):  # on a stepped clock nothing comes from outside: it would wait for ever
+        if isinstance(notice, MissionWaits):  # on a stepped clock nothing arrives from outside: it would wait for ever
             if self._options.is_stepped:
                 self._notify(MissionOver(notice.mission, "failure", notice.message))
             return
         self._channel.send(notice)
         is_the_end = isinstance(notice, MissionOver) and notice.mission == self._plan.start
         if is_the_end and self._options.is_stepped and not self._options.is_detached:
-            self._is_ending = True  # here and not by a message, which would come at another instant in each run
+            self._is_ending = True  # here and not by a message, which would arrive at another instant in each run
 
     def _printed(self, level: Level, text: str, detail: str) -> None:
-        """Log what was printed, as told by the component that runs in the thread that printed, else by the process."""
+        """Log printed text under the component that runs in the printing thread, else under the process."""
         host, thread = self._host, threading.current_thread()
         if host is None:
             self._log.write(Record(self._clock.now(), level, self._name, text, detail))

@@ -1,7 +1,7 @@
 """The ports and the context of a component that runs in a thread of its own.
 
-What it reads, it reads at once; what it does to the bus is sent to the scheduler's thread, which is the only one that
-touches it, and what comes back is handed over as any other call.
+The component reads directly. What it does to the bus is sent to the scheduler's thread, the only one that touches the
+bus; replies are handed over like any other call.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def handed_over(end: Any, port: Port[Any], worker: Worker) -> Any:
         case ServesAction():
             return _ActionServer(end, worker)
         case _:
-            return end  # it is only read
+            return end  # it is read only
 
 
 def _answering(worker: Worker, label: str, then: Callable[[Any], None]) -> Callable[[Any], None]:
@@ -68,23 +68,23 @@ class _ActionCaller(_Caller):
 
 
 class _SentGoal:
-    """A goal that is sent as soon as the scheduler comes to it."""
+    """A goal that is sent as soon as the scheduler gets to it."""
 
     def __init__(self, worker: Worker) -> None:
         self._worker = worker
         self._goal: Any = None
 
     def follow(self, goal: Any) -> None:
-        """Take the goal as it was sent; in the scheduler's thread."""
+        """Attach the goal that was sent; called in the scheduler's thread."""
         self._goal = goal
 
     def cancel(self) -> None:
-        """Ask the server to end it."""
+        """Request the server to end the goal."""
         self._worker.send(lambda: self._goal.cancel())
 
 
 class _ActionServer:
-    """The goal that is carried out."""
+    """The current goal of a server."""
 
     def __init__(self, end: Any, worker: Worker) -> None:
         self._end, self._worker = end, worker
@@ -101,7 +101,7 @@ class _ActionServer:
 
 
 class _ServedGoal:
-    """A goal; that it has ended is known here before the scheduler has come to it."""
+    """A goal; its end is known here before the scheduler has processed it."""
 
     def __init__(self, goal: Any, worker: Worker) -> None:
         self.goal, self._worker = goal, worker
@@ -137,7 +137,7 @@ class _ServedGoal:
 
 
 class HandedOver:
-    """What the runtime gives to the component besides its ports."""
+    """The context of the component: what the runtime provides besides its ports."""
 
     def __init__(self, context: Context, worker: Worker) -> None:
         self.clock: Clock = context.clock
@@ -165,7 +165,7 @@ class HandedOver:
         self._worker.send(lambda: self._context.notify(event))
 
     def repeat(self, requests: Sequence[Command]) -> None:
-        """Have the component told these again after it was restarted."""
+        """Send these to the component again after it was restarted."""
         self._worker.send(lambda: self._context.repeat(requests))
 
     def window(self, path: str, question: Query[Any]) -> Window:
@@ -174,7 +174,7 @@ class HandedOver:
 
 
 class _Window:
-    """A window that the scheduler's thread opens as soon as it comes to it."""
+    """A window that the scheduler's thread opens as soon as it gets to it."""
 
     def __init__(self, context: Context, worker: Worker, path: str, question: Query[Any]) -> None:
         self._worker = worker

@@ -1,4 +1,4 @@
-"""The host of a process: carries its components through their lifecycle and isolates their faults."""
+"""The host of a process: takes its components through their lifecycle and isolates their faults."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ from rbxcompose.typed_json import UnreadableError
 
 A = TypeVar("A")
 
-SLOW = 0.005  # [s] in one callback, after which diagnostics name it: meanwhile nothing else of the process runs
+SLOW = 0.005  # [s] in one callback, after which diagnostics name it: nothing else in the process runs meanwhile
 
-Notice = States | Failed | Repeated | RobotEvent  # what a host tells the supervisor by itself
-Told = Callable[..., None]  # takes the name of a method of the host, and words
+Notice = States | Failed | Repeated | RobotEvent  # what a host reports to the supervisor on its own
+Told = Callable[..., None]  # takes the name of a method of the host, and its arguments
 
 
 def _nobody(verb: str, *words: object) -> None:
-    """Keep no record of orders."""
+    """Ignore an order."""
 
 
 class Host:
@@ -58,9 +58,9 @@ class Host:
         told: Told = _nobody,
         post: Post | None = None,
     ) -> None:
-        """Have `told` hear of each order that is carried out, by which a recording can be done again.
+        """Take `told`, which is called with each order carried out, so that a recording can be replayed.
 
-        By `post` other threads reach the scheduler's; without it, components that may block run in the scheduler's.
+        With `post`, other threads reach the scheduler's; without it, components that may block run in the scheduler's.
         """
         self.plan, self.clock, self.bus, self.scheduler = plan, clock, bus, scheduler
         self.notify = notify
@@ -72,7 +72,7 @@ class Host:
         self.is_held = False  # robot time stands still
         self._log, self._post = log, post
         self.owner = f"host_{instances[0].process}" if instances else "host"
-        self._wanted: set[str] = set()  # to be active, as soon as they can
+        self._wanted: set[str] = set()  # components to activate as soon as possible
         self.statuses = Statuses(self.owner, bus, scheduler, clock)
         self._deliveries = Deliveries(self.owner, bus, scheduler, clock, self.statuses)
         self.parameters = Parameters(self.owner, bus, clock, plan.bus.namespace)
@@ -80,7 +80,7 @@ class Host:
         self.frames = self._frames(instances)
         self.hosted = {one.name: Hosted(self, one) for one in instances}
         self._policies = {one.name: RestartPolicy(one.restart) for one in instances}
-        self._retired: dict[str, Component[Any]] = {}  # whose place another one may take
+        self._retired: dict[str, Component[Any]] = {}  # those that another one may replace
         self.at_work: str | None = None  # the component that runs in the scheduler's thread
         self.doing = ""  # what it does
         scheduler.on_error, scheduler.observe = self.failed, self._observed
@@ -108,14 +108,14 @@ class Host:
                 self._guarded(name, self.hosted[name].activate)
 
     def start(self) -> None:
-        """Begin what waits for the whole robot to be active."""
+        """Start everything that waits for the whole robot to be active."""
         self._told("start")
         self.has_started = True
         self._deliveries.start()
         self._each_active("start")
 
     def shutdown(self) -> None:
-        """Deactivate and clean up in reverse order; a component that raises does not keep the others."""
+        """Deactivate and clean up in reverse order; a component that raises does not affect the others."""
         self._told("shutdown")
         self.is_braking = True
         for name in reversed(self.hosted):
@@ -138,12 +138,12 @@ class Host:
         self._each_active("release")
 
     def hold(self) -> None:
-        """Let nothing but rest be commanded while robot time stands still."""
+        """Allow no command but rest while robot time stands still."""
         self.is_held = True
         self._each_active("hold")
 
     def go_on(self) -> None:
-        """Allow commands again; each deadline starts over."""
+        """Allow commands again; all deadlines start over."""
         self.is_held = False
         self._each_active("go_on")
 
@@ -161,7 +161,7 @@ class Host:
         self._each_active("lost", tuple(names), cause)
 
     def request(self, instance: str, data: object) -> Request[Any]:
-        """Return the request that data stand for.
+        """Return the request that data represent.
 
         Raises:
             Refused: if the component does not take such a request, or the data cannot be read.
@@ -184,7 +184,7 @@ class Host:
         return self._idle(instance).handle(request)
 
     def _idle(self, instance: str) -> Component[Any]:
-        """Return a component that can be asked now."""
+        """Return a component that can take a request now."""
         hosted = self.hosted.get(instance)
         if hosted is None or hosted.component is None or hosted.state is not Lifecycle.ACTIVE:
             raise Refused(f"'{instance}' is not active")
@@ -224,7 +224,7 @@ class Host:
         self.statuses.publish()
 
     def follow(self, instances: Sequence[Instance], keys: Mapping[str, Sequence[str]]) -> dict[str, str]:
-        """Let components follow the settings of `keys`; return the reasons of those that refuse, by name."""
+        """Apply the settings of `keys` to components; return the reasons of those that refuse, by name."""
         refused: dict[str, str] = {}
         for one in instances:
             if (hosted := self.hosted.get(one.name)) is None:
@@ -244,7 +244,7 @@ class Host:
         return refused
 
     def work(self) -> tuple[list[str], dict[str, str]]:
-        """Return what moves the robot, and at what components are that a restart would cut off, both in words."""
+        """Return what moves the robot, and the work of components that a restart would cut off, both in words."""
         moves: list[str] = []
         runs: dict[str, str] = {}
 
@@ -259,24 +259,24 @@ class Host:
                 self._guarded(name, lambda name=name, hosted=hosted: look(name, hosted))  # type: ignore[misc]
         return moves, runs
 
-    # What is known of the components
+    # What is known about the components
 
     @property
     def is_at_rest(self) -> bool:
-        """Return whether nothing moves that a component of this process moves."""
+        """Return whether everything that the components of this process move is at rest."""
         return all(one.component.is_at_rest for one in self.hosted.values() if one.component)
 
     def summary(self) -> dict[str, dict[str, str]]:
-        """Return what the components tell for the summary: instance -> label -> text."""
+        """Return the components' facts for the summary: instance -> label -> text."""
         facts = {name: one.component.summary() for name, one in self.hosted.items() if one.component}
         return {name: some for name, some in facts.items() if some}
 
     def states(self) -> dict[str, tuple[str, int]]:
-        """Return state and number of restarts of each instance."""
+        """Return the state and the number of restarts of each instance."""
         return {name: (one.state.value, self._policies[name].restarts) for name, one in self.hosted.items()}
 
     def log(self, source: str, level: Level, text: str, detail: str = "") -> None:
-        """Write one record, for people and for who listens on the bus, unless its level is less than is wanted."""
+        """Write one record to the log and to the bus, unless its level is below the configured one."""
         hosted = self.hosted.get(source)
         if hosted is not None and level < hosted.instance.log:
             return
@@ -290,16 +290,16 @@ class Host:
     # Who works
 
     def worker(self, name: str) -> Worker | None:
-        """Return a thread for a component that may block, or None if all have to run in one: on a stepped clock."""
+        """Return a thread for a component that may block, or None if all must run in one thread: on a stepped clock."""
         return Worker(name, self.clock, self._post, partial(self.failed, name)) if self._post is not None else None
 
     def ready(self, name: str) -> None:
-        """Activate a component that took its time to be configured, if it was to be active meanwhile."""
+        """Activate a component that was slow to configure, if its activation was requested meanwhile."""
         if name in self._wanted:
             self._guarded(name, self.hosted[name].activate)
 
     def look_at_workers(self) -> None:
-        """Tell diagnostics of components that do not return from a call, and take those that never do for failed."""
+        """Report components that do not return from a call to diagnostics; those that never do have failed."""
         for name, hosted in list(self.hosted.items()):
             if hosted.worker is not None:
                 self.statuses.busy(name, hosted.worker.look())
@@ -320,7 +320,7 @@ class Host:
     # Mistakes
 
     def failed(self, name: str, error: Exception) -> None:
-        """Take an exception of a component: tell it, restart the component unless it fails too often."""
+        """Handle an exception of a component: report it, and restart the component unless it fails too often."""
         if name not in self.hosted:
             raise error
         text, detail = explain(error, self.hosted[name].file)
@@ -338,9 +338,9 @@ class Host:
             self._give_up(name, text)
 
     def _give_up(self, name: str, text: str) -> None:
-        """Leave a component as it is; one that failed too often, unlike one that is never restarted, ends the robot."""
+        """Leave a component failed; one that failed too often, unlike one that is never restarted, ends the robot."""
         self.hosted[name].state = Lifecycle.FAILED
-        if self._policies[name].is_allowed:  # told first: a robot that starts would go on without what has failed
+        if self._policies[name].is_allowed:  # first: else a starting robot would continue without it
             self.notify(Failed(name, f"'{name}' failed too often: {text}"))
         else:
             self.log(name, Level.WARN, "stays failed: it is never restarted")
@@ -357,7 +357,7 @@ class Host:
     def _guarded(self, name: str, action: Callable[[], None]) -> None:
         try:
             self._working(name, action)
-        except Exception as error:  # whatever a plug-in raises is its own failure, and told as such
+        except Exception as error:  # whatever a plug-in raises is its own failure, and reported as such
             self.failed(name, error)
 
     def _each_active(self, method: str, *arguments: object) -> None:

@@ -29,7 +29,7 @@ from rbxcompose.sdk.ports import Port, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.typed_json import to_data
 
-LONGEST_GOODBYE = 0.3  # [s] to wait for a component's own thread when it is to end
+LONGEST_GOODBYE = 0.3  # [s] to wait for a component's own thread to end
 
 
 class Lifecycle(StrEnum):
@@ -42,7 +42,7 @@ class Lifecycle(StrEnum):
 
 
 class ServesParameters(Protocol):
-    """What makes the settings of an instance parameters of ROS 2."""
+    """Serves the settings of an instance as parameters of ROS 2."""
 
     def serve(self, hosted: Hosted, /) -> None:
         """Serve the parameters of an instance."""
@@ -66,24 +66,24 @@ class InstanceHome(Protocol):
 
     @property
     def notify(self) -> Callable[[Repeated | RobotEvent], None]:
-        """Return what tells the supervisor."""
+        """Return the function that notifies the supervisor."""
         ...
 
     @property
     def parameters(self) -> ServesParameters:
-        """Return what serves parameters."""
+        """Return the server of parameters."""
         ...
 
     def worker(self, name: str) -> Worker | None:
-        """Return a thread for an instance that may block; None if it runs in the scheduler's."""
+        """Return a thread for an instance that may block; None if it runs in the scheduler's thread."""
         ...
 
     def ready(self, name: str) -> None:
-        """Hear that an instance is inactive."""
+        """Handle that an instance has become inactive."""
         ...
 
     def changed(self, name: str) -> None:
-        """Hear that the state of an instance has changed."""
+        """Handle a change of the state of an instance."""
         ...
 
     def log(self, source: str, level: Level, text: str, detail: str = "") -> None:
@@ -91,7 +91,7 @@ class InstanceHome(Protocol):
         ...
 
     def ask(self, instance: str, request: Request[Any]) -> Any:
-        """Have an instance answer a request."""
+        """Return an instance's answer to a request."""
         ...
 
 
@@ -102,23 +102,23 @@ class Hosted:
         self.host, self.instance = host, instance
         self.clock: Clock = host.clock
         self.state = Lifecycle.UNCONFIGURED
-        self.config = instance.config  # as it is now: parameters may have changed it
+        self.config = instance.config  # the current one: parameters may have changed it
         self.component: Component[Any] | None = None
         self.worker: Worker | None = None  # the thread of a component that may block
         self._ends: dict[str, Any] = {}  # of the ports, on the bus
-        self._claiming: list[Any] = []  # those of them that serve an action which claims a part of the robot
-        self._repeated: Sequence[Command] = ()  # what it is told again after it was restarted in its place
-        self._wakes: set[float] = set()  # robot times [s] at which the component is to be woken
+        self._claiming: list[Any] = []  # those ports that serve an action which claims a part of the robot
+        self._repeated: Sequence[Command] = ()  # requests that it gets again after a restart in place
+        self._wakes: set[float] = set()  # robot times [s] at which to wake the component
 
     @property
     def file(self) -> str | None:
-        """Return the file in which the component's type is written."""
+        """Return the file that defines the component's type."""
         return sys.modules[component_type(self.instance.type).__module__].__file__
 
     # Lifecycle
 
     def configure(self) -> None:
-        """Make the component, bind its ports, let it get ready."""
+        """Create the component, bind its ports, and configure it."""
         cls = component_type(self.instance.type)
         self.worker = self.host.worker(self.instance.name) if cls.blocking else None
         made = cls(self.instance.name, self.config, self if self.worker is None else HandedOver(self, self.worker))
@@ -141,7 +141,7 @@ class Hosted:
             self.host.ready(self.instance.name)
 
     def reconfigure(self, config: Config) -> None:
-        """Let the component follow another configuration; if it raises, the old one stays."""
+        """Apply another configuration to the component; if it raises, the old one stays."""
         if self.is_busy:
             raise Refused(f"'{self.instance.name}' is busy")
         component, old = self._made(), self.config
@@ -154,7 +154,7 @@ class Hosted:
         self.config = config
 
     def activate(self) -> None:
-        """Let the component work; it joins a robot that has started, is stopped or goes down as the others did."""
+        """Activate the component; like the others, it learns that the robot has started, is stopped or goes down."""
         component = self._made()
         self.host.statuses.set(self.instance.name, Level.OK, "active", {})
         self.do("activate", component.activate, then=self._activated)
@@ -175,10 +175,10 @@ class Hosted:
             self.do("start", component.start)
             for request in self._repeated:
                 self.do("command", partial(self._repeat, component, request))
-        self.host.bus.open(self.instance.name)  # who found it before it was active has waited
+        self.host.bus.open(self.instance.name)  # those who found it before it was active have waited
 
     def close(self) -> None:
-        """Deactivate and clean up, as far as it got, and give back its ports."""
+        """Deactivate and clean up, as far as it got, and release its ports."""
         self.host.scheduler.remove(self.instance.name)
         component, state = self.component, self.state
         try:
@@ -191,7 +191,7 @@ class Hosted:
             self.host.bus.close_owner(self.instance.name)
 
     def abandon(self) -> None:
-        """Forget the component as it is."""
+        """Drop the component without cleaning up."""
         if self.worker is not None:
             self.worker.close(0.0)
         self.component = self.worker = None
@@ -200,7 +200,7 @@ class Hosted:
         self.state = Lifecycle.UNCONFIGURED
 
     def _taken_back(self, component: Component[Any]) -> bool:
-        """Let the scheduler's thread use the component itself again; tell whether its own thread has let go of it."""
+        """Return the component to the scheduler's thread; return whether its own thread has let go of it."""
         if self.worker is None:
             return True
         label, _ = self.worker.busy_for()
@@ -213,9 +213,9 @@ class Hosted:
     def do(
         self, label: str, call: Callable[[], None], *, depth: int | None = None, then: Callable[[], None] | None = None
     ) -> None:
-        """Have the component do something, now or, if it has a thread, there; `then` follows in the scheduler's thread.
+        """Run a call of the component, now or, if it has a thread, there; `then` follows in the scheduler's thread.
 
-        Of calls that wait with the same label, the newest `depth` are kept.
+        Of waiting calls with the same label, the newest `depth` are kept.
         """
         worker = self.worker
         if worker is not None:
@@ -228,12 +228,12 @@ class Hosted:
 
     @property
     def is_busy(self) -> bool:
-        """Return whether the component is in a call in its own thread, so that no other may use it."""
+        """Return whether the component is in a call in its own thread, so that no other thread must use it."""
         return self.worker is not None and self.worker.is_busy
 
     @property
     def moves(self) -> str:
-        """Return in words what of it moves the robot or is about to; empty if nothing."""
+        """Return in words how it moves the robot or is about to; empty if it does not."""
         component = self.component
         if component is None or self.state is not Lifecycle.ACTIVE:
             return ""
@@ -244,7 +244,7 @@ class Hosted:
         return component.occupation if component.claims else ""
 
     def cancel_claimed(self) -> None:
-        """Ask the goals that claim a part of the robot to end."""
+        """Request the end of the goals that claim a part of the robot."""
         for server in self._claiming:
             server.cancel_all()
 
@@ -288,7 +288,7 @@ class Hosted:
     def wake_at(self, time: float) -> None:
         """Call the component's `wake` at robot time `time` [s]."""
         time = max(time, self.clock.now())
-        if time not in self._wakes:  # a wake that asks for the next one would otherwise multiply
+        if time not in self._wakes:  # a wake that requests the next one would otherwise multiply
             self._wakes.add(time)
             self.host.scheduler.at(time, self.instance.name, lambda: self._wake(time))
 
@@ -301,7 +301,7 @@ class Hosted:
         self.host.notify(event)
 
     def repeat(self, requests: Sequence[Command]) -> None:
-        """Have the component told these again after it, or its process, was restarted."""
+        """Send these to the component again after it, or its process, was restarted."""
         self._repeated = requests
         self.host.notify(Repeated(self.instance.name, [as_data(one) for one in requests]))
 

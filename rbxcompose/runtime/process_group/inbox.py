@@ -10,7 +10,7 @@ from rbxcompose.scheduler import Scheduler
 
 
 class CallbackInbox:
-    """Takes callbacks from any thread or signal handler and wakes who waits for its descriptor."""
+    """Takes callbacks from any thread or signal handler and wakes the thread that waits for its descriptor."""
 
     def __init__(self) -> None:
         self._descriptor = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
@@ -18,27 +18,27 @@ class CallbackInbox:
         self._is_signalled = False
 
     def fileno(self) -> int:
-        """Return the descriptor that is readable when something has come."""
+        """Return the descriptor that is readable when something has arrived."""
         return self._descriptor
 
     def put(self, owner: str, callback: Callable[[], None]) -> None:
-        """Let `callback` run for `owner` on the scheduler's thread. May be called from any thread."""
+        """Run `callback` for `owner` on the scheduler's thread. May be called from any thread."""
         self._callbacks.append((owner, callback))
         if not self._is_signalled:  # one system call per wake, not per sample
             self._is_signalled = True
             os.eventfd_write(self._descriptor, 1)
 
     def drain(self, scheduler: Scheduler) -> None:
-        """Post everything that has come, in the order of arrival."""
-        # Read whatever the flag says: of two threads that signal at once, one may write after the other was heard.
+        """Post everything that has arrived, in the order of arrival."""
+        # Read regardless of the flag: if two threads signal at the same time, one may write after the other was served.
         try:
             os.eventfd_read(self._descriptor)
         except BlockingIOError:
-            return  # nothing has come, or its write is still to come
-        self._is_signalled = False  # before the reading: what comes from now on signals again
+            return  # nothing has arrived, or its write is still pending
+        self._is_signalled = False  # before reading: anything that arrives from now on signals again
         while self._callbacks:
             scheduler.post(*self._callbacks.popleft())
 
     def close(self) -> None:
-        """Give the descriptor back; nothing may be put in afterwards."""
+        """Close the descriptor; nothing must be put in afterwards."""
         os.close(self._descriptor)

@@ -1,8 +1,8 @@
-"""Proves that the session of a process still carries data, and opens it again when it does not.
+"""Checks that the session of a process still carries data, and reopens it when it does not.
 
-A session can be stuck for hours while Zenoh takes it for sound. So each process asks the nearest of the others over the
-bus, after a miss all of them and the router of the robot, and answers them. Questions are answered in Zenoh's own
-thread, because they are about the session: whether the loop of a process turns is told by its signs of life.
+A session can be stuck for hours while Zenoh considers it healthy. So each process sends a probe over the bus to the
+nearest of the others, after a miss to all of them and to the robot's router, and answers the probes of others. Probes
+are answered in Zenoh's own thread, because they test the session; signs of life show whether a process's loop runs.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from rbxcompose.bus.renewal import RenewableTransport
 from rbxcompose.bus.transport import Question, Transport, TransportReply
 from rbxcompose.runtime.process_group.driver import BEAT
 
-BEATS = 3  # of the process between two probes: three that are missed, and the change, take less than 4 s
-LONGEST_PROBE = 4.0  # [s] for an answer; all is over by then
+BEATS = 3  # of the process between two probes: three misses and the new session take less than 4 s
+LONGEST_PROBE = 4.0  # [s] for an answer; a probe is over by then
 LONGEST_CLOSE = 1.0  # [s] for closing a session; Zenoh may hang in it
-FIRST_PAUSE, LONGEST_PAUSE = 2, 120  # beats until the next try, when no session can be opened
+FIRST_PAUSE, LONGEST_PAUSE = 2, 120  # beats until the next try, if no session can be opened
 KNOCK = 0.05  # [s] to wait for a connection on the loopback interface
 
 Post = Callable[[str, Callable[[], None]], None]
@@ -36,7 +36,7 @@ def answer(question: Question) -> None:
 class Lifeline:
     """Sends a probe every `BEATS` beats of its process, and answers those of others.
 
-    What would block, closing a session and opening one, is done in a thread of its own; all else in the scheduler's.
+    Closing and opening a session may block and have a thread of their own; all else runs in the scheduler's thread.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Lifeline:
     ) -> None:
         """Take the endpoint of the router, and whether it is the robot's own, which answers probes.
 
-        `reopen` returns the transport over a new session, `post` has a callback run in the scheduler's thread.
+        `reopen` returns the transport over a new session, `post` runs a callback in the scheduler's thread.
         """
         self._key, self._transport, self._reopen, self._router = probe_key(robot), transport, reopen, router
         self._post, self._log = post, log
@@ -61,11 +61,11 @@ class Lifeline:
         self._sent: _Sent | None = None
         self._is_changing = False
         self._pause, self._retry = FIRST_PAUSE, 0  # beats
-        self._has_hung = False  # the old session, in closing
+        self._has_hung = False  # the old session, while closing
         transport.serve(self._key, answer)
 
     def beat(self) -> None:
-        """Count a beat of the process; when it is time, judge the last probe and send the next one."""
+        """Count a beat of the process; when due, evaluate the last probe and send the next one."""
         self._beats += 1
         if self._is_changing:
             self._look_whether_to_try()
@@ -82,7 +82,7 @@ class Lifeline:
 
     @property
     def heard(self) -> ProbeResult:
-        """Return what has come back so far to the probe that is on its way."""
+        """Return the result of the current probe so far."""
         return self._sent.heard if self._sent is not None else ProbeResult.NOTHING
 
     def _router_is_up(self) -> bool:
@@ -132,19 +132,19 @@ class Lifeline:
 
 
 def _close(old: Transport) -> None:
-    with suppress(zenoh.ZError):  # it is stuck, and left behind
+    with suppress(zenoh.ZError):  # it is stuck, and abandoned
         old.close()
 
 
 class _Sent:
-    """A probe on its way."""
+    """A probe that was sent."""
 
     def __init__(self, transport: Transport, key: str, *, of_all: bool) -> None:
         self.heard = ProbeResult.NOTHING
         self._asked = transport.ask(key, b"", b"", self._answered, of_all=of_all, within=LONGEST_PROBE)
 
     def close(self) -> ProbeResult:
-        """Wait no longer; return what has come."""
+        """Stop waiting and return the result."""
         heard = self.heard
         self._asked.close()
         return heard
@@ -153,5 +153,5 @@ class _Sent:
         # In a thread of the transport, so that a loop which is busy for a while does not miss it.
         if not given.error:
             self.heard = ProbeResult.ANSWER
-        elif self.heard is not ProbeResult.ANSWER:  # each query ends with an error, also after its answers
+        elif self.heard is not ProbeResult.ANSWER:  # each query ends with an error, even after its answers
             self.heard = ProbeResult.NOBODY

@@ -33,11 +33,11 @@ from rbxcompose.sdk.ports import (
 
 
 class Handling(Protocol):
-    """Who has a component do something."""
+    """What runs the handlers of a component."""
 
     @property
     def worker(self) -> Worker | None:
-        """Return the thread of the component, if it has one."""
+        """Return the component's own thread, if it has one."""
         ...
 
     def refusal(self, port: Port[Any]) -> str:
@@ -45,7 +45,7 @@ class Handling(Protocol):
         ...
 
     def do(self, label: str, call: Callable[[], None], *, depth: int | None = None) -> None:
-        """Have `call` run by whichever thread the component belongs to."""
+        """Run `call` in the thread that the component belongs to."""
         ...
 
     def log(self, level: Level, text: str) -> None:
@@ -54,7 +54,7 @@ class Handling(Protocol):
 
 
 def bind(component: Component[Any], instance: Instance, bus: Bus, frames: Frames | None, handling: Handling) -> None:
-    """Fill `component.bound`; what arrives goes to its handlers unless there is a reason to refuse it."""
+    """Fill `component.bound`; incoming data go to its handlers unless there is a reason to refuse them."""
     for name, port in type(component).ports(component.config).items():
         component.bound[name] = _end(component, instance, name, port, bus, frames, handling)
 
@@ -78,7 +78,7 @@ def _end(
             return bus.publisher(owner, instance.topic(name), interface, port.qos)
         case In():
             topic, handler = instance.topic(name), _on_message(component, name, port, handling)
-            waits = isinstance(port, ServesTopic)  # as goals do: who sends an order once somebody listens counts on it
+            waits = isinstance(port, ServesTopic)  # like goals: a sender that waits for a listener relies on it
             return bus.subscribe(owner, topic, interface, port.qos, handler, max_rate=port.max_rate, waits=waits)
         case Serves():
             serve = _on_request(component, name, port, handling)
@@ -110,7 +110,7 @@ def _lookup(port: Looks, frames: Frames | None, handling: Handling) -> Lookup:
 def _pause(
     server: ActionServer[Any, Any, Any], port: Port[Any], handling: Handling, request: SetBool.Request
 ) -> SetBool.Response:
-    """Hold the goal that is carried out, or let it go on; a robot that is stopped lets nothing go on."""
+    """Pause or resume the current goal; while the robot is stopped, nothing resumes."""
     goal = server.current
     if goal is None:
         return SetBool.Response(success=False, message="no goal is being carried out")
@@ -127,7 +127,7 @@ def _on_message(component: Component[Any], name: str, port: In[Any], handling: H
 
     def take(message: Any) -> None:
         reason = handling.refusal(port)
-        if not reason:  # else it stays the newest value, for who asks
+        if not reason:  # else it only stays the newest value, for whoever reads it
             handling.do(label, partial(handler, message), depth=depth)
         elif isinstance(port, ServesTopic):
             handling.log(Level.WARN, f"an order to {name} is not carried out: {reason}")

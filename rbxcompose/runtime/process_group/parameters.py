@@ -39,10 +39,10 @@ class Parameters:
         serve(name, f"{name}/set_parameters_atomically", rcl.SetParametersAtomically, served.set_all)
 
     def change(self, hosted: Hosted, config: Config) -> None:
-        """Let a component follow other settings, and tell everybody.
+        """Apply new settings to a component, and publish the change.
 
         Raises:
-            Refused: if it cannot be done now, with the reason.
+            Refused: if this cannot be done now, with the reason.
         """
         _Served(self, hosted).follow(config)
 
@@ -53,7 +53,7 @@ class Parameters:
 
 
 class _Served:
-    """What the services of one component answer."""
+    """The implementation of the services of one component."""
 
     def __init__(self, parameters: Parameters, hosted: Hosted) -> None:
         self._parameters, self._hosted = parameters, hosted

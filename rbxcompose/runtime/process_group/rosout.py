@@ -1,4 +1,4 @@
-"""`/rosout`: the log lines of components as ROS 2 has them."""
+"""`/rosout`: the log lines of components, in the form of ROS 2."""
 
 from __future__ import annotations
 
@@ -21,5 +21,5 @@ class Rosout:
         self._publisher = bus.publisher(owner, TOPIC, Log, Qos.EVENT)
 
     def publish(self, name: str, level: Level, text: str) -> None:
-        """Send one line of the component `name`."""
+        """Publish one line of the component `name`."""
         self._publisher(Log(stamp=to_time(self._clock.stamp()), level=_LEVELS[level], name=name, msg=text))

@@ -56,7 +56,7 @@ class Router:
                 raise RuntimeError(f"not a message for a router: {message}")
 
     def orphaned(self) -> None:
-        """End: the supervisor has gone."""
+        """End: the supervisor is gone."""
         self.is_over = True
 
     def beat(self) -> None:

@@ -18,15 +18,15 @@ class Taping:
     """Writes a tape of a robot to a file, with its plan; secrets of the plan are left out."""
 
     def __init__(self, path: Path, plan: Plan, clock: Clock, log: Callable[[str], None]) -> None:
-        """Take the robot's `clock`; `log` is told, once, why a recording has ended too early."""
+        """Take the robot's `clock`; `log` is called once with the reason if a recording ends too early."""
         self._path, self._log = path, log
-        self._real = MonotonicClock()  # by which a killed recorder loses little
+        self._real = MonotonicClock()  # so that a killed recorder loses little
         self._recorder: Recorder | None = None
         self._try(lambda: self._begin(plan))
         self.tape = Tape(clock, self._declare, self._add)
 
     def keep(self) -> None:
-        """Do what is due: to be called several times a second."""
+        """Write what is due; must be called several times a second."""
         recorder = self._recorder
         if recorder is not None:
             self._try(lambda: recorder.keep(self._real.now()))

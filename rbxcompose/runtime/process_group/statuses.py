@@ -1,4 +1,4 @@
-"""The diagnostic statuses of a process: kept here, sent once a second and at once when a level changes."""
+"""The diagnostic statuses of a process: published once a second, and immediately when a level changes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class _Slow:
 
 
 class Statuses:
-    """What each component of a process said last about itself."""
+    """The last status of each component of a process."""
 
     def __init__(self, owner: str, bus: Bus, scheduler: Scheduler, clock: Clock) -> None:
         self._owner, self._scheduler, self._clock = owner, scheduler, clock
@@ -45,7 +45,7 @@ class Statuses:
         scheduler.every(PERIOD, owner, lambda dt: self.publish())
 
     def set(self, name: str, level: Level, message: str, values: Mapping[str, object]) -> None:
-        """Keep a status; one with a new level goes out at this instant."""
+        """Keep a status; publish it at this instant if its level is new."""
         before = self._statuses.get(name)
         pairs = tuple(KeyValue(key=key, value=str(value)) for key, value in values.items())
         self._statuses[name] = DiagnosticStatus(level=int(level), name=name, message=message, values=pairs)
@@ -53,17 +53,17 @@ class Statuses:
             self._publish_soon()
 
     def forget(self, name: str) -> None:
-        """Report nothing more about a component that no longer exists."""
+        """Stop reporting on a component that no longer exists."""
         for known in (self._statuses, self._busy, self._slow):
             known.pop(name, None)
 
     def block(self, causes: Mapping[str, str]) -> None:
-        """Show those components as not well that cannot do their work, whatever they say; replaces who was blocked."""
+        """Show exactly these components as blocked, at least as a warning, whatever their own status."""
         self._blocked = dict(causes)
         self._publish_soon()
 
     def busy(self, name: str, text: str) -> None:
-        """Show a component as not well that does not return from a call, in words; without any it is well again."""
+        """Show a component that does not return from a call with at least a warning; an empty text clears it."""
         if text == self._busy.get(name, ""):
             return
         if bool(text) is not (name in self._busy):

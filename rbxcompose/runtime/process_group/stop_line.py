@@ -1,6 +1,6 @@
-"""A second way for `stop`, past the supervisor: whoever asks here has this process hold everything that moves.
+"""A second path for `stop`, past the supervisor: a query here makes this process hold everything that moves.
 
-A supervisor that a signal suspended, or that waits for a disk, answers nobody while the robot drives on.
+A supervisor that is suspended by a signal, or waits for a disk, answers nobody while the robot drives on.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ PATH = "stop"  # below the robot's own keys; a process adds its name
 
 
 def stop_key(robot: str, process: str = "*") -> str:
-    """Return the Zenoh key at which a process is asked to stop; without its name, those of all."""
+    """Return the Zenoh key of the stop query of a process; without a name, that of all processes."""
     return admin_key(robot, f"{PATH}/{process}")
 
 
@@ -25,7 +25,7 @@ def open_stop_line(
     stop: Callable[[], None],
     post: Callable[[str, Callable[[], None]], None],
 ) -> Closable:
-    """Have `stop` called by the scheduler's thread for each question, and answer with the name of the process."""
+    """Call `stop` in the scheduler's thread for each query, and answer with the name of the process."""
 
     def asked(question: Question) -> None:
         def carry_out() -> None:

@@ -1,6 +1,6 @@
 """A watchdog within a process: it ends the process if its loop does not run, and reports where it hung.
 
-It counts its own wakings, not time: a process that was suspended, or a machine that slept, has hung nowhere.
+It counts its own wake-ups, not time: a suspended process, or a machine that slept, has not hung.
 """
 
 from __future__ import annotations
@@ -12,22 +12,22 @@ import sys
 import threading
 import time
 
-HANG = 2.0  # [s] without a turn of the loop after which the process ends itself
-PERIOD = 0.25  # [s] between two wakings
+HANG = 2.0  # [s] without an iteration of the loop after which the process ends itself
+PERIOD = 0.25  # [s] between two wake-ups
 MARK = "the loop did not run for "
 """What the process prints before the places where its threads are."""
 
 
 class Watchdog:
-    """Ends the process with exit code 1 unless it is fed in time. A hang that keeps Python's lock is not seen here."""
+    """Ends the process with exit code 1 unless it is fed in time. It cannot detect a hang that holds Python's lock."""
 
     def __init__(self) -> None:
         self._seconds = HANG
-        self._left = 0  # wakings until the end
+        self._left = 0  # wake-ups until the end
         self._thread: threading.Thread | None = None
 
     def feed(self, seconds: float = HANG) -> None:
-        """Let the process live for another `seconds` [s], less the part of a period that has gone already."""
+        """Let the process live for another `seconds` [s], less the part of a period that has already passed."""
         self._seconds, self._left = seconds, math.ceil(seconds / PERIOD)
         if self._thread is None:
             self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)

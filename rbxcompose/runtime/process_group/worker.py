@@ -1,8 +1,8 @@
 """The thread of a component that may block, and the calls that wait for it.
 
 A component is used by one thread at a time, so that neither it nor its ports need a lock: the scheduler's thread hands
-one call over and keeps its hands off the component until that has returned. What the component sends meanwhile comes
-back through the inbox of the process and is sent by the scheduler's thread.
+one call over and does not touch the component until the call has returned. What the component sends meanwhile goes
+through the inbox of the process, and the scheduler's thread sends it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from queue import SimpleQueue
 
 from rbxcompose.clock import Clock
 
-LONG = 1.0  # [s] in one call, after which diagnostics tell
+LONG = 1.0  # [s] in one call, after which diagnostics report it
 LONGEST = 30.0  # [s] in one call, after which the component has failed and its thread is left behind
 
 Call = Callable[[], None]
@@ -37,8 +37,8 @@ class Worker:
     """Runs calls one after the other in a thread of its own; all methods are called from the scheduler's thread."""
 
     def __init__(self, owner: str, clock: Clock, post: Post, failed: Callable[[Exception], None]) -> None:
-        """Take `post`, by which any thread has something run in the scheduler's thread for `owner`."""
-        self.skipped = 0  # calls that had to make room for newer ones
+        """Take `post`, with which any thread can run a callback in the scheduler's thread for `owner`."""
+        self.skipped = 0  # calls dropped in favour of newer ones
         self._owner, self._clock, self._failed = owner, clock, failed
         self._post = post
         self._waiting: list[_Waiting] = []
@@ -55,7 +55,7 @@ class Worker:
         return bool(self._label)
 
     def submit(self, label: str, call: Call, depth: int | None = None) -> None:
-        """Have `call` run after those that wait; with a `depth`, the oldest of as many with this label makes room."""
+        """Queue `call`; if `depth` calls with this label are waiting already, drop the oldest of them."""
         if self._is_closed:
             return
         same = [one for one in self._waiting if one.label == label]
@@ -66,15 +66,15 @@ class Worker:
         self._hand_over()
 
     def send(self, call: Call) -> None:
-        """Have the scheduler's thread send something, unless the component has gone by then. Any thread may call."""
+        """Run `call` in the scheduler's thread, unless the component is gone by then. Any thread may call this."""
         self._post(self._owner, lambda: None if self._is_closed else call())
 
     def busy_for(self) -> tuple[str, float]:
-        """Return the call that runs and for how long it has [s]."""
+        """Return the label of the current call, and how long it has been running [s]."""
         return (self._label, self._clock.now() - self._since) if self.is_busy else ("", 0.0)
 
     def look(self) -> str:
-        """Return in words what takes long, empty if nothing does; a call that takes too long is a failure."""
+        """Return in words which call takes long, empty if none does; a call that takes too long is a failure."""
         label, seconds = self.busy_for()
         if seconds > LONGEST and not self._is_closed:
             error = HungError(f"{label} has not returned for {LONGEST:g} s")
@@ -83,7 +83,7 @@ class Worker:
         return f"has been in {label} for {seconds:.0f} s" if seconds > LONG else ""
 
     def close(self, patience: float) -> bool:
-        """Forget what waits and end the thread; tell whether it was not in a call after `patience` [s]."""
+        """Drop the waiting calls and end the thread; return whether it has ended within `patience` [s]."""
         self._is_closed = True
         self._waiting.clear()
         self._calls.put(None)
@@ -102,7 +102,7 @@ class Worker:
             error: Exception | None = None
             try:
                 call()
-            except Exception as raised:  # whatever a component raises is its own failure, and told as such
+            except Exception as raised:  # whatever a component raises is its own failure, and reported as such
                 error = raised
             self._post(self._owner, lambda error=error: self._returned(error))  # type: ignore[misc]
 

@@ -1,1 +1,1 @@
-"""How a robot is led: the supervisor, what it decides, and the processes that it has forked."""
+"""How a robot is supervised: the supervisor, its decisions, and the processes that it has forked."""

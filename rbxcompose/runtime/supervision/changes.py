@@ -1,4 +1,4 @@
-"""What another plan changes in a running robot, decided before anything is touched. Pure."""
+"""What a new plan changes in a running robot, decided before anything is touched. Pure."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from rbxcompose.plan.diff import WHOLE, Change, difference
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.runtime.supervision.dependents import is_commanding
 
-WORLD = "world"  # the process group of simulated truth, which cannot come back as it was
+WORLD = "world"  # the process group of simulated truth, whose state a restart would lose
 DOWN_AND_UP = "needs 'down' and 'up'"
 
-_TAKEN_OVER = ("starts_after", "restart", "log")  # options that nothing has to be restarted for
+_TAKEN_OVER = ("starts_after", "restart", "log")  # options that can change without a restart
 _OPTIONS = ("type", "process", *_TAKEN_OVER)
 
 
 class Fate(StrEnum):
-    """What becomes of a component."""
+    """What a change does to a component."""
 
     KEPT = "kept"
     LIVE = "changed live"
@@ -30,9 +30,9 @@ class Fate(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Fated:
-    """A component, what becomes of it, and why."""
+    """A component, what the change does to it, and why."""
 
-    instance: Instance  # as it will be; of a removed one as it was
+    instance: Instance  # as it will be; if removed, as it was
     fate: Fate
     reasons: tuple[Change, ...] = ()
 
@@ -49,25 +49,25 @@ class Fated:
 
 @dataclass(frozen=True, slots=True)
 class Changes:
-    """What leads from one plan to another; `fated` in start order, what is removed last."""
+    """The changes from one plan to another; `fated` is in start order, with the removed ones last."""
 
     before: Plan
     after: Plan
     fated: tuple[Fated, ...]
-    impossible: tuple[str, ...] = ()  # why it cannot be done while the robot is up, in words
+    impossible: tuple[str, ...] = ()  # why this cannot be done while the robot is up, in words
 
     @property
     def is_empty(self) -> bool:
-        """Return whether the plans do the same."""
+        """Return whether the plans are equivalent."""
         return not self.impossible and all(one.fate is Fate.KEPT for one in self.fated)
 
     def names(self, fate: Fate) -> list[str]:
-        """Return the components of one fate."""
+        """Return the components that share a fate."""
         return [one.instance.name for one in self.fated if one.fate is fate]
 
     @property
     def starting(self) -> frozenset[str]:
-        """Return the components that are started, once more or for the first time."""
+        """Return the components that are started, again or for the first time."""
         return frozenset(one.instance.name for one in self.fated if one.starts)
 
     @property
@@ -76,10 +76,10 @@ class Changes:
         return frozenset(one.instance.name for one in self.fated if one.stops)
 
     def unsafe(self, moves: Collection[str], runs: Mapping[str, str]) -> str:
-        """Return why it cannot be done just now, or nothing if it can.
+        """Return why the changes cannot be made now, or nothing if they can.
 
-        `moves` are words for what moves the robot or is about to, `runs` what components are at that a restart would
-        cut off. `Live` settings are made to be changed while the robot moves.
+        `moves` says in words what moves the robot or is about to, `runs` which work of components would be cut off.
+        `Live` settings are made to be changed while the robot moves.
         """
         cut = next((name for name in runs if name in self.stopping), None)
         if cut is not None:
@@ -100,7 +100,7 @@ class Changes:
 
 
 def changes(before: Plan, after: Plan, failed: Collection[str] = ()) -> Changes:
-    """Return what leads from `before`, which runs, to `after`; what has `failed` is tried again."""
+    """Return the changes from `before`, which runs, to `after`; components that have `failed` are started again."""
     found = difference(before, after)
     old = {one.name: one for one in before.instances}
     fated = [_fated(old.get(one.name), one, found.changed.get(one.name, ()), failed) for one in after.instances]

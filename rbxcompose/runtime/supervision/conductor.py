@@ -1,7 +1,7 @@
-"""What the supervisor decides, pure: when each process is started, informed or ended, and how the robot ends.
+"""The decisions of the supervisor, pure: when each process is started, informed or ended, and how the robot ends.
 
-The shell around it (`supervisor.py`) carries out the `ConductorEffects` and tells what happened; time comes from a
-scheduler.
+The shell around it (`supervisor.py`) carries out the `ConductorEffects` and reports what happened; time comes from
+a scheduler.
 """
 
 from __future__ import annotations
@@ -44,22 +44,22 @@ class Conductor:
         self.time = 0.0  # [s] of robot time, as far as known
         self.states: dict[str, tuple[str, int]] = {one.name: ("unconfigured", 0) for one in plan.instances}
         self.is_real_time = not options.is_stepped and not plan.follows_clock
-        self.blocked: dict[str, str] = {}  # who cannot do its work -> who has failed
+        self.blocked: dict[str, str] = {}  # blocked component -> failed component
         self.plan = plan
         self.generation = 0  # of the plan: how often it was changed
         self._changing: Changing | None = None
-        self._repeated: dict[str, list[dict[str, Any]]] = {}  # what components are told again after a restart
+        self._repeated: dict[str, list[dict[str, Any]]] = {}  # requests that components get again after a restart
         self._options, self._router = options, router
         self._scheduler, self._effects = scheduler, effects
         names = [*([router] if router else []), *plan.groups]
         self.members = {name: Member(name) for name in names}
-        self._is_running = False  # all has been active
+        self._is_running = False  # everything has been active
         self._silence = Silence(effects, self._tell_lost, scheduler.now)
-        self._closing: Closing | None = None  # from the beginning of the end on
+        self._closing: Closing | None = None  # set once the robot goes down
 
     @property
     def phase(self) -> Phase:
-        """Return where the robot as a whole stands."""
+        """Return the phase of the whole robot."""
         if self._closing:
             return self._closing.phase
         return Phase.RUNNING if self._is_running else Phase.STARTING
@@ -79,26 +79,26 @@ class Conductor:
         member.forked(self._scheduler.now)
         member.is_stopped = self.is_stopped
         self._effects.fork(name, is_restart=is_restart, is_stopped=self.is_stopped)
-        if self.generation and name != self._router:  # the pre-fork parent knows the first plan only
+        if self.generation and name != self._router:  # the pre-fork parent knows only the first plan
             self._effects.send(name, say.Adopt(text_of(self.plan, self.plan.of_group(name))))
         if name == self._router or self.endpoint is not None:
             self._effects.send(name, say.Configure(self.endpoint, self.time))
 
     def _proceed(self) -> None:
-        """Do the next step of starting, for the robot as a whole or for processes that came again."""
+        """Do the next step of starting, for the whole robot or for restarted processes."""
         if self.is_going_down or not self._all_configured():
             return
         waiting = [one for one in self.plan.instances if self.states[one.name][0] not in ("active", "failed")]
         fresh = [one for one in waiting if one.name not in self.members[one.process].requested]
         if self.phase is Phase.STARTING and waiting[:1] != fresh[:1]:
-            return  # the answer of the first is to come, or it is being restarted in place
+            return  # the answer of the first one is pending, or it is being restarted in place
         if fresh:
             group = fresh[0].process
             self._activate(group, [one.name for one in takewhile(lambda one: one.process == group, fresh)])
             return
         if self.phase is Phase.STARTING:
             self._is_running = True
-            self._effects.is_up()  # before anything that starts can tell of itself
+            self._effects.is_up()  # before anything that starts can report
             if self._options.duration is not None and self.is_real_time:
                 self._scheduler.at(self._options.duration, _OWNER, lambda: self.go_down(FINE, "the time is up"))
         for group in self.plan.groups:
@@ -125,7 +125,7 @@ class Conductor:
     # What processes say
 
     def heard(self, name: str, message: say.ChannelWord) -> None:
-        """Take a message of a process."""
+        """Handle a message of a process."""
         member = self.members[name]
         member.last_word = self._scheduler.now
         match message:
@@ -189,14 +189,14 @@ class Conductor:
     # Faults
 
     def exited(self, name: str, how: str, detail: str = "") -> None:
-        """Take the end of a process: `how` it ended in words, and what it printed."""
+        """Handle the end of a process: `how` it ended in words, and what it printed."""
         member = self.members[name]
         member.is_there = member.is_configured = False
         member.moves, member.runs = (), {}
         if self._closing:
             self._closing.exited()
             return
-        if member.is_closing:  # it holds nothing any more
+        if member.is_closing:  # it holds no components any more
             self._went_on_without(name)
             return
         lost = self.plan.of_group(name)
@@ -233,7 +233,7 @@ class Conductor:
             self._proceed()
 
     def _failed(self, name: str, message: str) -> None:
-        """Take a component that failed too often: the robot ends, unless it was doing without it a moment ago."""
+        """Handle a component that failed too often: the robot ends, unless a change has just started this component."""
         if self._changing and self._changing.failed(name, message):
             self._effects.log(Level.ERROR, message)
             self._are({name: ("failed", self.states[name][1])})
@@ -242,12 +242,12 @@ class Conductor:
             self.go_down(ROBOT_FAILED, message, Level.ERROR)
 
     def _are(self, states: Mapping[str, tuple[str, int]]) -> None:
-        """Take new states; who waits for what has failed hears of it, and whom it commanded is held."""
+        """Apply new states; inform components blocked by a failed one, and hold motion if it was on a command path."""
         states = {name: state for name, state in states.items() if name in self.states}
         new = {name for name, (state, _) in states.items() if state == "failed" and self.states[name][0] != "failed"}
         self.states.update(states)
         self._effects.states_changed()
-        if self._options.is_stepped:  # there it could only be heard at another instant in each run
+        if self._options.is_stepped:  # there it would be received at another instant in each run
             return
         self._look_who_is_blocked()
         commanding = [one.name for one in self.plan.instances if one.name in new and is_commanding(one)]
@@ -295,7 +295,7 @@ class Conductor:
             self._effects.log(Level.WARN, f"process '{member.name}' answers again")
 
     def _look_at_duration(self) -> None:
-        """End the run by a time that is told from outside; on a stepped clock the process itself does."""
+        """End the run when time from outside has reached the duration; on a stepped clock the process itself does."""
         duration = self._options.duration
         if self.plan.follows_clock and duration is not None and self.time >= duration:
             self.go_down(FINE, "the time is up")
@@ -342,7 +342,7 @@ class Conductor:
         return changes.unsafe(moves, runs)
 
     def change(self, changes: Changes, done: WhenDone) -> None:
-        """Carry out changes that nothing speaks against; `done` is told how it went."""
+        """Carry out changes that `why_not` allows; `done` is called with the result."""
 
         def end(text: str, is_refused: bool) -> None:
             self._changing = None
@@ -355,7 +355,7 @@ class Conductor:
         self._proceed()
 
     def _switch(self, changes: Changes) -> None:
-        """Let another plan hold, now that all that stops has stopped."""
+        """Apply the new plan, now that everything that stops has stopped."""
         self.plan, self.generation = changes.after, self.generation + 1
         fresh = {one.name: ("unconfigured", 0) for one in self.plan.instances if one.name in changes.starting}
         self.states = {one.name: fresh.get(one.name) or self.states[one.name] for one in self.plan.instances}
@@ -371,7 +371,7 @@ class Conductor:
 
     @property
     def is_going_down(self) -> bool:
-        """Return whether the end has begun."""
+        """Return whether the robot goes down."""
         return self._closing is not None
 
     def go_down(self, exit_code: int, reason: str, level: Level = Level.OK, detail: str = "") -> None:
@@ -389,7 +389,7 @@ class Conductor:
         closing.brake()
 
     def hurry(self) -> None:
-        """End at once everything that is left of a robot that goes down."""
+        """End everything that is left of a robot that goes down immediately."""
         if self._closing:
             self._closing.hurry()
 

@@ -1,4 +1,4 @@
-"""Which components cannot work without which, from the wires of a plan; and which are on the path of commands."""
+"""Which components depend on which others, by the wires of a plan, and which are on the path of commands."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _FED_BY = {In.kind: Out.kind, Calls.kind: Serves.kind, CallsAction.kind: ServesA
 
 
 def blocked_by(plan: Plan, failed: Collection[str]) -> dict[str, str]:
-    """Return who cannot do its work since all that serve or feed one of its ports have failed: name -> one of those.
+    """Return the components that cannot work because all that serve or feed a port have failed: name -> one of those.
 
-    An input that is open to the outside waits for nobody. Who starts after what has failed waits for it, too.
+    An input that is open to the outside waits for none. A component that starts after a failed one waits for it, too.
     """
     found: dict[str, str] = {}
     for one in plan.instances if failed else ():
@@ -47,7 +47,7 @@ def _feeds(other: Instance, wanted: Wire) -> bool:
 
 
 def is_commanding(one: Instance) -> bool:
-    """Return whether commands leave, pass or arrive at an instance: whoever drives, a mux, a base."""
+    """Return whether an instance sends, passes on or receives commands: a driver, a mux, a base."""
     ports = component_type(one.type).ports(one.config).values()
     return any(isinstance(port, In | Out) and port.qos is Qos.COMMAND for port in ports)
 

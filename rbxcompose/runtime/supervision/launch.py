@@ -1,4 +1,4 @@
-"""Starting a supervisor as a process of its own, and hearing from it how the start and the end went."""
+"""Starting a supervisor as a process of its own, and receiving its reports on the start and the end."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Begun:
 
 @dataclass(frozen=True, slots=True)
 class Up:
-    """All components are active; `seconds` of real time after the start."""
+    """All components are active, `seconds` of real time after the start."""
 
     components: int
     processes: int
@@ -58,7 +58,7 @@ class AlreadyUp:
 
 @dataclass(frozen=True, slots=True)
 class Unsafe:
-    """The robot's folder cannot be trusted, or not be written to."""
+    """The robot's folder cannot be trusted or written to."""
 
     reason: str
 
@@ -78,7 +78,7 @@ _REPORTS: Family[LaunchReport] = Family(get_args(LaunchReport))
 
 
 class Started:
-    """A supervisor that was started, a child of this process; signals that would end us are passed on to it."""
+    """A supervisor started as a child of this process; signals that would end us are passed on to it."""
 
     def __init__(self, pid: int, reports: int) -> None:
         self.pid = pid
@@ -103,18 +103,18 @@ class Started:
         return _REPORTS.from_line(line)
 
     def let_go(self) -> None:
-        """Leave it to itself."""
+        """Leave it running on its own."""
         os.close(self._reports)
         for number, handler in self._previous.items():
             signal.signal(number, handler)
 
     def wait(self) -> int:
-        """Wait for its end and return its exit code, negative if a signal has ended it."""
-        self.let_go()  # before its pid can be given to someone else
+        """Wait for it to end and return its exit code, negative if a signal has ended it."""
+        self.let_go()  # before its pid can be reused
         return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
 
     def _pass_on(self, number: int, frame: FrameType | None) -> None:
-        os.kill(self.pid, number)  # it is not waited for yet, so the pid is its own
+        os.kill(self.pid, number)  # it has not been reaped yet, so the pid is still its own
 
 
 def start_supervisor(plan: Plan, options: RunOptions) -> Started:
@@ -125,7 +125,7 @@ def start_supervisor(plan: Plan, options: RunOptions) -> Started:
     clock = MonotonicClock()
     ours, theirs = os.pipe2(os.O_CLOEXEC)
     caller = os.getpid()
-    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDINGS)  # an interrupt waits until its handler stands
+    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDINGS)  # an interrupt waits until its handler is installed
     pid = os.fork()
     if pid == 0:
         os.close(ours)
@@ -171,7 +171,7 @@ def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: 
         folder.sweep()
         log = start_new(folder.path)
         folder.write_state(_beginning(plan))
-    except OSError as error:  # it is somebody else's, the disk is full
+    except OSError as error:  # it belongs to somebody else, or the disk is full
         _report(reports, Unsafe(str(error)))
         return FINDINGS
     _report(reports, Begun())
@@ -190,8 +190,8 @@ def _beginning(plan: Plan) -> RobotState:
 
 
 def _not_brought_down(folder: RobotFolder) -> Iterator[str]:
-    """Yield that the run before has left its state, which a supervisor that ends takes away."""
-    with contextlib.suppress(BrokenStateError):  # which is told where the leftovers are ended
+    """Yield a warning if the previous run has left its state, which a supervisor removes when it ends."""
+    with contextlib.suppress(BrokenStateError):  # which is reported where the leftovers are ended
         if folder.read_state() is not None:
             yield "the previous run was not shut down, its supervisor died: cleaning up"
 
@@ -213,7 +213,7 @@ def _run(launch: Launch, folder: RobotFolder, lock: int, reports: TextIO) -> Run
     supervisor = Supervisor(launch, folder, lock, tell_up)
     try:
         supervisor.run()
-    except Exception as error:  # our own bug: nobody reads our stderr, so it goes where people look
+    except Exception as error:  # our own bug: nobody reads our stderr, so it is written where people look
         text, detail = explain(error)
         launch.log.write(Record(clock.now(), Level.ERROR, "robot", f"the supervisor failed: {text}", detail))
         end_leftovers(folder)
@@ -224,5 +224,5 @@ def _run(launch: Launch, folder: RobotFolder, lock: int, reports: TextIO) -> Run
 
 
 def _report(reports: TextIO, report: LaunchReport) -> None:
-    with contextlib.suppress(BrokenPipeError):  # a detached robot outlives who started it
+    with contextlib.suppress(BrokenPipeError):  # a detached robot outlives the process that started it
         reports.write(_REPORTS.to_line(report).decode())

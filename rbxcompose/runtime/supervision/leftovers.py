@@ -1,4 +1,4 @@
-"""Ending what a dead or unresponsive supervisor has left behind."""
+"""Ending the processes that a dead or unresponsive supervisor has left behind."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ AT_ONCE = 1.0  # [s] for the kernel to end what was killed
 
 
 def end_leftovers(folder: RobotFolder) -> list[str]:
-    """End the processes of a robot whose supervisor has gone and return what a person should know of it.
+    """End the processes of a robot whose supervisor is gone and return what a person should know about it.
 
-    Those that still hear have been asked by the kernel to stop: they get the time for it.
+    The kernel has signalled them to stop; those that still respond get the time for it.
     """
     told: list[str] = []
     try:
@@ -39,7 +39,7 @@ def end_leftovers(folder: RobotFolder) -> list[str]:
 
 
 def _found_by_title(folder: RobotFolder) -> dict[str, Process]:
-    """Return the processes that call themselves ones of this robot and have its log open."""
+    """Return the processes that are titled as ones of this robot and have its log open."""
     return {
         str(one.pid): one
         for one in titled(title(folder.path.name))
@@ -48,7 +48,7 @@ def _found_by_title(folder: RobotFolder) -> dict[str, Process]:
 
 
 def kill_supervisor(supervisor: Process) -> None:
-    """End a supervisor that does not answer; the kernel then asks its process groups to stop."""
+    """End a supervisor that does not answer; the kernel then signals its process groups to stop."""
     _kill([supervisor])
     wait_until_ended([supervisor], AT_ONCE)
 

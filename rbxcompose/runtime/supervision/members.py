@@ -1,4 +1,4 @@
-"""What the conductor knows of a robot's processes, and what it can do to them."""
+"""What the conductor knows about a robot's processes, and what it can do to them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class ConductorEffects(Protocol):
         ...
 
     def end(self, process: str) -> None:
-        """Ask a process that does not listen yet to end, by SIGTERM."""
+        """End a process that does not listen yet, by SIGTERM."""
         ...
 
     def kill(self, process: str) -> None:
@@ -40,11 +40,11 @@ class ConductorEffects(Protocol):
         ...
 
     def is_up(self) -> None:
-        """Tell those who wait that everything is active."""
+        """Notify those who wait that everything is active."""
         ...
 
     def states_changed(self) -> None:
-        """Keep for later what `ps` tells, which has changed."""
+        """Mark the state that `ps` shows as changed, to be saved later."""
         ...
 
     def answer(self, number: int, answer: object) -> None:
@@ -57,7 +57,7 @@ class ConductorEffects(Protocol):
 
 
 class Phase(Enum):
-    """Where the robot as a whole stands."""
+    """The phase of the whole robot."""
 
     STARTING = auto()
     RUNNING = auto()
@@ -68,7 +68,7 @@ class Phase(Enum):
 
 @dataclass
 class Member:
-    """What is known of one process."""
+    """The state of one process."""
 
     name: str
     is_there: bool = False
@@ -77,17 +77,17 @@ class Member:
     is_at_rest: bool = False
     is_told_lost: bool = False
     is_closing: bool = False
-    is_stopped: bool = False  # as it was told last
-    is_given_up: bool = False  # it has gone, and nothing in it is ever restarted
+    is_stopped: bool = False  # as last sent to it
+    is_given_up: bool = False  # it is gone, and nothing in it is ever restarted
     last_word: float = 0.0  # [s]
     restarts: int = 0
-    moves: Sequence[str] = ()  # what moves the robot or is about to, in words
-    runs: dict[str, str] = field(default_factory=dict)  # components that a restart would cut off, and at what
-    requested: set[str] = field(default_factory=set)  # components that were told to become active
+    moves: Sequence[str] = ()  # what moves the robot or is about to move it, in words
+    runs: dict[str, str] = field(default_factory=dict)  # components whose work a restart would cut off -> that work
+    requested: set[str] = field(default_factory=set)  # components that were ordered to become active
     policy: RestartPolicy = field(default_factory=RestartPolicy)
 
     def forked(self, now: float) -> None:
-        """Begin a new life."""
+        """Reset the state for a newly forked process."""
         self.is_there, self.last_word = True, now
         self.is_configured = self.is_started = self.is_at_rest = self.is_told_lost = False
         self.moves, self.runs = (), {}

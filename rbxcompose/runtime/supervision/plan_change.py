@@ -1,7 +1,7 @@
-"""A change of a running robot, carried out step by step. Pure: the conductor leads it and learns how it went.
+"""A change of a running robot, carried out step by step. Pure: the conductor drives it and gets the result.
 
-What stops is retired in reverse start order; processes that hold nothing any more end; then the new plan holds: new
-processes are forked, new components configured and, as at the start of the robot, activated in start order.
+Components that stop are retired in reverse start order; empty processes end; then the new plan applies: new processes
+are forked, new components configured and, as at the start of the robot, activated in start order.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.supervision.changes import Changes, Fate
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member
 
-LONGEST = 20.0  # [s] until all that is new must be active
+LONGEST = 20.0  # [s] within which all new components must be active
 
-WhenDone = Callable[[str, bool], None]  # a text, and whether it was refused, all of it or in part
+WhenDone = Callable[[str, bool], None]  # a text, and whether the change was refused wholly or in part
 
 
 def text_of(plan: Plan, instances: Iterable[Instance]) -> str:
-    """Return what a process has to know of a plan: these instances, with their secrets."""
+    """Return the part of a plan that a process needs, as text: these instances, with their secrets."""
     return dump(replace(plan, instances=tuple(instances)), reveals_secrets=True)
 
 
 class Changing:
-    """Carries out changes; `switch` is called when all that stops has stopped, and lets the new plan hold."""
+    """Carries out changes; once everything that stops has stopped, `switch` is called to apply the new plan."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class Changing:
     ) -> None:
         self.changes = changes
         self.is_over = False
-        self.failures: dict[str, str] = {}  # by component, why it does not run as it should
+        self.failures: dict[str, str] = {}  # by component: why it does not run as it should
         self.refused: set[str] = set()  # components that did not take their new settings
         self._members, self._effects, self._switch, self._fork, self._done = members, effects, switch, fork, done
         old = changes.before.instances
@@ -49,9 +49,9 @@ class Changing:
             (process, [one.name for one in run]) for process, run in groupby(stopping, key=lambda one: one.process)
         ]
         self._ending = [one for one in reversed(changes.before.groups) if one not in changes.after.groups]
-        self._waited_for = ""  # a process whose answer is to come
+        self._waited_for = ""  # the process whose answer is pending
         self._has_switched = False
-        self._setting: set[str] = set()  # processes that set what may change live
+        self._setting: set[str] = set()  # processes that are changing live settings
 
     def proceed(self) -> None:
         """Do the next step."""
@@ -75,7 +75,7 @@ class Changing:
             self._effects.send(process, order)
 
     def _prepare(self) -> None:
-        """Have all that is new configured, in processes that are there or in new ones."""
+        """Configure all new components, in existing processes or in new ones."""
         after, members = self.changes.after, self._members
         for group in self.changes.before.groups:
             if group not in after.groups:
@@ -83,7 +83,7 @@ class Changing:
         for group in after.groups:
             mine = [one for one in after.of_group(group) if one.name in self.changes.starting]
             member = members.pop(group) if group in members else Member(group)
-            members[group] = member  # in start order, as those that were there from the start
+            members[group] = member  # in start order, like the members of the first plan
             member.requested -= self.changes.starting
             if not member.is_there and (member.is_given_up or group not in self.changes.before.groups):
                 member.is_given_up = member.is_given_up and not mine
@@ -106,24 +106,24 @@ class Changing:
     # What comes back
 
     def retired(self, process: str) -> None:
-        """Continue: a process has retired what it was to, or has gone."""
+        """Continue: a process has retired its components, or is gone."""
         if self._waited_for == process:
             self._waited_for = ""
             self.proceed()
 
     def exited(self, process: str) -> None:
-        """Continue without a process."""
+        """Continue without a process that has ended."""
         self._setting.discard(process)
         self.retired(process)
 
     def reconfigured(self, process: str, refused: Mapping[str, str]) -> None:
-        """Take what became of settings that change live."""
+        """Record the result of a change of live settings."""
         self._setting.discard(process)
         self.refused |= refused.keys()
         self.failures.update(refused)
 
     def failed(self, name: str, message: str) -> bool:
-        """Take the failure of a component for good; tell whether it is one that this change has started."""
+        """Record the final failure of a component; return whether this change has started it."""
         if name in self.changes.starting:
             self.failures[name] = message
         return name in self.changes.starting
@@ -131,19 +131,19 @@ class Changing:
     # The end
 
     def look(self, states: Mapping[str, tuple[str, int]]) -> None:
-        """End it once all is as it is going to be."""
+        """End the change once all components have reached their final states."""
         if self.is_over or not self._has_switched or self._setting:
             return
         if all(states[name][0] in ("active", "failed") for name in self.changes.starting):
             self._end("; ".join(self.failures.values()))
 
     def time_is_up(self, states: Mapping[str, tuple[str, int]]) -> None:
-        """End it, as far as it has come."""
+        """End the change, as far as it has got."""
         late = sorted(name for name in self.changes.starting if states.get(name, ("",))[0] != "active")
         self.cut_off(f"not active after {LONGEST:g} s: {', '.join(late)}")
 
     def cut_off(self, reason: str) -> None:
-        """End it before its time."""
+        """End the change early."""
         if not self.is_over:
             self._end(reason)
 
@@ -156,6 +156,6 @@ class Changing:
 
 
 def summary(changes: Changes) -> str:
-    """Return in one line what becomes of which components."""
+    """Return one line that says what happens to which components."""
     named = ((fate, changes.names(fate)) for fate in Fate if fate is not Fate.KEPT)
     return ", ".join(f"{' '.join(names)} {fate}" for fate, names in named if names) or "nothing to do"

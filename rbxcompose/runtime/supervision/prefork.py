@@ -1,7 +1,7 @@
 """The pre-fork parent: a process with everything imported and nothing running, which forks the process groups.
 
 It is forked from the supervisor while that has one thread, opens no bus and starts no thread. The kernel ends it with
-the supervisor and asks the groups to stop when it ends, so that nobody outlives a supervisor that was killed.
+the supervisor and signals the groups to stop when it ends, so that no process outlives a supervisor that was killed.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from rbxcompose.runtime.processes import Process, end_with, give_back_large_memo
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.typed_json import Family
 
-ROUTER = "router"  # the process that is in no plan
+ROUTER = "router"  # the process that no plan contains
 _MOST = 4096  # [B] of one message
-_HELD_BACK = [signal.SIGTERM]  # until the handlers of a child stand
+_HELD_BACK = [signal.SIGTERM]  # until a child has installed its handlers
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Launch:
     clock: MonotonicClock
 
     def title(self, process: str) -> str:
-        """Return the title under which `ps` of the system shows a process."""
+        """Return the title of a process in the system's `ps`."""
         return title(self.plan.robot, process)
 
     def output(self, process: str) -> Path:
@@ -65,7 +65,7 @@ class Fork:
 
 @dataclass(frozen=True, slots=True)
 class Forked:
-    """A process group has been forked; `descriptor` is its pidfd, which goes beside the message."""
+    """A process group has been forked; `descriptor` is its pidfd, which is sent along with the message."""
 
     group: str
     process: Process
@@ -85,7 +85,7 @@ _EVENTS: Family[Forked | Exited] = Family((Forked, Exited))
 
 
 class Parent:
-    """The supervisor's side: orders forks and hears what became of them."""
+    """The supervisor's side: orders forks and receives the events of the children."""
 
     def __init__(self, launch: Launch) -> None:
         """Fork the parent. Call it from the main thread, before any other thread exists."""
@@ -106,7 +106,7 @@ class Parent:
         return self._connection.fileno()
 
     def fork(self, order: Fork) -> Channel:
-        """Have a process group forked and return the channel to it; `Forked` follows.
+        """Order a process group to be forked and return the channel to it; `Forked` follows.
 
         Raises:
             BrokenPipeError: if the parent has ended.
@@ -117,7 +117,7 @@ class Parent:
         return Channel(ours)
 
     def receive(self) -> Forked | Exited | None:
-        """Return the next event, or None if there is none at the moment.
+        """Return the next event, or None if there is none now.
 
         Raises:
             EOFError: if the parent has ended.
@@ -158,7 +158,7 @@ def _run_parent(launch: Launch, connection: socket.socket, supervisor: int) -> N
 
 
 class _Forking:
-    """The parent's own side: one thread that forks, waits for exits and tells."""
+    """The parent's own side: one thread that forks, waits for exits and reports them."""
 
     def __init__(self, launch: Launch, connection: socket.socket) -> None:
         self._launch, self._connection = launch, connection
@@ -181,7 +181,7 @@ class _Forking:
         order = _ORDERS.from_line(text)
         pid = self._fork(order, descriptors[0])
         os.close(descriptors[0])
-        process, descriptor = Process.of(pid), os.pidfd_open(pid)  # not waited for yet: the id is still its own
+        process, descriptor = Process.of(pid), os.pidfd_open(pid)  # not reaped yet: the id is still its own
         self._selector.register(descriptor, selectors.EVENT_READ, pid)
         self._tell(Forked(order.group, process), [descriptor])
 
@@ -248,7 +248,7 @@ def _import_what_is_common(plan: Plan) -> None:
 
 
 def _close_all(keep: Sequence[int]) -> None:
-    """Close all descriptors but the standard ones and `keep`: a lock that is held by mistake is held for ever."""
+    """Close all descriptors but the standard ones and `keep`: a lock held by mistake would be held for ever."""
     lowest = 3
     for descriptor in sorted(set(keep)):
         os.closerange(lowest, descriptor)
@@ -264,7 +264,7 @@ def _redirect_output(path: Path) -> None:
 
 
 def _in_child(main: Callable[[], None]) -> None:
-    """Run `main` in a process that was just forked and end it there, past all that the parent has registered."""
+    """Run `main` in a process that was just forked and end it there, bypassing all that the parent has registered."""
     status = 1
     try:
         main()

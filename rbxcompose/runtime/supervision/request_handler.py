@@ -1,4 +1,4 @@
-"""Carries out the requests that come to the control socket, or passes them on to the component that takes them."""
+"""Carries out the requests from the control socket, or passes them on to the component that takes them."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ OWN = requests(RobotStatus, StopRobot, ReleaseRobot, ComparePlan, ApplyPlan, Bri
 
 
 class Supervised(Protocol):
-    """What requests can do with a supervisor; answers go by the number of the request."""
+    """What requests can do with a supervisor; an answer carries the number of its request."""
 
     conductor: Conductor
 
     def state(self) -> RobotState:
-        """Return what is known from outside."""
+        """Return the state that is known from outside."""
         ...
 
     def send(self, process: str, message: say.ChannelOrder) -> None:
@@ -47,14 +47,14 @@ class Supervised(Protocol):
 
 
 class RequestHandler:
-    """Carries out the requests of the command line and of whoever else this user lets in."""
+    """Carries out the requests of the command line and of any other program of this user."""
 
     def __init__(self, supervisor: Supervised, *, is_stepped: bool) -> None:
-        """On a stepped clock the process group writes what came from outside, at its own time."""
+        """On a stepped clock the process group logs what came from outside, at its own time."""
         self._supervisor, self._is_stepped = supervisor, is_stepped
 
     def handle(self, data: object, number: int) -> None:
-        """Carry out a request; its answer comes now or later."""
+        """Carry out a request; it is answered now or later."""
         try:
             if name_in(data) in OWN.types:
                 self._carry_out(OWN.from_data(data), number)
@@ -113,7 +113,7 @@ class RequestHandler:
         return "going down"
 
     def _pass_on(self, data: object, number: int) -> None:
-        """Pass a request on to the first component that takes it; that one answers."""
+        """Pass a request on to the first component that takes it; this component answers."""
         taker = self._taker(name_in(data))
         known = component_type(taker.type).requests()
         request = known.from_data(data)
@@ -138,7 +138,7 @@ class RequestHandler:
     # Another plan
 
     def _compare(self, plan: str) -> PlanComparison:
-        """Report what another plan would change, and what prevents it now; nothing happens."""
+        """Report what another plan would change, and what prevents it now; change nothing."""
         found, conductor = self._changes(plan), self._supervisor.conductor
         why_not = "" if found.is_empty else conductor.why_not(found)
         return PlanComparison.of(found, conductor.generation, why_not)

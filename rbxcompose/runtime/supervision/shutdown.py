@@ -1,4 +1,4 @@
-"""Going down: brake, wait for rest, shut the processes down in reverse order. Pure: the conductor leads it."""
+"""Going down: brake, wait for rest, shut the processes down in reverse order. Pure: the conductor drives it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member, Phase
 
 REST_BOUND = 1.0  # [s] to come to rest
-DOWN_BOUND = 1.9  # [s] for all of going down; what is left then is killed
+DOWN_BOUND = 1.9  # [s] for the whole shutdown; what is left then is killed
 
 
 class Closing:
-    """Brings processes to rest and ends them one by one; `phase` tells how far it is."""
+    """Brings processes to rest and ends them one by one; `phase` is its progress."""
 
     def __init__(self, members: Mapping[str, Member], effects: ConductorEffects, router: str | None) -> None:
         self.phase = Phase.BRAKING
@@ -20,32 +20,32 @@ class Closing:
         self._left: list[str] = []  # processes still to be shut down, the next one last
 
     def brake(self) -> None:
-        """Bring to rest whatever may move."""
+        """Bring everything that may move to rest."""
         for member in self._there():
             if member.is_configured and member.name != self._router:
                 self._effects.send(member.name, say.Brake())
             elif member.name != self._router:
-                self._effects.end(member.name)  # it cannot listen yet; what of it moves brakes before it ends
+                self._effects.end(member.name)  # it cannot listen yet; its components brake before it ends
         self.close_when_at_rest()
 
     def hurry(self) -> None:
-        """End at once everything that is left."""
+        """End everything that is left immediately."""
         for member in self._there():
             self._effects.kill(member.name)
 
     def exited(self) -> None:
-        """Go on after the end of a process."""
+        """Continue after the end of a process."""
         self.close_when_at_rest()
         self._close_next()
 
     def close_when_at_rest(self) -> None:
-        """Shut down, if nothing moves any more."""
+        """Shut down if nothing moves any more."""
         moving = [one for one in self._there() if one.name != self._router and not one.is_at_rest]
         if self.phase is Phase.BRAKING and not moving:
             self.close()
 
     def close(self) -> None:
-        """Shut down, whatever moves."""
+        """Shut down even if something still moves."""
         if self.phase is Phase.BRAKING:
             self.phase = Phase.CLOSING
             self._left = list(self._members)  # the router first, so that it ends last

@@ -1,6 +1,6 @@
 """The supervisor of a robot: the shell that carries out what the conductor decides.
 
-One thread waits for channels, the pre-fork parent, the control socket and signals. It never touches the bus or the
+One thread waits for channels, the pre-fork parent, the control socket and signals. It uses neither the bus nor the
 terminal, so that neither can keep it from bringing the robot to rest.
 """
 
@@ -34,7 +34,7 @@ from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.registry import declared
 
-_TAIL = 8000  # [B] of what a process printed that go into the log
+_TAIL = 8000  # [B] of a process's printed output that go into the log
 _LONGEST_WAIT = 60.0  # [s]
 _ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _OWNER = "supervisor"
@@ -42,12 +42,12 @@ _OWNER = "supervisor"
 
 @dataclass
 class _Child:
-    """A process as its supervisor holds it; its pidfd is known once it has been forked."""
+    """A child process of the supervisor; its pidfd is known once it has been forked."""
 
     channel: say.Channel
     process: Process | None = None
     descriptor: int | None = None
-    wanted_end: signal.Signals | None = None  # to be sent as soon as it is there
+    wanted_end: signal.Signals | None = None  # to be sent as soon as it is forked
 
 
 class Supervisor:
@@ -61,7 +61,7 @@ class Supervisor:
         self._selector = selectors.DefaultSelector()
         self._children: dict[str, _Child] = {}
         self._interrupts = 0
-        self._is_state_old = False  # the state file tells what was
+        self._is_state_old = False  # the state file is out of date
         self._complained = ""
         router = None if launch.plan.bus.router else ROUTER
         self.conductor = Conductor(launch.plan, launch.options, self._scheduler, self, router=router)
@@ -70,7 +70,7 @@ class Supervisor:
             end.setblocking(False)
 
     def run(self) -> int:
-        """Lead the robot from the first fork to the last exit and return the exit code."""
+        """Run the robot from the first fork to the last exit and return the exit code."""
         for number in _ENDINGS:
             signal.signal(number, self._on_signal)
         signal.set_wakeup_fd(self._wake.fileno(), warn_on_full_buffer=False)
@@ -123,13 +123,13 @@ class Supervisor:
     # Effects of the conductor
 
     def fork(self, process: str, *, is_restart: bool, is_stopped: bool) -> None:
-        """Have a process forked and listen to it."""
+        """Order a fork and listen to the process."""
         if self._parent is None:
             return
         try:
             channel = self._parent.fork(Fork(process, is_restart, is_stopped))
         except (BrokenPipeError, ConnectionResetError):
-            return  # its end is about to be heard
+            return  # its end is about to be reported
         self._children[process] = _Child(channel)
         self._selector.register(channel, selectors.EVENT_READ, lambda: self._hear(process, channel))
 
@@ -141,7 +141,7 @@ class Supervisor:
             self._watch(channel)
 
     def _watch(self, channel: say.Channel) -> None:
-        """Wait for what a process says, and for when it takes the rest of what is too long to be sent at once."""
+        """Wait for messages of a process, and until it can take the rest of a message too long for one send."""
         if channel.is_open:
             events = selectors.EVENT_READ | (selectors.EVENT_WRITE if channel.is_behind else 0)
             key = self._selector.get_key(channel)
@@ -149,7 +149,7 @@ class Supervisor:
                 self._selector.modify(channel, events, key.data)
 
     def end(self, process: str) -> None:
-        """Ask a process to end."""
+        """Signal a process to end."""
         self._signal(process, signal.SIGTERM)
 
     def kill(self, process: str) -> None:
@@ -175,12 +175,12 @@ class Supervisor:
         self._launch.log.write(Record(time, level, "robot", text, detail))
 
     def is_up(self) -> None:
-        """Tell those who wait that everything is active."""
+        """Notify those who wait that everything is active."""
         self._write_state()
         self._on_up()
 
     def states_changed(self) -> None:
-        """Have the state file written at the end of this turn, once."""
+        """Schedule one write of the state file at the end of this turn."""
         self._is_state_old = True
 
     def answer(self, number: int, answer: object) -> None:
@@ -251,7 +251,7 @@ class Supervisor:
             self._restore_folder()
 
     def _restore_folder(self) -> None:
-        """Restore what was removed from the folder of this robot, so that `stop` and `down` find it."""
+        """Restore files removed from the folder of this robot, so that `stop` and `down` find it."""
         try:
             self._folder.make()
             lock = self._folder.lock() if self._folder.has_lost_lock(self._lock) else self._lock
@@ -269,17 +269,17 @@ class Supervisor:
             self.log(Level.WARN, "files of the running robot were removed; they are restored")
 
     def _complain(self, text: str) -> None:
-        """Warn of something that is tried again and again, once for each reason."""
+        """Warn about something that is retried, once for each reason."""
         if text != self._complained:
             self._complained = text
             self.log(Level.WARN, text)
 
     def _look_at_parent(self) -> None:
-        """End a parent that a signal keeps from running: it forks nothing, and tells of no end of a process."""
+        """End a pre-fork parent that a signal has suspended: it neither forks nor reports the end of a process."""
         now, looked = self._clock.now(), self._parent_looked
         self._parent_looked = now
         if self._parent is None or not self._parent.process.is_stopped or now - looked > silence.SILENT:
-            self._parent_ran = now  # or this process did not run itself: it cannot tell
+            self._parent_ran = now  # or this process did not run itself, so it cannot know
         elif now - self._parent_ran > DEAD:
             self.log(Level.ERROR, "the pre-fork parent was suspended by a signal and is killed")
             self._parent.process.send_signal(signal.SIGKILL)
@@ -305,7 +305,7 @@ class Supervisor:
             try:
                 how = describe_exit(os.waitpid(pid, 0)[1])
             except ChildProcessError:
-                how = "ended"  # the parent had waited for it before it ended itself
+                how = "ended"  # the parent had reaped it before it ended itself
             self._bury(name, how)
 
         return reap
@@ -313,7 +313,7 @@ class Supervisor:
     # What is known from outside
 
     def state(self) -> RobotState:
-        """Return what the state file and `ps` tell."""
+        """Return the state for the state file and `ps`."""
         running = {name: child.process for name, child in self._children.items() if child.process is not None}
         plan = self.conductor.plan
         components = tuple(self._component(one.name, one.type, one.process) for one in plan.instances)
