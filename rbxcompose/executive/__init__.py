@@ -1,1 +1,1 @@
-"""Missions on a running robot: carries out their requests; several run side by side, all can be watched."""
+"""Missions on a running robot: carries out their requests, runs several side by side, and lets viewers watch all."""

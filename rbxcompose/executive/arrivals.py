@@ -1,4 +1,4 @@
-"""Pure core: the newest value of each name, when it came, and how many have come."""
+"""Pure core: the newest value of each name, when it arrived, and how many have arrived."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Arrivals:
         return NOT_ARRIVED if self._values[name] is NOT_ARRIVED else now - self._times[name]
 
     def count(self, name: str) -> int:
-        """Return how many messages have come."""
+        """Return how many messages have arrived."""
         return self._counts[name]
 
 
@@ -55,6 +55,6 @@ def _field(message: Any, path: str) -> Any:
 
 
 def _level(message: Any, group: str) -> str | None:
-    """Return the level of a group of the diagnostics in lower case, None if it is not there."""
+    """Return the level of a group of the diagnostics in lower case; None if it is absent."""
     levels = (level_of(one.level) for one in message.status if one.name == f"/{group}")
     return next((level.name.lower() for level in levels), None)

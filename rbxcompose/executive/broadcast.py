@@ -1,6 +1,6 @@
-"""What viewers in other processes see of missions: the whole when they ask, then what changes.
+"""What viewers in other processes see of missions: the full state on request, then what changes.
 
-The keys are `missions` (a list, for who asks) and `missions/NAME`, below the robot's own.
+The keys are `missions` (a list, on request) and `missions/NAME`, below the robot's own.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from rbxcompose.requests import Query
 from rbxcompose.sdk.bound import Window
 
 PATH = "missions"
-_ALWAYS = frozenset({"mission", "version", "whole", "state"})  # what is in all news
+_ALWAYS = frozenset({"mission", "version", "whole", "state"})  # what is in all updates
 
-Open = Callable[[str, Query[Any]], Window]  # takes a path and the question that is asked there
+Open = Callable[[str, Query[Any]], Window]  # takes a path and the query that is made there
 
 
 class Broadcast:
@@ -28,13 +28,13 @@ class Broadcast:
         self._feeds = {name: MissionFeed(open_window(f"{PATH}/{name}", LookAtAll(name))) for name in names}
 
     def tell(self, missions: RunningMissions) -> None:
-        """Send viewers what has changed; nothing is prepared without a viewer."""
+        """Publish what has changed; nothing is prepared without a viewer."""
         for name, one in missions.runs.items():
             self._feeds[name].tell(one)
 
 
 class MissionFeed:
-    """What was told last of one mission."""
+    """What was last published about one mission."""
 
     def __init__(self, window: Window) -> None:
         self._window = window

@@ -14,41 +14,41 @@ from rbxcompose.missions.program.sources import OUTCOME
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal
 
-BACK_WITHIN = 5.0  # [s] in which a server that is not there must come
-STOP_WITHIN = 0.5  # [s] in which the stop that cancelled a goal is heard of here
-LOOK_AGAIN = 0.1  # [s] between two looks at what nothing announces
-MESSAGE = "message"  # the field of a result or an answer that gives a reason
+BACK_WITHIN = 5.0  # [s] in which a missing server must appear
+STOP_WITHIN = 0.5  # [s] in which the stop that cancelled a goal becomes known here
+LOOK_AGAIN = 0.1  # [s] between two polls of what nothing announces
+MESSAGE = "message"  # the field of a result or a response that gives a reason
 
 WhenDone = Callable[[Result], None]
 
 
 class Errand:
-    """Something on its way for one leaf; `done` is called once, unless it is halted before."""
+    """Something under way for one leaf; `done` is called once, unless it is halted earlier."""
 
     def __init__(self, shell: Shell, done: WhenDone) -> None:
         self._shell = shell
         self._done: WhenDone | None = done
 
     def begin(self) -> None:
-        """Begin; what it raises is a failure of the leaf."""
+        """Begin; an exception is a failure of the leaf."""
         raise NotImplementedError
 
     def halt(self) -> None:
-        """Stop, and tell nothing any more."""
+        """Stop, and report nothing any more."""
         self._done = None
 
     def pause(self) -> None:
-        """Hold it as it is."""
+        """Pause it."""
 
     def resume(self) -> None:
         """Continue."""
 
     def next_look(self) -> float | None:
-        """Return when it wants to be looked after [s]; None: it is told what happens."""
+        """Return when to poll it next [s]; None if it needs no polling."""
         return None
 
     def look(self) -> None:
-        """Look after it."""
+        """Poll it."""
 
     def end(self, result: Result) -> None:
         """Report how it ended."""
@@ -64,17 +64,17 @@ class Errand:
 
 
 class Waiting(Errand):
-    """An errand that needs a server: it waits for one for a while."""
+    """An errand that needs a server, and waits a while for one."""
 
-    nobody: ClassVar[str] = "nothing serves"  # what is told of a server that is not there
+    nobody: ClassVar[str] = "nothing serves"  # what is reported about a missing server
 
     def __init__(self, shell: Shell, done: WhenDone, name: str) -> None:
         super().__init__(shell, done)
         self.name = name
         self.is_sent = False
-        self.until = 0.0  # [s] how long it waits
-        self.earliest = 0.0  # [s] who has just gone may still be in the books
-        self.why = ""  # it fails, if nobody comes
+        self.until = 0.0  # [s] when it stops waiting
+        self.earliest = 0.0  # [s] not before: a server that has just gone may still be listed
+        self.why = ""  # reason for failing if no server appears
 
     def send(self) -> bool:
         """Send it, if a server is there; return whether it was sent."""
@@ -86,18 +86,18 @@ class Waiting(Errand):
             self.wait(f"{self.nobody} {self.name}", f"{self.nobody} {self.name}")
 
     def wait(self, told: str, why: str) -> None:
-        """Wait for a server; after the time it fails, with this reason."""
+        """Wait for a server; at the timeout, fail with this reason."""
         now = self._shell.now
         self.is_sent, self.why = False, why
         self.earliest, self.until = now + LOOK_AGAIN, now + BACK_WITHIN
         self._shell.warn(f"{told}; waiting for up to {BACK_WITHIN:.0f} s")
 
     def next_look(self) -> float | None:
-        """Look after it while no server works on it."""
+        """Return when to poll it next [s]; None while a server works on it."""
         return None if self.is_sent else self._shell.now + LOOK_AGAIN
 
     def look(self) -> None:
-        """Send it again once a server is back; give up after the time."""
+        """Send it again once a server is back; fail at the timeout."""
         if self.is_sent or self._shell.now < self.earliest:
             return
         if self.send():
@@ -116,7 +116,7 @@ class GoalErrand(Waiting):
         self._is_paused = False
 
     def send(self) -> bool:
-        """Send the goal, unless it was cancelled: that may have been a stop, which is heard of soon."""
+        """Send the goal, unless it was cancelled: that may have been a stop, which will soon be known."""
         caller = self._shell.bound[SKILL + self._skill.name]
         if self.why == CANCELLED or not caller.is_available:
             return False
@@ -134,12 +134,12 @@ class GoalErrand(Waiting):
             self._handle.cancel()
 
     def pause(self) -> None:
-        """Ask the server to hold it; if it does not, the goal is cancelled, and sent again later."""
+        """Ask the server to pause it; if it does not, the goal is cancelled, and sent again later."""
         self._is_paused = True
         self._ask_to_pause(True)
 
     def resume(self) -> None:
-        """Let it continue; send it again if it is gone."""
+        """Resume the goal; send it again if it is gone."""
         self._is_paused = False
         if self.is_sent:
             self._ask_to_pause(False)
@@ -168,10 +168,10 @@ class GoalErrand(Waiting):
 
     def _ended(self, handle: SentGoal | None, ended: Ended[Any]) -> None:
         if self.is_over or (handle is not None and handle is not self._handle):
-            return  # it was halted or given up meanwhile
+            return  # it was halted or abandoned meanwhile
         self._lose()
         if self._is_paused and ended.outcome is not Outcome.SUCCEEDED:
-            return  # who stopped the robot also ended the goal: it is sent again at the resume
+            return  # whoever stopped the robot also ended the goal: it is sent again at the resume
         match ended.outcome:
             case Outcome.SUCCEEDED | Outcome.ABORTED:
                 self.end(_result(self._skill, ended))
@@ -180,7 +180,7 @@ class GoalErrand(Waiting):
             case Outcome.LOST:
                 self.end(Result(False, GONE))
             case Outcome.CANCELED:
-                # A stop cancels goals, too, and may be on its way to this process: then it is no failure.
+                # A stop also cancels goals, and its message may still be on its way here: then this is no failure.
                 self.why, self.earliest = CANCELLED, self._shell.now
                 self.until = self._shell.now + STOP_WITHIN
             case _:
@@ -192,7 +192,7 @@ GONE, CANCELLED = "its server is gone", "cancelled by someone else"
 
 
 def _result(skill: Skill, ended: Ended[Any]) -> Result:
-    """Return what the end of a goal says: an outcome and a reason stand in the fields of these names."""
+    """Return the result of a goal; the fields `outcome` and `message` give its outcome and reason."""
     values = values_of(ended.result)
     is_good = ended.outcome is Outcome.SUCCEEDED
     told = values.get(OUTCOME) if skill.outcomes else ""
@@ -201,13 +201,13 @@ def _result(skill: Skill, ended: Ended[Any]) -> Result:
 
 
 def text_in(values: Mapping[str, Value]) -> str:
-    """Return the reason in the fields of a result, an answer or an end; empty if there is none."""
+    """Return the reason in the fields of a result, a response or an end; empty if there is none."""
     told = values.get(MESSAGE, "")
     return told if isinstance(told, str) else ""
 
 
 class CallErrand(Waiting):
-    """A call of a service; an answer that says `success: false` is a failure."""
+    """A call of a service; a response with `success: false` is a failure."""
 
     def __init__(self, shell: Shell, done: WhenDone, name: str, port: str, request: Any) -> None:
         super().__init__(shell, done, name)

@@ -1,4 +1,4 @@
-"""The log of missions in memory: the newest records as they are, older ones packed, the oldest forgotten."""
+"""The log of missions in memory: the newest records as they are, older ones compressed, the oldest dropped."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class LogStore:
             self._new = []
 
     def since(self, number: int) -> list[LogRecord]:
-        """Return the records that were written after so many, as far as they are kept."""
+        """Return the records after the first `number`, as far as they are kept."""
         first = self.written - len(self._new) - BLOCK * len(self._packed)
         return [one for at, one in enumerate(self._all(max(0, number - first) // BLOCK), first) if at >= number]
 
     def _all(self, skipped: int) -> Iterator[LogRecord]:
-        """Yield all records; those of the blocks that nobody wants are not unpacked, and stand in as empty ones."""
+        """Yield all records; the first `skipped` blocks are not decompressed, and yield empty ones."""
         for at, block in enumerate(self._packed):
             yield from ({} for _ in range(BLOCK)) if at < skipped else json.loads(zlib.decompress(block))
         yield from self._new

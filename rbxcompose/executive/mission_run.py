@@ -1,4 +1,4 @@
-"""One mission that runs: its engine with its world, its story, its log, what can be seen of it."""
+"""One mission that runs: its engine with its world, its story, its log, and what viewers see of it."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from rbxcompose.missions.program.results import Result
 from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING
 from rbxcompose.missions.view.mirror import Mirror
 
-PATIENCE = 60.0  # [s] of waiting for values before the mission begins, after which it is told, and told again
+PATIENCE = 60.0  # [s] between warnings while a mission waits for its first values
 ROUNDING = 1e-6  # [s]
-LAST = 20  # transitions that a viewer is shown
+LAST = 20  # transitions that viewers get
 
 MakeWorld = Callable[[Callable[[int, Result], None], Callable[[MissionEvent], None]], tuple[World, RobotWorld]]
 Tell = Callable[[Level, str], None]
 
 
 class MissionRun:
-    """Runs a mission in time that it is told; `tell` takes the lines of its story, `write` the records of its log."""
+    """Runs a mission, with time as an argument; `tell` takes the lines of its story, `write` the records of its log."""
 
     def __init__(
         self,
@@ -48,14 +48,14 @@ class MissionRun:
         self.is_paused = False
         self.end: MissionEnded | None = None
         self.began: float | None = None  # [s] of robot time
-        self.patient_until: float | None = None  # [s] while it waits for values to begin with
+        self.patient_until: float | None = None  # [s] of the next warning while it waits for its first values
         self.story = MissionStory(name, names.skills)
         self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
         self._tell, self._now = tell, 0.0
         world, self.robot = make(self._ended, self._said)
         self.log = LoggedWorld(world, lambda record: write({"time": self._now, "mission": name, **record}))
         self.engine = Engine(program, names, inputs, self.log, settings)
-        self.claims = claims_of(self.engine.program, self.engine.robot.skills)  # parts of the robot, for itself alone
+        self.claims = claims_of(self.engine.program, self.engine.robot.skills)  # parts of the robot, exclusively
         self.mirror = Mirror(self.engine)
         self._known = frozenset(names.values) | {POSE}
         self._inputs, self._settings = inputs, settings
@@ -67,7 +67,7 @@ class MissionRun:
 
     @property
     def state(self) -> str:
-        """Return in a word how it stands."""
+        """Return its state as a word."""
         if self.end is not None:
             return self.end.outcome or self.end.result
         if self.is_paused:
@@ -75,12 +75,12 @@ class MissionRun:
         return "waiting" if self.engine.status == IDLE else NAMES[self.engine.status]
 
     def missing(self) -> list[str]:
-        """Return the names that it reads and of which nothing has come yet."""
+        """Return the names that it reads and that have no value yet."""
         reads = self.engine.program.reads() & self._known
         return sorted(name for name in reads if self.robot.value(name) is NOT_ARRIVED)
 
     def loses_patience(self, now: float) -> bool:
-        """Tell, while it waits for values to begin with, whether another `PATIENCE` has passed."""
+        """Return whether another `PATIENCE` has passed while it waits for its first values."""
         if self.patient_until is None:
             self.patient_until = now + PATIENCE
         if now < self.patient_until - ROUNDING:
@@ -109,7 +109,7 @@ class MissionRun:
         return min((time for time in due if time is not None), default=None)
 
     def pause(self, now: float) -> None:
-        """Hold it: its timers stand still."""
+        """Pause it: its timers stop."""
         self.is_paused = True
         self._do(logbook.PAUSE, lambda: self.engine.pause(now), now)
 
@@ -127,12 +127,12 @@ class MissionRun:
             self._said(MissionEnded("halted"))
 
     def seen(self, since: int = 0) -> dict[str, Any]:
-        """Return for a viewer what is new since a version of its own, 0 for the whole."""
+        """Return what has changed since the version that a viewer has; 0 gives the full state."""
         more = {"state": self.state, "began": self.began, "transitions": list(self.transitions)}
         return {"mission": self.name, **self.mirror.look(since), **more}
 
     def _do(self, what: str, call: Callable[[], object], now: float) -> None:
-        """Do something with the engine and write down what it read for it."""
+        """Call the engine, and log what it read during the call."""
         self._now = now
         call()
         self.log.did(what)
@@ -160,6 +160,6 @@ class MissionRun:
 
 
 def claims_of(program: Program, skills: Mapping[str, Skill]) -> frozenset[str]:
-    """Return the parts of the robot that the skills of a linked mission need for themselves."""
+    """Return the parts of the robot that the skills of a linked mission need exclusively."""
     used = {node.skill for node in program.nodes}
     return frozenset(skills[name].claims for name in used if name in skills and skills[name].claims)

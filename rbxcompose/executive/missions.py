@@ -1,4 +1,4 @@
-"""All missions of a robot: which run, whether another one may start beside them, what users want of them."""
+"""All missions of a robot: which run, whether another one may start beside them, what users request."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Told = Callable[[str, Level, str], None]  # mission, level, line of its story
 
 
 class RunningMissions:
-    """The missions that run, in the order in which they began, and those that have ended, until they run again."""
+    """The running missions, in the order in which they began, and ended ones until they run again."""
 
     def __init__(self, equipment: Equipment, make: MakeWorld, tell: Told, publish: Callable[[LogRecord], None]) -> None:
         self._equipment, self.make, self._tell, self._publish = equipment, make, tell, publish
@@ -35,19 +35,19 @@ class RunningMissions:
         self._counts: dict[str, int] = {}
 
     def __iter__(self) -> Iterator[MissionRun]:
-        """Return those that run or are held."""
+        """Return the missions that run or are paused."""
         return (one for one in list(self.runs.values()) if not one.is_over)
 
     @property
     def names(self) -> list[str]:
-        """Return the names of those that run or are held."""
+        """Return the names of the missions that run or are paused."""
         return [one.name for one in self]
 
     def run(self, name: str, given: Mapping[str, str], start: str = "") -> MissionRun:
-        """Begin a mission with these inputs, as text; in the state `start` of its machines, if one is named.
+        """Start a mission with these inputs, as text, in the state `start` of its machines if one is named.
 
         Raises:
-            Refused: if there is none, an input does not fit, or what runs needs the same part of the robot.
+            Refused: if there is none, an input does not fit, or a running mission needs the same part of the robot.
         """
         program = self._program(name)
         if name in self.names:
@@ -76,7 +76,7 @@ class RunningMissions:
         return self.runs[name]
 
     def seen(self, name: str, since: int = 0) -> Seen:
-        """Return for a viewer what is new of a mission since a version of its own, 0 for the whole.
+        """Return what has changed in a mission since the version that a viewer has; 0 gives the full state.
 
         Raises:
             Refused: if it has not been running.
@@ -95,7 +95,7 @@ class RunningMissions:
     def running(
         self, name: str, what: Callable[[MissionRun], bool] = lambda one: True, word: str = "running"
     ) -> MissionRun:
-        """Return the mission of this name, or without one the only one of which `what` holds.
+        """Return the mission of this name; without a name, the only one for which `what` holds.
 
         Raises:
             Refused: if it does not run, or it is not clear which one is meant.
@@ -116,7 +116,7 @@ class RunningMissions:
         raise Refused(f"several missions are {word}: {', '.join(one.name for one in found)}; name one")
 
     def listed(self) -> tuple[ListedMission, ...]:
-        """Return all missions of the robot with how they stand."""
+        """Return all missions of the robot with their states."""
         return tuple(self._listed(name, program) for name, program in self._equipment.programs.items())
 
     def _listed(self, name: str, program: Program) -> ListedMission:
@@ -125,7 +125,7 @@ class RunningMissions:
         return ListedMission(name, program.about, one.state if one else NAMES[IDLE], tuple(claims))
 
     def since(self, number: int) -> LogPart:
-        """Return the records of the log that were written after so many."""
+        """Return the records of the log after the first `number`."""
         return LogPart(self._log.written, self._log.since(number))
 
     def _begun(self, name: str) -> MissionRun:
@@ -140,7 +140,7 @@ class RunningMissions:
         return programs[name]
 
     def _inputs(self, name: str, program: Program, given: Mapping[str, str]) -> Mapping[str, Value]:
-        """Return the robot's inputs for a mission with those that were given laid over them."""
+        """Return the robot's inputs for a mission, overridden by those that were given."""
         known = self._equipment.inputs.get(name, {})
         inputs, findings = bind_texts(program, given, known, self._equipment.names.places)
         if findings:
@@ -148,7 +148,7 @@ class RunningMissions:
         return inputs
 
     def _clash(self, linked: Program) -> str:
-        """Return why a mission cannot run beside those that do; empty if it can."""
+        """Return why a mission cannot run beside the running ones; empty if it can."""
         wanted = claims_of(linked, self._equipment.names.skills)
         for other in self:
             if common := sorted(wanted & other.claims):

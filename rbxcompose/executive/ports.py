@@ -1,4 +1,4 @@
-"""The ports of the component that runs missions: an end for all that they ask of the robot."""
+"""The ports of the component that runs missions, for all that they request of the robot."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Ports = Iterator[tuple[str, Port[Any]]]
 
 
 def ports_for(equipment: Equipment) -> dict[str, Port[Any]]:
-    """Return an end for each value, skill, topic and service that is used, and for the pose if it is read."""
+    """Return a port for each value, skill, topic and service that is used, and for the pose if it is read."""
     return {name: port.named(name) for name, port in _ports(equipment)}
 
 

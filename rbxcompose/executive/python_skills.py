@@ -1,4 +1,4 @@
-"""Skills in Python on a running robot: their turns, their ends, and what they raise."""
+"""Skills in Python on a running robot: their steps, their results, and what they raise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rbxcompose.expressions.values import Value
 from rbxcompose.missions.program.results import Result
 from rbxcompose.sdk.skills import Activity, SkillType, Told
 
-LONGEST = 0.005  # [s] in one call; meanwhile no mission does anything else
+LONGEST = 0.005  # [s] in one call, during which all missions wait
 WORDS = ("success", "failure")
 
 T = TypeVar("T")
@@ -26,11 +26,11 @@ class PythonErrand(Errand):
         self._arguments = {name: _fitted(declared, name, value) for name, value in arguments.items()}
         self._activity: Activity | None = None
         self._is_paused = False
-        self._due = 0.0  # [s] of the next step
-        self._is_told = False  # that it takes long
+        self._due = 0.0  # [s] when the next step is due
+        self._is_told = False  # it was reported to take long
 
     def begin(self) -> None:
-        """Call the function, or start the activity; what it raises is the leaf's failure."""
+        """Call the function, or start the activity; an exception is a failure of the leaf."""
         if not self._declared.is_activity:
             told = self._timed(lambda: self._declared.make(**self._arguments))
             self.end(result_of(True if told is None else told))
@@ -47,24 +47,24 @@ class PythonErrand(Errand):
             self._safely(self._activity.halt)
 
     def pause(self) -> None:
-        """Hold the activity; one that raises there has failed."""
+        """Pause the activity; if it raises, it has failed."""
         self._is_paused = True
         if (activity := self._activity) is not None:
             self._safely(lambda: activity.pause(self._shell.now))
 
     def resume(self) -> None:
-        """Let the activity continue."""
+        """Resume the activity."""
         self._is_paused, self._due = False, self._shell.now
         if (activity := self._activity) is not None:
             self._safely(lambda: activity.resume(self._shell.now))
         self._shell.look_soon()
 
     def next_look(self) -> float | None:
-        """Look after it at its rate."""
+        """Return when its next step is due [s]."""
         return None if self._is_paused or self._activity is None else self._due
 
     def look(self) -> None:
-        """Let it do a step, if that is due."""
+        """Do a step of the activity, if one is due."""
         activity, now = self._activity, self._shell.now
         if activity is None or self._is_paused or now + 1e-9 < self._due:
             return
@@ -72,7 +72,7 @@ class PythonErrand(Errand):
         try:
             told = self._timed(lambda: activity.step(now))
             result = None if told is None else result_of(told)
-        except Exception as error:  # whatever a plug-in raises is its own failure, and told as such
+        except Exception as error:  # whatever a plug-in raises is its own failure, and reported as such
             result = _raised(error)
         if result is not None:
             self.end(result)
@@ -98,7 +98,7 @@ class PythonErrand(Errand):
 
 
 def result_of(told: Told) -> Result:
-    """Return the result that a skill tells by True, False, a word or a map.
+    """Return the result that a skill gives as True, False, a word or a map.
 
     Raises:
         TypeError: if it is something else.

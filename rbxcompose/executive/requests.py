@@ -20,7 +20,7 @@ PictureData = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class RunMission(Command):
-    """Begin a mission, with inputs as text, in the state `start` of its machines if one is named."""
+    """Start a mission, with inputs as text, in the state `start` of its machines if one is named."""
 
     about = MISSION
     mission: str
@@ -29,21 +29,21 @@ class RunMission(Command):
 
     @property
     def words(self) -> str:
-        """Return it as it is said on the command line."""
+        """Return it as written on the command line."""
         inputs = [word for name, text in self.inputs.items() for word in (_SET, f"{name}={text}")]
         return shlex.join(["run", self.mission, *inputs, *([_FROM, self.start] if self.start else [])])
 
 
 @dataclass(frozen=True, slots=True)
 class _OfMission(Command):
-    """A command to a mission that runs; without a name the only one is meant."""
+    """A command to a running mission; without a name, to the only one."""
 
     about = MISSION
     mission: str = ""
 
     @property
     def words(self) -> str:
-        """Return it as it is said on the command line."""
+        """Return it as written on the command line."""
         verb = type(self).__name__.removesuffix("Mission").lower()
         return shlex.join([verb, self.mission] if self.mission else [verb])
 
@@ -55,17 +55,17 @@ class CancelMission(_OfMission):
 
 @dataclass(frozen=True, slots=True)
 class PauseMission(_OfMission):
-    """Hold a mission; its timers stand still."""
+    """Pause a mission; its timers stop."""
 
 
 @dataclass(frozen=True, slots=True)
 class ResumeMission(_OfMission):
-    """Resume a mission that was held."""
+    """Resume a paused mission."""
 
 
 @dataclass(frozen=True, slots=True)
 class ListedMission:
-    """A mission of the robot, how it stands, and the parts of the robot that it needs for itself."""
+    """A mission of the robot, its state, and the parts of the robot that it needs exclusively."""
 
     name: str
     about: str
@@ -75,7 +75,7 @@ class ListedMission:
 
 @dataclass(frozen=True, slots=True)
 class ListMissions(Query[tuple[ListedMission, ...]]):
-    """Ask which missions there are."""
+    """Query the list of missions."""
 
     about = MISSION
 
@@ -90,7 +90,7 @@ class ShowPicture(Query[PictureData]):
 
 @dataclass(frozen=True, slots=True)
 class LookAtMission(Query[Seen]):
-    """Ask what is new of a mission since a version of what was seen; 0: all."""
+    """Query what has changed in a mission since a version; 0 gives the full state."""
 
     about = MISSION
     mission: str
@@ -99,7 +99,7 @@ class LookAtMission(Query[Seen]):
 
 @dataclass(frozen=True, slots=True)
 class LookAtAll(Query[Seen]):
-    """Ask how a mission stands, with its picture under `picture`."""
+    """Query the full state of a mission, with its picture under `picture`."""
 
     about = MISSION
     mission: str
@@ -115,7 +115,7 @@ class LogPart:
 
 @dataclass(frozen=True, slots=True)
 class ReadLog(Query[LogPart]):
-    """Ask for the records that were written after so many."""
+    """Query the records of the log after the first `after`."""
 
     about = MISSION
     after: int = 0

@@ -1,4 +1,4 @@
-"""What the executive needs of the component that it lives in."""
+"""What the executive needs from the component that it runs in."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any, Protocol
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource
 
-# What the names of ports begin with.
+# Prefixes of port names.
 VALUE, PUBLISHES, CALLS = "value_", "publishes_", "calls_"
-SKILL, PAUSES, ENDS, HALTS = "skill_", "pauses_", "ends_", "halts_"  # of a skill: asked, held, its ends, given up
+SKILL, PAUSES, ENDS, HALTS = "skill_", "pauses_", "ends_", "halts_"  # of a skill: requests, pauses, ends, cancels
 
 
 class Equipment(Protocol):
-    """The robot's missions, and what they may ask of it."""
+    """The robot's missions, and what they may request of it."""
 
     @property
     def programs(self) -> Mapping[str, Program]:
@@ -28,7 +28,7 @@ class Equipment(Protocol):
 
     @property
     def values(self) -> Mapping[str, ValueSource]:
-        """Return where values come from."""
+        """Return the sources of values."""
         ...
 
     @property
@@ -69,7 +69,7 @@ class Shell(Protocol):
 
     @property
     def equipment(self) -> Equipment:
-        """Return what there is."""
+        """Return the robot's missions and what they may request of it."""
         ...
 
     @property
@@ -86,7 +86,7 @@ class Shell(Protocol):
         ...
 
     def look_soon(self) -> None:
-        """Be woken at this instant."""
+        """Request to be woken at this instant."""
         ...
 
 

@@ -13,34 +13,34 @@ from rbxcompose.missions.program.sources import OUTCOME, SkillSource
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.bound import OrderSender
 
-LATE_BY = 0.2  # [s] by which the end of an order that was given up may come after that
+LATE_BY = 0.2  # [s] how long after an order was abandoned its end may still arrive
 ROUNDING = 1e-9  # [s]
 REPLACED = "replaced by a newer order"
 
 
 class Desk:
-    """The orders whose ends are told on one topic, whichever skills and missions they belong to.
+    """The orders whose ends arrive on one topic, whichever skills and missions they belong to.
 
-    Ends have no numbers, so that one order is under way at most.
+    Ends do not name their order, so at most one order is under way.
     """
 
     def __init__(self) -> None:
         self.current: TopicErrand | None = None
-        self.closed_until = -math.inf  # [s] until then an end belongs to an order that was given up
+        self.closed_until = -math.inf  # [s] until then, an end belongs to an abandoned order
 
     def take(self, errand: TopicErrand) -> None:
-        """Let an order be the one that is under way; the one before it is given up."""
+        """Make an order the one that is under way; abandon the one before it."""
         if self.current is not None:
             self.current.replace()
         self.current = errand
 
     def leave(self, errand: TopicErrand) -> None:
-        """Let an order that has ended, or was given up, be under way no more."""
+        """Note that an order has ended or was abandoned."""
         if self.current is errand:
             self.current = None
 
     def told(self, message: Any) -> None:
-        """Take an end. One that comes while no order is out is that of an order that was given up."""
+        """Handle an end. One that arrives while no order is under way belongs to an abandoned order."""
         current = self.current
         if current is not None and current.is_sent:
             current.told(message)
@@ -50,7 +50,7 @@ class Desk:
             current.look_soon()
 
     def changed(self) -> None:
-        """Hear that others listen."""
+        """Handle a change of subscribers."""
         if self.current is not None:
             self.current.changed()
 
@@ -60,7 +60,7 @@ class Desks:
 
     def __init__(self, shell: Shell) -> None:
         self._shell = shell
-        self._desks: dict[str, Desk] = {}  # by the port at which ends come, else by that of the skill
+        self._desks: dict[str, Desk] = {}  # by the port on which ends arrive, else by that of the skill
         self._watched: set[str] = set()  # skills
 
     def of(self, source: SkillSource) -> Desk:
@@ -73,7 +73,7 @@ class Desks:
         return desk
 
     def told(self, port: str, message: Any) -> None:
-        """Take the end of an order; without an order nothing waits for it."""
+        """Handle the end of an order; ignore it if nothing waits for it."""
         if port in self._desks:
             self._desks[port].told(message)
 
@@ -90,7 +90,7 @@ class TopicErrand(Waiting):
         self._sent_to: frozenset[bytes] = frozenset()
 
     def begin(self) -> None:
-        """Send the order, once no end of an earlier one can come any more; or wait for a subscriber."""
+        """Send the order once no end of an earlier one can arrive any more, or wait for a subscriber."""
         if self._source.orders.ends is not None:
             self._desk.take(self)
         self._begin_if_free()
@@ -109,24 +109,24 @@ class TopicErrand(Waiting):
         return True
 
     def halt(self) -> None:
-        """Give the order up."""
+        """Abandon the order."""
         super().halt()
         self._give_up()
 
     def replace(self) -> None:
-        """Give the order up for a newer one."""
+        """Abandon the order for a newer one."""
         self._give_up()
         self.end(Result(False, REPLACED))
 
     def told(self, message: Any) -> None:
-        """Take its end."""
+        """Handle its end."""
         values = values_of(message)
         told = values.get(OUTCOME) if self._source.skill.outcomes else ""
         outcome = told if isinstance(told, str) else ""
         self.end(Result(values.get(SUCCESS) is True, text_in(values), outcome, values))
 
     def changed(self) -> None:
-        """Look whether anybody is left of those to whom it was sent."""
+        """Check whether any of the subscribers that it was sent to is left."""
         sender: OrderSender[Any] = self._shell.bound[SKILL + self._source.skill.name]
         if not self.is_sent or self._sent_to & sender.listeners:
             return
@@ -137,18 +137,18 @@ class TopicErrand(Waiting):
         self.look_soon()
 
     def next_look(self) -> float | None:
-        """Look after it when it may be sent, and while there is no subscriber."""
+        """Return when to poll it next [s]: when it may be sent, and while there is no subscriber."""
         return super().next_look() if self._has_begun else max(self._desk.closed_until, self._shell.now)
 
     def look(self) -> None:
-        """Send it as soon as that can be; give up after the time."""
+        """Send it as soon as possible; fail at the timeout."""
         if self._has_begun:
             super().look()
         else:
             self._begin_if_free()
 
     def look_soon(self) -> None:
-        """Have it looked after at this instant."""
+        """Request a poll at this instant."""
         self._shell.look_soon()
 
     def end(self, result: Result) -> None:

@@ -21,7 +21,7 @@ from rbxcompose.sdk.skills import skill_type
 
 
 class RobotWorld:
-    """Carries out what an engine asks; `ended` hears of results, `say` of events."""
+    """Carries out the requests of an engine; `ended` receives results, `say` events."""
 
     def __init__(
         self,
@@ -44,19 +44,19 @@ class RobotWorld:
         return self._arrivals.value(name)
 
     def age(self, name: str, /) -> float | NotArrived:
-        """Return the time since the last message [s]; the pose, which is computed when it is asked for, is of now."""
+        """Return the time since the last message [s]; the pose, which is computed on request, has age 0."""
         if name == POSE:
             return NOT_ARRIVED if self.value(POSE) is NOT_ARRIVED else 0.0
         return self._arrivals.age(name, self._shell.now)
 
     def count(self, name: str, /) -> int:
-        """Return how many messages have come; the pose comes without any."""
+        """Return how many messages have arrived; the pose needs none."""
         return 0 if name == POSE else self._arrivals.count(name)
 
     # What a mission does
 
     def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
-        """Begin a skill: a goal or an order is sent, a service is called, or Python runs."""
+        """Start a skill: send a goal or an order, call a service, or run Python."""
         self._begin(leaf, self._errand(self._done(leaf), skill, arguments))
 
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
@@ -70,31 +70,31 @@ class RobotWorld:
         self._shell.bound[port_name(PUBLISHES, topic)](message_of(message, fields))
 
     def halt(self, leaf: int, /) -> None:
-        """Stop what a leaf asked for."""
+        """Stop the request of a leaf."""
         errand = self._errands.pop(leaf, None)
         if errand is not None:
             errand.halt()
 
     def pause(self, leaf: int, /) -> None:
-        """Hold the skill of a leaf."""
+        """Pause the skill of a leaf."""
         self._errands[leaf].pause()
 
     def resume(self, leaf: int, /) -> None:
-        """Let the skill of a leaf continue."""
+        """Resume the skill of a leaf."""
         self._errands[leaf].resume()
 
     def say(self, event: MissionEvent, /) -> None:
-        """Pass on what happens."""
+        """Forward an event."""
         self._say(event)
 
-    # What nothing announces
+    # Polling
 
     def next_look(self) -> float | None:
-        """Return when to look after what is on its way [s]."""
+        """Return when to poll the requests under way [s]."""
         return min((time for one in self._errands.values() if (time := one.next_look()) is not None), default=None)
 
     def look(self) -> None:
-        """Look after what is on its way."""
+        """Poll the requests under way."""
         for errand in list(self._errands.values()):
             errand.look()
 

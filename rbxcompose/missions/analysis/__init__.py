@@ -1,1 +1,1 @@
-"""What can be known of a mission before it runs."""
+"""What can be known about a mission before it runs."""

@@ -22,7 +22,7 @@ from rbxcompose.expressions.tree import (
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """The least and the most that a value can be, both possible."""
+    """The smallest and the largest possible value, both inclusive."""
 
     least: float = -math.inf
     most: float = math.inf
@@ -30,14 +30,14 @@ class Bounds:
 
 ANYTHING = Bounds()
 NOT_BELOW_ZERO = Bounds(0.0)
-Known = Mapping[str, Bounds]  # what is known of `$names`
+Known = Mapping[str, Bounds]  # known bounds of `$names`
 
 _TURNED = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 _MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
 
 def truth(node: ExpressionNode, known: Known) -> bool | None:
-    """Return whether a condition holds whatever happens, never holds (False), or may do either (None)."""
+    """Return whether a condition always holds (True), never holds (False), or may do either (None)."""
     match node:
         case Flag(value=value):
             return value
@@ -64,7 +64,7 @@ def _compared(operator: str, left: Bounds, right: Bounds) -> bool | None:
 
 
 def _joined(operands: tuple[ExpressionNode, ...], known: Known, *, decides: bool) -> bool | None:
-    """Read from the left as it runs: an operand is asked only where those before it have not decided."""
+    """Evaluate from the left, as at run time: an operand counts only where those before it have not decided."""
     is_open = False
     for operand in operands:
         found = truth(operand, known)
@@ -76,7 +76,7 @@ def _joined(operands: tuple[ExpressionNode, ...], known: Known, *, decides: bool
 
 
 def narrowed(known: Known, node: ExpressionNode, *, holds: bool) -> Known:
-    """Return what is known where a comparison of a `$name` holds, or does not."""
+    """Return the bounds that are known where a comparison of a `$name` holds, or does not hold."""
     if not isinstance(node, Comparison) or node.operator not in _TURNED:
         return known
     operator, name, limit = node.operator, node.left, bounds_of(node.right, known)
@@ -92,7 +92,7 @@ def narrowed(known: Known, node: ExpressionNode, *, holds: bool) -> Known:
 
 
 def bounds_of(node: ExpressionNode, known: Known) -> Bounds:
-    """Return the bounds of a number; of anything else, that it can be anything."""
+    """Return the bounds of a number; `ANYTHING` for everything else."""
     match node:
         case Number(value=value):
             return Bounds(value, value)

@@ -1,4 +1,4 @@
-"""What can be known of a mission on a robot before it runs: rules of one file each in `missions/checks`."""
+"""Checks of a mission on a robot before it runs: rules, one file each in `missions/checks`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _CHECKS: dict[str, MissionCheck] = {}
 def mission_check(
     kind: str | FindingKind, severity: Severity = Severity.ERROR, *, is_fixable: bool = False
 ) -> Callable[[Find], MissionCheck]:
-    """Declare a rule under its code; or under a kind of finding that reading a mission finds as well.
+    """Declare a rule under its own code, or under a kind of finding that reading a mission also reports.
 
     Raises:
         ValueError: if it has no docs page, or another rule has its code.
@@ -46,7 +46,7 @@ def mission_checks() -> tuple[MissionCheck, ...]:
 
 
 def check_program(program: Program, robot: RobotNames) -> list[Finding]:
-    """Return all that is wrong with a mission on this robot, in the order of the text."""
+    """Return all findings about a mission on this robot, in the order of the text."""
     mission = Examined(program, robot)
     return sorted((finding for one in mission_checks() for finding in one(mission)), key=_place)
 

@@ -1,4 +1,4 @@
-"""Which parts of the robot the branches of a parallel need for themselves at the same time."""
+"""Which parts of the robot the branches of a parallel need exclusively at the same time."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 
 
 def claims_of(program: Program, robot: RobotNames, within: tuple[str, ...] = ()) -> frozenset[str]:
-    """Return what a mission claims with all that it uses."""
+    """Return everything that a mission claims, including what the missions it uses claim."""
     return frozenset(name for name, _ in claims_below(program.nodes, robot, within))
 
 
 def claims_below(
     nodes: tuple[MissionNode, ...], robot: RobotNames, within: tuple[str, ...] = ()
 ) -> Iterator[tuple[str, Span]]:
-    """Yield what nodes claim, each with its place; `within` are missions that are being looked at."""
+    """Yield the claims of nodes, each with its span; `within` are missions that are already being examined."""
     for node in nodes:
         skill = robot.skills.get(node.skill)
         if skill and skill.claims:

@@ -1,4 +1,4 @@
-"""What nodes set and send, by themselves or in their hooks."""
+"""What nodes set, publish and call, by themselves or in their hooks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rbxcompose.missions.program.program import MissionNode, Program
 
 
 def assignments(node: MissionNode) -> Iterator[Assignment]:
-    """Yield what a node sets."""
+    """Yield the assignments that a node makes."""
     yield from node.step.effects.assignments
     for deeds in _deeds(node):
         yield from deeds.assignments
@@ -31,12 +31,12 @@ def called(node: MissionNode) -> Iterator[MessageTemplate]:
 
 
 def replaced(program: Program) -> frozenset[str]:
-    """Return the names of all data that get other values while a mission runs."""
+    """Return the names of all data that are assigned while a mission runs."""
     return program.saved.union(one.name for node in program.nodes for one in assignments(node))
 
 
 def written(program: Program) -> frozenset[str]:
-    """Return the names of all data that change while a mission runs, also those that only lose items."""
+    """Return the names of all data that change while a mission runs, including those that only lose items."""
     shortened = (node.step.effects.shortened for node in program.nodes)
     return replaced(program).union(name for name in shortened if name)
 

@@ -1,4 +1,4 @@
-"""How the nodes of a mission may end, as far as the text shows: what machines must have transitions for."""
+"""How the nodes of a mission may end, as far as the text shows: the outcomes that machines need transitions for."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Ending:
     def __init__(self, program: Program, robot: RobotNames, within: tuple[str, ...] = ()) -> None:
         self.program = program
         self.robot = robot
-        self.within = within  # missions that are being looked at
+        self.within = within  # missions that are being examined
         self._known: dict[int, Outcomes] = {}
 
     def of(self, number: int, /) -> Outcomes:
@@ -24,7 +24,7 @@ class Ending:
         return self._known[number]
 
     def inside_of(self, node: MissionNode, key: str = "") -> Outcomes:
-        """Return how that may end which is inside of a modifier of a node; without one, the node itself."""
+        """Return the outcomes of a node inside its modifier `key`; without a key, with all its modifiers."""
         found = node.step.may_end(node, self)
         for name in takewhile(lambda one: one != key, reversed(tuple(node.modifiers))):
             found = node.modifiers[name].changed(found)

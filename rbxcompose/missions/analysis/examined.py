@@ -1,4 +1,4 @@
-"""A mission on a robot as the checks look at it: its nodes with what each sees, and how each may end."""
+"""A mission on a robot as the checks see it: its nodes with their scopes, and how each may end."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from rbxcompose.missions.program.program import Program, RobotNames
 
 @dataclass(frozen=True)
 class Examined:
-    """A mission, and what the robot gives to it."""
+    """A mission, and what the robot offers it."""
 
     program: Program
     robot: RobotNames
 
     @cached_property
     def views(self) -> tuple[View, ...]:
-        """Return each node with what it sees, in the order of the text."""
+        """Return each node with its scope, in the order of the text."""
         return tuple(views(self.program, self.robot))
 
     @cached_property
     def scope(self) -> NodeScope:
-        """Return what all of the mission sees."""
+        """Return the scope of the whole mission."""
         return base_scope(self.program, self.robot)
 
     @cached_property
     def ending(self) -> Ending:
-        """Return who knows how each node may end."""
+        """Return the analyser of how nodes may end."""
         return Ending(self.program, self.robot)

@@ -25,22 +25,22 @@ from rbxcompose.missions.language.spans import expression_of
 from rbxcompose.missions.program.answers import Skipped
 from rbxcompose.missions.program.program import MissionNode, Program
 
-Constants = Mapping[str, Value]  # what `$names` stand for throughout
+Constants = Mapping[str, Value]  # values of `$names` that never change
 
 
 def constants_of(program: Program, inputs: Constants) -> dict[str, Value]:
-    """Return the inputs, and the data that nothing changes."""
+    """Return the inputs and the data that nothing changes."""
     changed = written(program)
     return {**{name: datum.value for name, datum in program.data.items() if name not in changed}, **inputs}
 
 
 def number_of(expression: Expression | None, constants: Constants) -> float | None:
-    """Return the number that an option of a node always gives, if it is there and that simple."""
+    """Return the number that an option of a node always gives, if it is present and simple enough."""
     return number_in(expression.tree, constants) if expression else None
 
 
 def number_in(tree: ExpressionNode, constants: Constants) -> float | None:
-    """Return the number that a part of an expression always gives, if it is that simple."""
+    """Return the number that a part of an expression always gives, if it is simple enough."""
     match tree:
         case Number(value=value):
             return value
@@ -51,7 +51,7 @@ def number_in(tree: ExpressionNode, constants: Constants) -> float | None:
 
 
 def place_of(expression: Expression, constants: Constants, places: Mapping[str, Place]) -> Place | None:
-    """Return the place that an expression always gives, if it is that simple."""
+    """Return the place that an expression always gives, if it is simple enough."""
     match expression.tree:
         case Word(name=name):
             return places.get(name)
@@ -62,7 +62,7 @@ def place_of(expression: Expression, constants: Constants, places: Mapping[str, 
 
 
 def goal_place(node: MissionNode, main: str, constants: Constants, places: Mapping[str, Place]) -> Place | None:
-    """Return the place that a skill's main argument always is, if it is that simple."""
+    """Return the place that a skill's main argument always is, if it is simple enough."""
     for argument in node.step.arguments:
         if argument.name in ("", main) and isinstance(argument.value, ScalarNode):
             try:
@@ -73,7 +73,7 @@ def goal_place(node: MissionNode, main: str, constants: Constants, places: Mappi
 
 
 def items_of(node: MissionNode, constants: Constants, places: Mapping[str, Place]) -> list[Place] | None:
-    """Return the places that a loop goes through, if that is all it does and they are written down."""
+    """Return the places that a loop iterates over, if it has only places and the text gives all of them."""
     items = node.step.items
     if items is None:
         return []
@@ -86,7 +86,7 @@ def items_of(node: MissionNode, constants: Constants, places: Mapping[str, Place
 
 
 def never_skipped(program: Program, node: MissionNode) -> bool:
-    """Return whether a node is always done, so that its result is success or failure."""
+    """Return whether a node always runs, so that its result is success or failure."""
     if node.may_be_left_out:
         return False
     if node.step.skipped is Skipped.WITH_ALL_INSIDE:
@@ -95,14 +95,14 @@ def never_skipped(program: Program, node: MissionNode) -> bool:
 
 
 def is_simple(node: MissionNode) -> bool:
-    """Return whether the conditions of a node can always be asked."""
-    # An item that is not there, or a division by zero, would be a failure.
+    """Return whether the conditions of a node can always be evaluated."""
+    # A missing item or a division by zero would be a failure.
     trees = (asked.expression.tree for asked in node.asked)
     return not any(isinstance(part, Index | FieldAccess | Arithmetic) for tree in trees for part, _ in walk(tree))
 
 
 def is_sure(node: MissionNode, program: Program) -> bool:
-    """Return whether a node reads only what is there from the start, in ways that cannot go wrong."""
+    """Return whether a node reads only what exists from the start, in ways that cannot fail."""
     read = {name.name for asked in node.asked for name in asked.expression.names}
     others = read - program.inputs.keys() - program.data.keys()
     if others and not others <= {one.item for one in program.nodes}:
@@ -116,10 +116,10 @@ def _divides(part: ExpressionNode) -> bool:
 
 
 def takes_time(pause: Expression | None) -> bool:
-    """Return whether a time is there and not written out as none."""
+    """Return whether there is a duration that is not a literal zero."""
     return pause is not None and not (isinstance(pause.tree, Number) and pause.tree.value == 0)
 
 
 def place_in_text(node: MissionNode, expression: Expression | None) -> Span:
-    """Return where an expression of a node stands."""
+    """Return the span of an expression of a node."""
     return next((asked.scalar.span for asked in node.asked if asked.expression is expression), node.span)

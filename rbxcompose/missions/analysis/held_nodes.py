@@ -1,4 +1,4 @@
-"""Nodes in a mission's data: which ones a `run` may meet, and the values that represent them."""
+"""Nodes in a mission's data: which ones a `run` may get, and the values that represent them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from rbxcompose.expressions.tree import Expression, ExpressionNode, FieldAccess,
 from rbxcompose.expressions.values import Value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 
-ANY = None  # stands for any entry of a list or a map
-ITEM = ""  # stands for any item of a list that a loop goes through; of a map it goes through the keys
-NodeKey = tuple[str, ...]  # where a node stands in the data: ("chores", "kitchen", "0")
+ANY = None  # matches any entry of a list or a map
+ITEM = ""  # matches any item of a list in a loop; over a map, a loop iterates over the keys
+NodeKey = tuple[str, ...]  # where a node is in the data: ("chores", "kitchen", "0")
 PathPattern = tuple[str | None, ...]
 
 
@@ -27,7 +27,7 @@ class HeldNode:
 
 
 def pattern_of(expression: Expression, items: Mapping[str, PathPattern]) -> PathPattern | None:
-    """Return where in the data an expression looks; `items` are the patterns of the loops' items. None: nowhere."""
+    """Return where in the data an expression points, None for nowhere; `items` are the patterns of the loops' items."""
     return _pattern(expression.tree, items)
 
 
@@ -45,7 +45,7 @@ def _pattern(tree: ExpressionNode, items: Mapping[str, PathPattern]) -> PathPatt
 
 
 def matching(data: Mapping[str, TreeNode], pattern: PathPattern) -> Iterator[tuple[NodeKey, TreeNode]]:
-    """Yield what stands in the data at places of a pattern, with its key."""
+    """Yield the parts of the data that match a pattern, each with its key."""
     name = pattern[0] or ""
     if name in data:
         yield from _below((name,), data[name], pattern[1:])
@@ -82,7 +82,7 @@ def brief(node: TreeNode) -> str:
 
 
 def with_held(value: Value, nodes: Mapping[NodeKey, TreeNode], key: NodeKey) -> Value:
-    """Return a value of the data, at this key, with `HeldNode`s where nodes stand."""
+    """Return a value of the data, at this key, with its nodes replaced by `HeldNode`s."""
     if key in nodes:
         return HeldNode(key, brief(nodes[key]))
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""What a node sees before the mission runs: the types of all names in its scope."""
+"""The scope of a node before the mission runs: the types of all names in it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rbxcompose.missions.engine.condition_watches import POSE as POSE_NAME
 from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 
-_MEASURED = (TypeKind.QUANTITY, TypeKind.COUNT, TypeKind.FLAG)  # what no place can be
+_MEASURED = (TypeKind.QUANTITY, TypeKind.COUNT, TypeKind.FLAG)  # types that no place can have
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,14 +24,14 @@ class NodeScope:
 
     names: Mapping[str, Type]
     places: Iterable[str]
-    removed: Mapping[str, Span] = field(default_factory=dict)  # places that are gone, with what took them away
+    removed: Mapping[str, Span] = field(default_factory=dict)  # removed places, each with what removed it
 
     def variable(self, name: str) -> Type | None:
         """Return the type of `$name`, if there is one."""
         return self.names.get(name)
 
     def word(self, name: str) -> Type | None:
-        """Return that a bare word is a place, if it is one."""
+        """Return the type of a bare word, if it is a place."""
         return PLACE if name in self.places else None
 
     def variables(self) -> Iterable[str]:
@@ -58,12 +58,12 @@ class View:
         return any(below.step.waits for below in self.program.below(self.node.number))
 
     def typed(self, expression: Expression, wanted: Type, scalar: ScalarNode, kind: FindingKind) -> Iterator[Finding]:
-        """Yield what is wrong with an expression that must have the type `wanted`."""
+        """Yield the findings about an expression that must have the type `wanted`."""
         return findings_of(expression, wanted, scalar, self.scope, kind)
 
 
 def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
-    """Return the names that all of a mission sees."""
+    """Return the names in scope throughout a mission, with their types."""
     return {
         **robot.values,
         POSE_NAME: POSE,
@@ -74,14 +74,14 @@ def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
 
 
 def base_scope(program: Program, robot: RobotNames) -> NodeScope:
-    """Return what all of a mission sees."""
+    """Return the scope of a whole mission."""
     return NodeScope(base_names(program, robot), robot.places, robot.removed)
 
 
 def views(program: Program, robot: RobotNames) -> Iterator[View]:
-    """Yield each node with what it sees, in the order of the text."""
+    """Yield each node with its scope, in the order of the text."""
     base = base_scope(program, robot)
-    below: dict[int, NodeScope] = {}  # what the children of a node see
+    below: dict[int, NodeScope] = {}  # the scope of a node's children
     for node in program.nodes:
         scope = base if node.parent is None else below[node.parent]
         view = View(program, robot, node, scope)
@@ -93,7 +93,7 @@ def views(program: Program, robot: RobotNames) -> Iterator[View]:
 def findings_of(
     expression: Expression, wanted: Type, scalar: ScalarNode, scope: NodeScope, kind: FindingKind
 ) -> Iterator[Finding]:
-    """Yield what is wrong with an expression; what is neither a name nor a place is of the given kind."""
+    """Yield the findings about an expression; those about neither a name nor a place are of the given kind."""
     for problem in check_value(expression, scope, wanted):
         span = inner_span(scalar, problem.start, problem.end)
         written = expression.text[problem.start : problem.end]
@@ -121,7 +121,7 @@ def findings_of(
 
 
 def _no_text(word: str, span: Span, scope: NodeScope, kind: FindingKind) -> Finding:
-    """Return the finding about a bare word that stands for a text: a misspelt place, or one that needs quotes."""
+    """Return the finding about a bare word where a text must be: a misspelt place, or a text that needs quotes."""
     message = f"there is no place '{word}'"
     if near := nearest(word, scope.words()):
         return codes.UNKNOWN_PLACE.at(span, message, help=f"did you mean '{near[0]}', or the text '\"{word}\"'?")

@@ -1,4 +1,4 @@
-"""Where the states of machines lead to."""
+"""The transitions between the states of machines."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def transitions(program: Program) -> Iterator[tuple[MachineStates, list[MissionN
 
 
 def reached(start: str, leads: Leads) -> frozenset[str]:
-    """Return all states and ends to which a way leads from a state, itself included."""
+    """Return all states and ends that can be reached from a state, including the state itself."""
     found, open_ones = {start}, [start]
     while open_ones:
         new = leads.get(open_ones.pop(), frozenset()) - found
@@ -29,7 +29,7 @@ def reached(start: str, leads: Leads) -> frozenset[str]:
 
 
 def leading_to(goals: Iterable[str], leads: Leads) -> frozenset[str]:
-    """Return all states and ends from which a way leads to one of `goals`, these included."""
+    """Return all states and ends from which one of `goals` can be reached, including the goals."""
     back: dict[str, set[str]] = {}
     for name, targets in leads.items():
         for target in targets:

@@ -1,4 +1,4 @@
-"""How long the steps of a mission take at the very least: the ways between places, and the waits."""
+"""The least time that the steps of a mission take: for driving between places, and for waits."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from rbxcompose.missions.analysis.facts import Constants, goal_place, items_of, 
 from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import ROOT, MissionNode, Program
 
-MOST_STEPS = 2_000  # of a mission that are gone through; loops in loops would take for ever
+MOST_STEPS = 2_000  # visited per mission; nested loops would take for ever
 
-Here = Place | None  # where the robot is; None: nobody knows
+Here = Place | None  # where the robot is; None: unknown
 
 
 @dataclass(frozen=True, slots=True)
 class Driving:
-    """The skill that drives, its main argument, the speed [m/s] and how far off it may end [m]."""
+    """The skill that drives, its main argument, the speed [m/s] and the goal tolerance [m]."""
 
     skill: str
     main: str
@@ -28,7 +28,7 @@ class Driving:
 
 @dataclass(frozen=True, slots=True)
 class TooShort:
-    """A node that needs at least `needs` [s] and is given `given` [s]; between two places, if it is one drive."""
+    """A node that needs at least `needs` [s] but is given `given` [s]; `leg` are its two places, if it is one drive."""
 
     node: MissionNode
     given: float
@@ -43,7 +43,7 @@ class Ways:
     program: Program
     driving: Driving
     places: Mapping[str, Place]
-    short: dict[int, TooShort] = field(default_factory=dict)  # the worst of each node
+    short: dict[int, TooShort] = field(default_factory=dict)  # the worst case of each node
     visited: dict[str, Place] = field(default_factory=dict)
     starts_at: dict[int, Place] = field(default_factory=dict)  # where the robot is when other skills begin
     leg: tuple[Place, Place] | None = None  # the last drive between two known places
@@ -96,7 +96,7 @@ class Ways:
         return there, self.between(here, there)
 
     def between(self, here: Place, there: Place) -> float:
-        """Return the time that the straight way takes at full speed, from edge to edge of the tolerances [s]."""
+        """Return the time of a straight drive at full speed, from edge to edge of the tolerances [s]."""
         return max(0.0, distance(here, there) - 2 * self.driving.tolerance) / self.driving.speed
 
     def _in_turn(self, node: MissionNode, here: Here, constants: Constants) -> tuple[Here, float]:
@@ -120,7 +120,7 @@ class Ways:
 
 
 def too_short(ways: Ways, constants: Constants) -> Iterator[TooShort]:
-    """Go through the mission and its reactions, and yield the timeouts that are too short."""
+    """Yield the timeouts in the mission and its reactions that are too short."""
     ways.go(ROOT, None, constants)
     for interrupt in ways.program.interrupts:
         if interrupt.root is not None:
@@ -129,5 +129,5 @@ def too_short(ways: Ways, constants: Constants) -> Iterator[TooShort]:
 
 
 def distance(here: Place, there: Place) -> float:
-    """Return the straight way between two places [m]."""
+    """Return the straight-line distance between two places [m]."""
     return math.hypot(here.x - there.x, here.y - there.y)

@@ -1,4 +1,4 @@
-"""Which missions use which, and what is wrong with that as a whole: circles, and too many nodes."""
+"""Which missions use which, and what can be wrong with that as a whole: circles, and too many nodes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Use a mission in a loop instead of many times.
 
 
 def used_by(program: Program) -> dict[str, Span]:
-    """Return the names of the missions that a mission uses, each with its first place."""
+    """Return the names of the missions that a mission uses, each with the span of its first use."""
     found: dict[str, Span] = {}
     for node in program.nodes:
         if node.step.uses and node.step.uses.text:
@@ -51,12 +51,12 @@ def used_by(program: Program) -> dict[str, Span]:
 
 
 class Using:
-    """Tells of missions by name which can be linked, and what keeps the others from it."""
+    """Finds which missions, by name, can be linked, and why the others cannot."""
 
     def __init__(self, missions: Mapping[str, Program]) -> None:
         self._missions = missions
         self._uses = {name: used_by(program) for name, program in missions.items()}
-        self._sizes: dict[str, tuple[int, int]] = {}  # nodes with all that is used, and how deep that is
+        self._sizes: dict[str, tuple[int, int]] = {}  # node count and depth, including the missions it uses
         self.findings: list[Finding] = []
         self.broken: set[str] = set()  # those that cannot be linked
         for name in missions:
@@ -82,7 +82,7 @@ class Using:
         return self._sizes[name]
 
     def _circle(self, names: list[str]) -> None:
-        """Report a circle once, at its first mission, with the place of each step."""
+        """Report a circle once, at its first mission, with the span of each step."""
         if names[0] in self.broken:
             return
         self.broken.update(names)
@@ -93,7 +93,7 @@ class Using:
         self.findings.append(CIRCLE.at(steps[0][2], message, help=help_text, related=related))
 
     def _too_large(self) -> Iterator[Finding]:
-        """Yield the smallest missions that are too large: those that use them follow from it."""
+        """Yield the innermost missions that are too large; those that use them are so as a consequence."""
         for name in self._missions:
             nodes, depth = self._sizes[name]
             if nodes <= MOST_NODES and depth <= DEEPEST:

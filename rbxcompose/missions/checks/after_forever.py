@@ -49,7 +49,7 @@ def after_forever(mission: Examined) -> Iterator[Finding]:
 
 
 def _barrier(program: Program, node: MissionNode, ending: Ending) -> tuple[MissionNode, MissionNode, str] | None:
-    """Return the first step that none can follow, the step behind it, and why."""
+    """Return the first step after which none can run, the next step, and why."""
     steps = [program.nodes[child] for child in node.children]
     for step, following in pairwise(steps) if node.step.goes_on_after else ():
         if ending.of(step.number).counting_as(node.step.goes_on_after):

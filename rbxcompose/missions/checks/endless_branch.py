@@ -1,4 +1,4 @@
-"""Parallels that wait for a branch which never ends."""
+"""Parallels that wait for a branch that never ends."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def endless_branch(mission: Examined) -> Iterator[Finding]:
 
 
 def _most_wanted(node: MissionNode, branches: Branches) -> float:
-    """Return how many branches must succeed, as far as that is written down; else none."""
+    """Return how many branches must succeed; 0 if the text does not say."""
     if branches.succeed_when == ALL:
         return len(node.children)
     tree = branches.succeed_when.tree if isinstance(branches.succeed_when, Expression) else None

@@ -57,7 +57,7 @@ def _comes_again(program: Program, node: MissionNode) -> bool:
         return True
     parent = node.parent
     if parent is None:
-        return node.number != program.main  # a reaction comes as often as its interrupt
+        return node.number != program.main  # a reaction runs as often as its interrupt
     above = program.nodes[parent]
     is_repeated = above.step.comes_again or any(one.repeats for one in above.modifiers.values())
     return is_repeated or _comes_again(program, above)

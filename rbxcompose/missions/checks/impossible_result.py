@@ -75,7 +75,7 @@ def impossible_result(mission: Examined) -> Iterator[Finding]:
 
 
 def _compared(tree: ExpressionNode) -> tuple[str, str] | None:
-    """Return the name and the word that a comparison is of."""
+    """Return the name and the word that are compared."""
     match tree:
         case Comparison(operator="==", left=Variable(name=name), right=Word(name=word)):
             return name, word

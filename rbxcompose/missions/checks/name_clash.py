@@ -1,4 +1,4 @@
-"""Names with two meanings, as far as the robot must be known for it."""
+"""Names with two meanings, where finding them needs the robot."""
 
 from __future__ import annotations
 

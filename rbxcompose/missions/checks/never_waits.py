@@ -1,4 +1,4 @@
-"""Loops without an end that take no time."""
+"""Endless loops that take no time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4107", Severity.WARNING)
 def never_waits(mission: Examined) -> Iterator[Finding]:
-    """A loop without an end never waits
+    """An endless loop never waits
 
     Nothing in the body takes time, so the loop would run as fast as it can. The engine slows it down to the mission's
     rate.

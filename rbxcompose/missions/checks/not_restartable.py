@@ -1,4 +1,4 @@
-"""Skills that an interrupt may start again."""
+"""Skills that an interrupt may restart."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rbxcompose.missions.program.program import END
 
 @mission_check("RBX4116", Severity.WARNING)
 def not_restartable(mission: Examined) -> Iterator[Finding]:
-    """An interrupt may start a skill again that cannot be restarted
+    """An interrupt may restart a skill that cannot be restarted
 
     `afterwards: continue` restarts the step that was cut short. The skill declares that it must not be restarted.
 

@@ -1,4 +1,4 @@
-"""Results of nodes that have none."""
+"""Saved results of nodes that have none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lists that items cannot leave."""
+"""Lists from which items cannot be removed."""
 
 from __future__ import annotations
 

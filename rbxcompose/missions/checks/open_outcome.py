@@ -1,4 +1,4 @@
-"""Outcomes of states without a way."""
+"""Outcomes of states without a transition."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ ONE_WORD = "write 'next' as a map with 'success' and 'failure'"
 def open_outcome(mission: Examined) -> Iterator[Finding]:
     """An outcome of a state leads nowhere
 
-    Every way in which the body of a state can end needs a transition. An outcome without its own transition takes the
-    one of what it counts as, `success` or `failure`. One word after `next` is enough if the body cannot fail.
+    Every way in which the body of a state can end needs a transition. An outcome without its own transition takes that
+    of the result it counts as, `success` or `failure`. One word after `next` is enough if the body cannot fail.
 
     Bad:
 

@@ -15,7 +15,7 @@ from rbxcompose.missions.analysis.facts import place_in_text
 def pointless_number(mission: Examined) -> Iterator[Finding]:
     """A number of rounds or attempts, or a duration, leaves nothing to be done
 
-    `repeat: 0` does nothing, a timeout of zero fails at once, and durations are never negative.
+    `repeat: 0` does nothing, a timeout of zero fails immediately, and durations are never negative.
 
     Bad:
     ```yaml
@@ -43,7 +43,7 @@ def pointless_number(mission: Examined) -> Iterator[Finding]:
 
 
 def _written(expression: Expression | None) -> float | None:
-    """Return a number that is written out; one that has a name may have been chosen so."""
+    """Return a literal number; one that has a name may have been chosen on purpose."""
     match expression.tree if expression else None:
         case Number(value=value):
             return value

@@ -71,7 +71,7 @@ def same_case(mission: Examined) -> Iterator[Finding]:
 
 
 def _constant(expression: Expression) -> object:
-    """Return what a case is, if that is written out; a word and a text of the same letters are the same."""
+    """Return the value of a case if it is a literal; a word and a text of the same letters are the same."""
     match expression.tree:
         case Number(value=value) | Text(value=value):
             return value
@@ -83,7 +83,7 @@ def _constant(expression: Expression) -> object:
 
 
 def _can_be(case: Expression, chosen: Type) -> bool:
-    """Return whether a value of the type `chosen` can be equal to what is written out as a case."""
+    """Return whether a value of the type `chosen` can equal a literal case."""
     if chosen.kind not in (*WORDS, *NUMBERS, TypeKind.FLAG):
         return True
     match case.tree:

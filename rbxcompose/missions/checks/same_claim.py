@@ -39,7 +39,7 @@ def same_claim(mission: Examined) -> Iterator[Finding]:
     for node in program.nodes:
         if node.step.branches is None:
             continue
-        claimed: dict[str, list[Span]] = {}  # by what is claimed, a place for each branch
+        claimed: dict[str, list[Span]] = {}  # by what is claimed, a span for each branch
         for child in node.children:
             for resource, span in dict(claims_below(program.below(child), robot)).items():
                 claimed.setdefault(resource, []).append(span)

@@ -13,7 +13,7 @@ from rbxcompose.missions.program.program import MissionNode
 
 @mission_check("RBX4133", Severity.WARNING)
 def trapped_state(mission: Examined) -> Iterator[Finding]:
-    """A state from which no way leads to an end
+    """A state from which no path leads to an end
 
     The machine has an end that can be reached, but from this state it runs in circles for ever. A state whose body
     never ends by itself is taken as intended and not reported.
@@ -55,7 +55,7 @@ def trapped_state(mission: Examined) -> Iterator[Finding]:
         used = reached(machine.start, leads)
         goals = {*machine.ends, *(state.name for state in states if _is_endless(state))}
         if not used & machine.ends.keys():
-            continue  # it is meant to go on for ever
+            continue  # it is meant to run for ever
         free = leading_to(goals, leads)
         for state in states:
             if state.name in used and state.name not in free:

@@ -13,7 +13,7 @@ from rbxcompose.missions.program.messages import MessageTemplate
 
 @mission_check("RBX4150", is_fixable=True)
 def unknown_channel(mission: Examined) -> Iterator[Finding]:
-    """A mission publishes or calls what the robot does not have
+    """A mission uses a topic or a service that the robot does not have
 
     `publish` takes a topic of the robot, `call` one of its services, both under the name that the components use.
 
@@ -32,7 +32,7 @@ def unknown_channel(mission: Examined) -> Iterator[Finding]:
     ```
     """
     if not mission.robot.is_complete:
-        return  # it may be of a part that could not be read
+        return  # it may belong to a part that could not be read
     for node in mission.program.nodes:
         for message in published(node):
             yield from _nowhere(message, "topic", mission.robot.topics)

@@ -11,7 +11,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4144", is_fixable=True)
 def unknown_mission(mission: Examined) -> Iterator[Finding]:
-    """A mission uses one that the robot does not have
+    """A mission uses another one that the robot does not have
 
     `use` takes a name under the robot's `missions:`.
 

@@ -1,4 +1,4 @@
-"""Names that are set and do not exist; those that are read are found where their expressions are checked."""
+"""Names that are set but do not exist; those that are read are found where their expressions are checked."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rbxcompose.missions.codes import UNKNOWN_NAME
 
 @mission_check(UNKNOWN_NAME)
 def unknown_name(mission: Examined) -> Iterator[Finding]:
-    """Yield what is set although the mission has no such datum."""
+    """Yield the assignments to data that the mission does not have."""
     data = mission.program.data
     for node in mission.program.nodes:
         set_here = list(assignments(node))

@@ -1,4 +1,4 @@
-"""Ways of a machine to what does not exist."""
+"""Transitions to states that do not exist."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What interrupts restart."""
+"""Targets that interrupts restart."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4145", is_fixable=True)
 def unknown_target(mission: Examined) -> Iterator[Finding]:
-    """An interrupt restarts what does not exist
+    """An interrupt restarts something that does not exist
 
     `afterwards: {restart: NAME}` takes the `name` of a node, a state, or the item of a loop.
 

@@ -1,4 +1,4 @@
-"""States that nothing leads to."""
+"""States that cannot be reached."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rbxcompose.missions.analysis.transitions import reached, transitions
 
 @mission_check("RBX4143", Severity.WARNING)
 def unreachable_state(mission: Examined) -> Iterator[Finding]:
-    """A state that no way leads to
+    """A state that cannot be reached
 
     The machine begins in `start` and follows `next`; nothing leads to this state.
 

@@ -50,7 +50,7 @@ def wrong_argument(mission: Examined) -> Iterator[Finding]:
 def _missing(view: View, skill: Skill) -> Iterator[Finding]:
     given = {argument.name or skill.main for argument in view.node.step.arguments}
     if given - skill.arguments.keys():
-        return  # what seems to be missing may be what is misspelt
+        return  # the missing argument may be the misspelt one
     for name in sorted(skill.required - given):
         message = f"the skill '{skill.name}' needs its argument '{name}'"
         help_text = f"write '{skill.name}: ...'" if name == skill.main else f"write '{name}: ...' below it"

@@ -1,4 +1,4 @@
-"""Fields of messages, and what is in them."""
+"""Fields of messages, and their values."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FITTING = {  # the types of expressions that fit a field, by its ROS type; all o
     "bool": (TypeKind.FLAG,),
     "string": (TypeKind.TEXT, TypeKind.CHOICE, TypeKind.PLACE),
 }
-BYTES = ("uint8", "byte", "char")  # a text stands for a list of them
+BYTES = ("uint8", "byte", "char")  # a text may be written for a list of them
 NUMBERS = (TypeKind.QUANTITY, TypeKind.COUNT)
 
 
@@ -111,7 +111,7 @@ def _check_value(view: View, shape: TemplateShape, ros_type: str, span: Span) ->
 
 
 def _check_list(view: View, shape: WrittenValue, ros_type: str) -> Iterator[Finding]:
-    """Yield a single value where a list must be; a name may stand for one."""
+    """Yield a finding if a single value is where a list must be; a name may refer to a list."""
     found = check(shape.expression, view.scope)[0].kind if shape.expression else TypeKind.TEXT
     if found not in (TypeKind.LIST, TypeKind.UNKNOWN):
         help_text = f"write '[{shape.scalar.text}]'"
@@ -132,7 +132,7 @@ def _check_written(view: View, shape: WrittenValue, base: str, ros_type: str) ->
 
 
 def _span_of(shape: TemplateShape) -> Span | None:
-    """Return the place of a value, or of the first one of a list."""
+    """Return the span of a value, or of the first one in a list."""
     match shape:
         case WrittenValue(scalar=scalar):
             return scalar.span

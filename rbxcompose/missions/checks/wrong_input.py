@@ -16,7 +16,7 @@ from rbxcompose.missions.program.program import Program
 
 @mission_check(WRONG_INPUT)
 def wrong_input(mission: Examined) -> Iterator[Finding]:
-    """Yield what `with` of a `use` gives wrongly, or does not give."""
+    """Yield the inputs that the `with` of a `use` gets wrong or leaves out."""
     for view in mission.views:
         used = view.node.step.uses
         program = mission.robot.missions.get(used.text) if used else None

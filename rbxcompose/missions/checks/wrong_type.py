@@ -25,7 +25,7 @@ NUMBERS = (TypeKind.QUANTITY, TypeKind.COUNT)
 
 @mission_check(WRONG_TYPE)
 def wrong_type(mission: Examined) -> Iterator[Finding]:
-    """Yield the expressions that are of another type than their place asks for, or name what is not there."""
+    """Yield the expressions that have the wrong type, or name something that does not exist."""
     for view in mission.views:
         for asked in view.node.asked:
             if not asked.is_assigned:
@@ -41,10 +41,10 @@ def wrong_type(mission: Examined) -> Iterator[Finding]:
 
 
 def _assigned(view: View, assignment: Assignment) -> Iterator[Finding]:
-    """Yield a value that does not fit its datum.
+    """Yield a finding if a value does not fit its datum.
 
-    A count may be given any number, which must then be a whole one, and a text may be given a place: `room: dock` under
-    `data` is a text as well as the name of a place.
+    A count accepts any number, which must then be whole, and a text accepts a place: `room: dock` under `data` is both
+    a text and the name of a place.
     """
     asked, data = assignment.asked, view.program.data
     wanted = data[assignment.name].type if assignment.name in data else UNKNOWN
@@ -56,7 +56,7 @@ def _assigned(view: View, assignment: Assignment) -> Iterator[Finding]:
 
 
 def _not_listed(view: View) -> Iterator[Finding]:
-    """Yield what a loop goes through, if that is no list and no map."""
+    """Yield a finding if a loop iterates over something that is neither a list nor a map."""
     items = view.node.step.items
     if items is not None and not isinstance(items, tuple) and view.node.asked:
         found, _ = check(items, view.scope)
@@ -66,7 +66,7 @@ def _not_listed(view: View) -> Iterator[Finding]:
 
 
 def _other_cases(view: View) -> Iterator[Finding]:
-    """Yield the cases that are a quantity of another dimension than what is chosen by."""
+    """Yield the cases whose dimension differs from that of the value to choose by."""
     choice = view.node.step.choice
     if choice is None:
         return
@@ -79,7 +79,7 @@ def _other_cases(view: View) -> Iterator[Finding]:
 
 
 def _outcomes(view: View, ending: Ending) -> Iterator[Finding]:
-    """Yield what is wrong with the conditions over the branches of a parallel."""
+    """Yield the findings about the conditions over the branches of a parallel."""
     branches = view.node.step.branches
     if branches is None or not branches.outcomes:
         return
@@ -91,4 +91,4 @@ def _outcomes(view: View, ending: Ending) -> Iterator[Finding]:
         if asked := outcome.asked:
             found = list(findings_of(asked.expression, asked.wanted, asked.scalar, scope, WRONG_TYPE))
             unknown = [one for one in found if one.code == UNKNOWN_NAME.code]
-            yield from unknown or found  # what a misspelt branch is compared with would be no place
+            yield from unknown or found  # the word compared with a misspelt branch would count as an unknown place

@@ -1,6 +1,6 @@
-"""Kinds of findings about missions that are met while a mission is read, one file each with its docs page.
+"""Kinds of findings that come up while a mission is read, one file each with its docs page.
 
-Those that need the whole mission are rules, in `missions/checks`.
+Findings that need the whole mission come from rules, in `missions/checks`.
 """
 
 from __future__ import annotations

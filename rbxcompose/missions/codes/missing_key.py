@@ -1,4 +1,4 @@
-"""Something that must be there and is not."""
+"""Something required that is missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A word that is none of an option's."""
+"""A word that an option does not take."""
 
 from __future__ import annotations
 

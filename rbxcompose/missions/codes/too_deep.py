@@ -1,4 +1,4 @@
-"""Nodes within nodes within nodes."""
+"""Nodes that are nested too deeply."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two steps where one can be."""
+"""Two steps where only one is allowed."""
 
 from __future__ import annotations
 

@@ -29,5 +29,5 @@ do:
 
 
 def removed_place(span: Span, name: str, remover: Span) -> Finding:
-    """Return the finding for a place that the robot had until a layer over it took it away."""
+    """Return the finding for a place that the robot had until a layer removed it."""
     return UNKNOWN_PLACE.at(span, f"there is no place '{name}' any more", related=[Related(remover, "removed here")])

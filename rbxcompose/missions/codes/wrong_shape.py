@@ -1,4 +1,4 @@
-"""Another form than the language has."""
+"""A form that the language does not have."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A value of another type."""
+"""A value of the wrong type."""
 
 from __future__ import annotations
 

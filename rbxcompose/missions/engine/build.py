@@ -1,4 +1,4 @@
-"""From a program to its tasks: one per node, with a task around it for each of its modifiers."""
+"""Builds the tasks of a program: one per node, with a task around it for each of its modifiers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rbxcompose.missions.program.registry import task_of
 
 
 class Builder:
-    """Makes the runs and tasks of one engine; `leaves` are those that wait for results, by node number."""
+    """Builds the runs and tasks of one engine; `leaves` are the tasks that wait for results, by node number."""
 
     def __init__(self, engine: EngineBase, robot: RobotNames) -> None:
         self.engine = engine
@@ -28,7 +28,7 @@ class Builder:
         self.runs: list[Run] = []
 
     def run(self, program: Program) -> Run:
-        """Return the run of a mission with all its tasks; those below a `use` are part of it."""
+        """Return the run of a mission with all its tasks, including those below a `use`."""
         run = Run(self.engine, program, self.robot)
         self.runs.append(run)
         run.mission.root = self.build(program.main, run, run.scope)
@@ -38,10 +38,10 @@ class Builder:
         return run
 
     def build(self, number: int, run: Run, scope: MissionScope, branch: str = "") -> Task:
-        """Return the outermost task of a node, with all below it; `branch` is what a parallel above calls it.
+        """Return the outermost task of a node, with all tasks below it; `branch` is its name in a parallel above.
 
         Raises:
-            KeyError: if the robot has no such skill; `check_program` finds that before.
+            KeyError: if the robot has no such skill; `check_program` reports that earlier.
         """
         node = self.nodes[number]
         names = frozenset[str]().union(*(new_names(asked.expression) for asked in node.asked))
@@ -70,7 +70,7 @@ class Builder:
         return task
 
     def _around(self, site: Site, since: SinceScope | None, task: Task, branch: str) -> Task:
-        """Return the task with those around it that belong to no modifier."""
+        """Return the task, wrapped in the tasks that belong to no modifier."""
         node = site.node
         if since:
             task = self._kept(Since(site, since, task))

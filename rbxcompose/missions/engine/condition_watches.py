@@ -1,4 +1,4 @@
-"""Conditions that something waits for: which names wake it, and whether to evaluate it at the mission's rate."""
+"""Conditions that something waits for: which names wake it, and whether to poll at the mission's rate."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rbxcompose.expressions.tree import Expression
 
-POSE = "pose"  # `$pose` changes all the time, and nothing announces it
+POSE = "pose"  # `$pose` changes all the time without a message
 _UNANNOUNCED = frozenset({"age", "distance"})
 
 
@@ -20,7 +20,7 @@ class Watched:
 
     @classmethod
     def of(cls, condition: Expression) -> Watched:
-        """Return a condition with what it depends on."""
+        """Return a condition with its dependencies."""
         names = frozenset(reference.name for reference in condition.names)
         calls = {reference.name for reference in condition.calls}
         return cls(condition, names, POSE in names or bool(calls & _UNANNOUNCED))

@@ -11,9 +11,9 @@ from rbxcompose.missions.program.statuses import RUNNING, SUCCESS
 
 
 class Course:
-    """Work under one root. Its time stands still while it is suspended, so that its timers go on with the rest.
+    """Work under one root. Its clock stops while it is suspended, so that its timers later continue with the time left.
 
-    `order` tells who may cut whom: a smaller one cuts a larger one.
+    `order` is a priority: a course may suspend those with a larger order.
     """
 
     def __init__(self, order: int) -> None:
@@ -28,7 +28,7 @@ class Course:
         return now - self.lost
 
     def tick(self) -> int:
-        """Start the root or continue with it; a reaction without a root is done at once."""
+        """Start the root or continue with it; a reaction without a root ends immediately."""
         root = self.root
         if root is None:
             return SUCCESS
@@ -37,23 +37,23 @@ class Course:
         return status
 
     def suspend(self, now: float, from_start: bool) -> None:
-        """Stop what runs, keep the place and stop the clock."""
+        """Stop what runs, keep its place and stop the clock."""
         self.left = now
         self.cut(from_start)
 
     def cut(self, from_start: bool) -> None:
-        """Stop what runs and keep the place; who calls this stops the clock, if it is to be stopped."""
+        """Stop what runs and keep its place; stopping the clock is left to the caller."""
         if self.current is not None and self.current.suspend(from_start):
             self.current = None
 
     def resume(self, now: float) -> None:
-        """Let the clock run on."""
+        """Let the clock continue."""
         if self.left is not None:
             self.lost += now - self.left
             self.left = None
 
     def start_over(self, target: Target) -> bool:
-        """Let what is named begin again, if it runs here; tell whether it does."""
+        """Restart the target if it runs here; return whether it does."""
         current = self.current
         if current is None:
             return False
@@ -63,7 +63,7 @@ class Course:
         return current.restart(target)
 
     def restart(self) -> None:
-        """Forget an earlier run."""
+        """Reset after an earlier run."""
         self.current = None
         self.lost, self.left = 0.0, None
 
@@ -82,17 +82,17 @@ class Reaction(Course):
         self.name = definition.name
         self.afterwards = definition.afterwards
         self.targets = definition.targets
-        self.restarts = definition.restarts.text if definition.restarts else ""  # what the targets are named
+        self.restarts = definition.restarts.text if definition.restarts else ""  # the name of the targets
         self.watched = Watched.of(definition.when.expression)
         self.scope = SinceScope(scope, new_names(definition.when.expression))
-        self.is_armed = True  # it may act: its condition was false since it last did
-        self.trouble = ""  # why the condition had no value when it was last asked
+        self.is_armed = True  # it may act: its condition has been false since it last acted
+        self.trouble = ""  # why the condition had no value when it was last evaluated
 
     @property
     def path(self) -> str:
-        """Return where in the mission it is."""
+        """Return its path in the mission."""
         return f"interrupts.{self.name}"
 
     def holds(self) -> bool:
-        """Ask the condition; raises what an expression may raise."""
+        """Return whether the condition holds; raises what an expression may raise."""
         return holds(self.watched.condition, self.scope)

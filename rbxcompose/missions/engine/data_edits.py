@@ -1,4 +1,4 @@
-"""Changing lists and maps within a mission's data; what others hold of them stays as it is."""
+"""Edits of lists and maps in a mission's data; values held elsewhere stay unchanged."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rbxcompose.missions.program.results import NodeFailed
 
 
 def without(target: ExpressionNode, item: Value, data: dict[str, Value], scope: MissionScope) -> None:
-    """Take an item out of the list (the first that is equal) or map (its key) that an expression names in the data.
+    """Remove an item from the list (the first equal one) or map (its key) that an expression names in the data.
 
     Raises:
         NodeFailed: if the expression names nothing in the data.

@@ -22,9 +22,9 @@ TICKS_AT_ONCE = 100  # at one instant; then the mission is slowed down to its ra
 class Engine(EngineBase):
     """Ticks the tasks of a program.
 
-    `program` is linked: the missions that it uses are part of it, each as often as it is used. At a tick, results that
-    arrived come first, then the interrupts are looked at, then what is on top is ticked; that is done again at the
-    same instant as long as something asks for it.
+    `program` is linked: the missions that it uses are part of it, each as often as it is used. A tick first takes the
+    results that have arrived, then checks the interrupts, then ticks the course on top. It is repeated at the same
+    instant as long as something requests that.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class Engine(EngineBase):
         self.held_until: float | None = None  # slowed down until then [s]
         self.named: set[str] = set()  # loops that were reported for not waiting
 
-    # What the shell calls.
+    # Called by the shell.
 
     @property
     def data(self) -> Mapping[str, Value]:
@@ -51,7 +51,7 @@ class Engine(EngineBase):
         return self.main.data
 
     def ended(self, leaf: int, result: Result) -> None:
-        """Take the result of a skill or a call; it counts from the next tick on."""
+        """Take the result of a skill or a call; it takes effect at the next tick."""
         self.arrived.append((leaf, result))
 
     def tick(self, now: float) -> int:
@@ -75,7 +75,7 @@ class Engine(EngineBase):
         return self.status
 
     def next_wake(self) -> float | None:
-        """Return when to tick next [s], unless something happens before; None: not by itself."""
+        """Return when to tick next [s] unless something happens earlier; None if no time is set."""
         if self.status != RUNNING or self.is_paused:
             return None
         return self.wake if self.held_until is None else self.held_until
@@ -85,7 +85,7 @@ class Engine(EngineBase):
         return frozenset(self.reading) if self.status == RUNNING and not self.is_paused else frozenset()
 
     def pause(self, now: float) -> None:
-        """Halt what runs, and let all timers stand still until `resume`."""
+        """Halt what runs, and stop all timers until `resume`."""
         if self.status == RUNNING and not self.is_paused:
             self.now = now
             self._take_results()
@@ -94,7 +94,7 @@ class Engine(EngineBase):
             self.main.stack[-1].suspend(now, from_start=False)
 
     def resume(self, now: float) -> None:
-        """Continue; the skills that were halted are asked again at the next tick."""
+        """Continue; the skills that were halted are requested again at the next tick."""
         if self.is_paused:
             self.is_paused = False
             self.lost += now
@@ -139,7 +139,7 @@ class Engine(EngineBase):
         self.say(MissionEnded(NAMES[status], message, self.outcome or NAMES[status]))
 
     def _why(self) -> str:
-        """Return the path of the node that made the mission fail, and its reason; an outcome may say it all."""
+        """Return the path of the node that made the mission fail and its reason; empty if the outcome says it all."""
         if self.main.ending is not None:
             return self.main.message
         course = self.main.failed
@@ -157,7 +157,7 @@ class Engine(EngineBase):
         return "" if says_it_all else told
 
     def _deciding(self, number: int) -> tuple[int, ...]:
-        """Return the children whose failure may be that of a node."""
+        """Return the children whose failure can make a node fail."""
         node = self.program.nodes[number]
         return node.step.branches.deciding(node.children) if node.step.branches else node.children
 

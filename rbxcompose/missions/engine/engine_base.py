@@ -13,15 +13,15 @@ from rbxcompose.missions.program.program import Program, RobotNames, Target
 from rbxcompose.missions.program.results import Result
 from rbxcompose.missions.program.statuses import IDLE
 
-ROUNDING = 1e-6  # [s] by which a deadline may seem to lie ahead when it has come
+ROUNDING = 1e-6  # [s] tolerance with which a deadline counts as reached
 
 
 class TickSource(Protocol):
-    """Who may want another tick."""
+    """Something that may request another tick."""
 
     @property
     def path(self) -> str:
-        """Return where in the mission it is."""
+        """Return its path in the mission."""
         ...
 
 
@@ -34,46 +34,46 @@ class EngineBase:
         self.robot = robot
         self.settings = settings
         self.statuses = [IDLE] * len(program.nodes)
-        self.outcome = ""  # with which the node that ended last did so; empty for the plain one
+        self.outcome = ""  # the own outcome of the node that ended last; empty if it has none
         self.now = 0.0  # [s] of robot time
-        self.time = 0.0  # [s] of the course that is being ticked: timers use it
-        self.lost = 0.0  # [s] for which the mission was paused; while it is, less the time at which that began
+        self.time = 0.0  # [s] on the clock of the course being ticked; timers use it
+        self.lost = 0.0  # [s] for which the mission was paused; during a pause, minus the time at which it began
         self.because = ""  # why leaves are being halted
         self.cut_short: list[int] = []  # leaves that were halted by the latest suspension
         self.restarting: tuple[Target, ...] = ()  # what starts again after the current suspension
-        self.is_aborting = False  # the mission as a whole is ended from outside
+        self.is_aborting = False  # the whole mission is being ended from outside
         self.places = ResumePoints()
-        self.reasons: dict[int, str] = {}  # why a node failed the last time
-        self.draws = 0  # of chance so far
+        self.reasons: dict[int, str] = {}  # why each node last failed
+        self.draws = 0  # random draws so far
         self.arrived: list[tuple[int, Result]] = []
         self.wake: float | None = None
         self.reading: set[str] = set()
-        self.wants_again: TickSource | None = None  # who wants another tick at this instant
+        self.wants_again: TickSource | None = None  # what requested another tick at this instant
 
     @property
     def unpaused(self) -> float:
-        """Return robot time without the pauses of the mission [s]; unlike `time` it goes on during interrupts."""
+        """Return robot time without the pauses of the mission [s]; unlike `time`, it continues during interrupts."""
         return self.now - self.lost
 
     def again(self, by: TickSource) -> None:
-        """Ask for another tick at this instant."""
+        """Request another tick at this instant."""
         self.wants_again = by
 
     def is_past(self, time: float) -> bool:
-        """Return whether a time of this course [s] has come."""
+        """Return whether a time on the clock of this course [s] has been reached."""
         return time - self.time <= ROUNDING
 
     def has_gone_by(self, seconds: float, since: float) -> bool:
-        """Return whether so much time has gone by since a time without the pauses of the mission."""
+        """Return whether this many seconds have passed since a time of `unpaused`."""
         return seconds - (self.unpaused - since) <= ROUNDING
 
     def chance(self) -> Random:
-        """Return a source of chance for one draw: the same for the same seed and the same draws before."""
+        """Return a random source for one draw, which depends only on the seed and the number of earlier draws."""
         self.draws += 1
-        return Random(f"{self.settings.seed}/{self.draws}")  # noqa: S311 - no secret, and to be drawn again
+        return Random(f"{self.settings.seed}/{self.draws}")  # noqa: S311 - no secret, and must be repeatable
 
     def is_due(self, deadline: float) -> bool:
-        """Return whether a time of this course [s] has come; if not, the engine wakes then."""
+        """Return whether a deadline on the clock of this course [s] has been reached; if not, wake then."""
         if self.is_past(deadline):
             return True
         self.wake_at(deadline + (self.now - self.time))
@@ -91,9 +91,9 @@ class EngineBase:
             self.wake = at
 
     def forget_result(self, leaf: int) -> None:
-        """Drop a result that has come for a leaf which is halted before it was taken."""
+        """Drop the result of a leaf that is halted before the result was taken."""
         self.arrived = [result for result in self.arrived if result[0] != leaf]
 
     def say(self, event: MissionEvent) -> None:
-        """Report to the world what happens."""
+        """Report an event to the world."""
         self.world.say(event)

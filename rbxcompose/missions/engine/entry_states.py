@@ -7,17 +7,17 @@ from collections.abc import Iterator
 from rbxcompose.missions.program.program import MissionNode, Program
 
 
-class NoSuchState(LookupError):  # noqa: N818 - told to who names the state
-    """Raised with the reason, and the states that there are."""
+class NoSuchState(LookupError):  # noqa: N818 - shown to whoever names the state
+    """Raised with the reason and the existing states."""
 
 
 def start_at(program: Program, path: str) -> dict[int, str]:
-    """Return in which states machines begin, by the numbers of their nodes, for a path such as `outer.inner`.
+    """Return the initial states of machines, by node number, for a path such as `outer.inner`.
 
     Each step names a state of a machine; the next step one of a machine inside that state. `program` is linked.
 
     Raises:
-        NoSuchState: if there is none.
+        NoSuchState: if a part names no state.
     """
     found: dict[int, str] = {}
     below = program.main
@@ -40,7 +40,7 @@ def _states(machine: MissionNode) -> tuple[str, ...]:
 
 
 def _outermost(program: Program, number: int) -> Iterator[MissionNode]:
-    """Yield the machines below a node, but for those inside others."""
+    """Yield the machines of a node and below it, except those inside other machines."""
     node = program.nodes[number]
     if node.step.states:
         yield node

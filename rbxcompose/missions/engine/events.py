@@ -1,4 +1,4 @@
-"""What an engine reports while a mission runs: typed events, from which a shell writes the log."""
+"""Typed events that an engine reports while a mission runs; a shell writes the log from them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class SkillEnded:
 
 @dataclass(frozen=True, slots=True)
 class NodeStarted:
-    """A node with a name, or a state of a machine, was started."""
+    """A named node or a state of a machine was started."""
 
     node: int
     name: str
@@ -39,7 +39,7 @@ class NodeStarted:
 
 @dataclass(frozen=True, slots=True)
 class NodeEnded:
-    """A node with a name, or a state, ended: `success`, `failure`, `skipped`, `halted`, or an outcome of its own."""
+    """A named node or a state ended: `success`, `failure`, `skipped`, `halted`, or an outcome of its own."""
 
     node: int
     name: str
@@ -49,7 +49,7 @@ class NodeEnded:
 
 @dataclass(frozen=True, slots=True)
 class BranchEnded:
-    """A branch of a parallel ended, or was halted with it; `node` has no name of its own, `name` is the branch's."""
+    """A branch of a parallel ended, or was halted with it; `name` is the branch's, as `node` has none of its own."""
 
     node: int
     name: str
@@ -58,7 +58,7 @@ class BranchEnded:
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """A machine goes from a state to another one, or to one of its ends, because of an outcome."""
+    """A machine goes from a state to another state or to one of its ends, on an outcome."""
 
     machine: int
     state: str
@@ -86,9 +86,9 @@ class InterruptStarted:
 
 @dataclass(frozen=True, slots=True)
 class InterruptEnded:
-    """The reaction is done; `afterwards` says how it continues, `back_to` are the leaves that it halted.
+    """The reaction is done; `afterwards` says how the mission continues, `back_to` are the leaves that were halted.
 
-    `restarted` is the name of what begins again. If nothing of that name was running, it continues as with `continue`.
+    `restarted` is the name of what restarts. If nothing of that name was running, `afterwards` is `continue`.
     """
 
     name: str
@@ -99,7 +99,7 @@ class InterruptEnded:
 
 @dataclass(frozen=True, slots=True)
 class Logged:
-    """A `log` node spoke; the level is `info`, `warn` or `error`."""
+    """A node logged a text; the level is `info`, `warn` or `error`."""
 
     level: str
     text: str
@@ -115,7 +115,7 @@ class Reported:
 
 @dataclass(frozen=True, slots=True)
 class MissionEnded:
-    """The mission ended in `success` or `failure`, or was `halted` from outside; `outcome` may be an end's own name."""
+    """The mission ended in `success` or `failure`, or was `halted` from outside; `outcome` may be an end's name."""
 
     result: str
     message: str = ""

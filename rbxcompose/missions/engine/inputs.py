@@ -1,4 +1,4 @@
-"""Giving values to the inputs of a mission, by `with:` or `--set`."""
+"""Values for the inputs of a mission, from `with:` or `--set`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rbxcompose.missions.program.program import Datum, Input, Program
 def bind_texts(
     program: Program, given: Mapping[str, str], known: Mapping[str, Value], places: Mapping[str, Place]
 ) -> tuple[dict[str, Value], list[Finding]]:
-    """Return the values of all inputs when some are given as text, laid over `known` ones; and what is wrong."""
+    """Return the values of all inputs, the `known` ones overridden by those given as text, and the findings."""
     entries = {name: Entry(ScalarNode(name, NOWHERE), ScalarNode(text, NOWHERE)) for name, text in given.items()}
     asked = {name: one for name, one in program.inputs.items() if name in given or name not in known}
     values, findings = bind_inputs(replace(program, inputs=asked), entries, places, NOWHERE)
@@ -36,11 +36,11 @@ def bind_inputs(
     *,
     is_begun: bool = True,
 ) -> tuple[dict[str, Value], list[Finding]]:
-    """Return the values of all inputs by name, and what is wrong with those that were given.
+    """Return the values of all inputs by name, and the findings about them.
 
-    `given` are the entries below `with:`, `span` is the place of the robot's entry for the mission.
-    `removed` are places that are gone, with what took them away. A mission that is not begun with these inputs alone
-    gets the rest later: from `with:` of a `use`, or from who begins it.
+    `given` are the entries below `with:`, `span` is that of the robot's entry for the mission. `removed` are removed
+    places, each with what removed it. Unless `is_begun`, inputs may be missing: they come later, from the `with:` of
+    a `use` or from whoever starts the mission.
     """
     findings: list[Finding] = []
     for name, entry in given.items():
@@ -76,7 +76,7 @@ def _given(declared: Input, entry: Entry, findings: list[Finding]) -> Datum | No
 
 
 def _placed(datum: Datum, places: Mapping[str, Place], removed: Mapping[str, Span], findings: list[Finding]) -> Value:
-    """Return the value, with the place itself for the name of one."""
+    """Return the value; for the name of a place, return the place itself."""
     if datum.type.kind not in (TypeKind.PLACE, TypeKind.POSE):
         return datum.value
     name = str(datum.value)

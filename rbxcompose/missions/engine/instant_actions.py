@@ -1,4 +1,4 @@
-"""Small things that a task does at once: sends messages, sets data, logs. Only failing changes a result."""
+"""Instant actions of a task: publish messages, set data, log. They affect the result only by failing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TEXT = "string"
 
 
 def fields_of(sent: MessageTemplate, message: type[Message], task: Task) -> dict[str, Value]:
-    """Return the fields by name, nested ones as maps; a single value stands for the only field.
+    """Return the fields by name, nested ones as maps; a single value fills the only field.
 
     Raises:
         NodeFailed: if there is no such field.
@@ -66,7 +66,7 @@ def publish(message: MessageTemplate, task: Task) -> None:
 
 
 def assign(assignments: Iterable[Assignment], task: Task) -> None:
-    """Compute all right sides, then set them, and let everyone look once more at what may depend on it."""
+    """Evaluate all right-hand sides, then set the data, and request another tick for what may depend on it."""
     task.run.data.update({one.name: evaluate(one.asked.expression, task.scope) for one in assignments})
     task.engine.again(task)
 
@@ -80,7 +80,7 @@ def act(moments: Moments, moment: str, task: Task) -> None:
 
 
 def act_safely(moments: Moments, moment: str, task: Task) -> None:
-    """Do what belongs to a moment at which nothing can fail any more; what goes wrong is reported."""
+    """Do what belongs to a moment at which the node can no longer fail; report errors."""
     try:
         act(moments, moment, task)
     except Exception as error:  # the node is halted anyway

@@ -1,4 +1,4 @@
-"""A leaf that requests something of the robot and waits for the response: a skill, a call of a service."""
+"""Leaves that request something of the robot, a skill or a service call, and wait for the response."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SUCCESS
 
 
 class Leaf(Task):
-    """Asks when it begins, and returns the result once it has come; kinds fill in `ask`."""
+    """Sends a request when it begins, and returns the result once it arrives; kinds implement `ask`."""
 
     __slots__ = ("is_asked", "is_held", "outcome", "status", "values")
     saved: ClassVar[tuple[str, ...]] = ("is_asked", "is_held", "outcome", "status", "values")
 
     def __init__(self, site: Site) -> None:
         super().__init__(site)
-        self.is_asked = False  # the world is at it, and has not told how it ended
-        self.is_held = False  # the world holds it, to go on later
+        self.is_asked = False  # the request is under way, without a result so far
+        self.is_held = False  # the world has paused it, to continue later
         self.status = IDLE
         self.outcome = ""
         self.values: Mapping[str, Value] = {}
 
     def proceed(self) -> int:
-        """Return the result, once there is one; ask again what was stopped."""
+        """Return the result, once there is one; repeat a request that was stopped."""
         if self.is_held:
             self.is_held = False
             self.engine.world.resume(self.number)
@@ -38,7 +38,7 @@ class Leaf(Task):
         return self.status
 
     def ask(self) -> int:
-        """Ask, and return the status; what it raises is a failure of the node."""
+        """Send the request and return the status; an exception is a failure of the node."""
         raise NotImplementedError
 
     def ended(self, result: Result) -> None:
@@ -54,23 +54,23 @@ class Leaf(Task):
         return (SUCCESS if result.success else FAILURE), "", result.message
 
     def result(self) -> Value:
-        """Return what it found out."""
+        """Return the values of the result."""
         return dict(self.values)
 
     def halt(self) -> None:
-        """Ask the world to stop it."""
+        """Stop the request, for good."""
         super().halt()
         self.stop()
 
     def stop(self) -> None:
-        """Stop what the world is at."""
+        """Stop the request, if one is under way."""
         if self.is_asked:
             self.is_asked = self.is_held = False
             self.engine.forget_result(self.number)
             self.engine.world.halt(self.number)
 
     def suspend(self, from_start: bool) -> bool:
-        """Ask the world to stop it, to be started or asked again; a result that has come already stays."""
+        """Stop the request, to be repeated later; keep a result that has already arrived."""
         if not self.is_asked:
             return False
         self.stop()

@@ -1,8 +1,8 @@
-"""The log of a mission: what came in and what it did, as plain records from which it can be run again.
+"""The log of a mission: its inputs and what it did, as plain records from which it can be replayed.
 
 Each record is a map for JSON with `time` [s] of robot time, `mission`, `run` (how often the mission has been run), and
-`event`. What came in are `begin`, `tick` (with what was read and which results arrived), `pause`, `resume`, `abort`;
-all else is what the engine said of it. `replay` gives the same engine the same again.
+`event`. Inputs are `begin`, `tick` (with the values read and the results that arrived), `pause`, `resume`, `abort`;
+all other records are events of the engine. `replay` gives the same inputs to the same engine again.
 """
 
 from __future__ import annotations
@@ -30,32 +30,32 @@ _CAPITAL = re.compile(r"(?<!^)(?=[A-Z])")
 
 
 def record_of(event: MissionEvent) -> LogRecord:
-    """Return what an engine said as a record: `SkillStarted` is `skill_started`."""
+    """Return an event as a record: `SkillStarted` becomes `skill_started`."""
     name = _CAPITAL.sub("_", type(event).__name__).lower()
     return {"event": name, **{one.name: to_plain(getattr(event, one.name)) for one in fields(event)}}
 
 
 class LoggedWorld:
-    """A world of which all that is read is written down, around the real one; records of ticks hold what is new."""
+    """A wrapper around the real world that logs everything read from it; records of ticks hold only what is new."""
 
     def __init__(self, world: World, write: Write) -> None:
         self._world, self._write = world, write
-        self._known: dict[str, Any] = {}  # what was read last
-        self._read: dict[str, Any] = {}  # since the last record, and new
+        self._known: dict[str, Any] = {}  # last values read
+        self._read: dict[str, Any] = {}  # new values since the last record
         self._results: list[Any] = []
 
     def begin(self, inputs: Mapping[str, Value], settings: Settings) -> None:
-        """Write down how the mission begins."""
+        """Log how the mission begins."""
         start_at = {str(number): state for number, state in settings.start_at.items()}
         given = {name: to_plain(value) for name, value in inputs.items()}
         self._write({"event": BEGIN, "inputs": given, "seed": settings.seed, "start_at": start_at})
 
     def arrived(self, leaf: int, result: Result) -> None:
-        """Note a result, which counts from the next tick on."""
+        """Note a result, which takes effect at the next tick."""
         self._results.append([leaf, to_plain(result)])
 
     def did(self, what: str) -> None:
-        """Write down that something was done with the engine, and what it has read for it."""
+        """Log a call of the engine, with what the engine read during it."""
         record: LogRecord = {"event": what}
         if self._read:
             record["read"], self._read = self._read, {}
@@ -72,7 +72,7 @@ class LoggedWorld:
         return self._noted(f"age {name}", self._world.age(name))
 
     def count(self, name: str, /) -> int:
-        """Return how many messages have come."""
+        """Return how many messages have arrived."""
         return self._noted(f"count {name}", self._world.count(name))
 
     def _noted(self, key: str, value: V) -> V:
@@ -83,15 +83,15 @@ class LoggedWorld:
         return value
 
     def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
-        """Pass it on; what it raises is a result of the leaf as well."""
+        """Forward it; log an exception, which is a result of the leaf as well."""
         self._tried(leaf, lambda: self._world.start(leaf, skill, arguments))
 
     def call(self, leaf: int, service: str, request: Mapping[str, Value], /) -> None:
-        """Pass it on, as `start`."""
+        """Forward it, like `start`."""
         self._tried(leaf, lambda: self._world.call(leaf, service, request))
 
     def publish(self, topic: str, message: Mapping[str, Value], /) -> None:
-        """Pass it on, as `start`."""
+        """Forward it, like `start`."""
         self._tried(0, lambda: self._world.publish(topic, message))
 
     def _tried(self, leaf: int, call: Callable[[], None]) -> None:
@@ -102,29 +102,29 @@ class LoggedWorld:
             raise
 
     def halt(self, leaf: int, /) -> None:
-        """Pass it on."""
+        """Forward it."""
         self._world.halt(leaf)
 
     def pause(self, leaf: int, /) -> None:
-        """Pass it on."""
+        """Forward it."""
         self._world.pause(leaf)
 
     def resume(self, leaf: int, /) -> None:
-        """Pass it on."""
+        """Forward it."""
         self._world.resume(leaf)
 
     def say(self, event: MissionEvent, /) -> None:
-        """Write it down, and pass it on."""
+        """Log it and forward it."""
         self._write(record_of(event))
         self._world.say(event)
 
 
 class ReplayError(ValueError):
-    """Raised when records are no log of a mission from its beginning."""
+    """Raised when records are not the log of a mission from its start."""
 
 
 class Played:
-    """The world of a replay: it answers as it did, and writes down what is said."""
+    """The world of a replay: it returns what was logged, and records the events."""
 
     def __init__(self) -> None:
         self.said: list[LogRecord] = []
@@ -133,32 +133,32 @@ class Played:
         self._raised: list[Any] = []
 
     def now_reads(self, read: Mapping[str, Any]) -> None:
-        """Answer like this from now on."""
+        """Return these values from now on."""
         self._raised = list(read.get("raised", ()))
         self._known.update(read)
 
     def value(self, name: str, /) -> Any:
-        """Return what was read."""
+        """Return the logged value."""
         return from_plain(self._known[f"value {name}"])
 
     def age(self, name: str, /) -> Any:
-        """Return what was read."""
+        """Return the logged value."""
         return from_plain(self._known[f"age {name}"])
 
     def count(self, name: str, /) -> int:
-        """Return what was read."""
+        """Return the logged value."""
         return int(self._known[f"count {name}"])
 
     def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
-        """Raise again what was raised."""
+        """Raise the logged exception again, if there was one."""
         self._raise(leaf)
 
     def call(self, leaf: int, service: str, request: Mapping[str, Value], /) -> None:
-        """Raise again what was raised."""
+        """Raise the logged exception again, if there was one."""
         self._raise(leaf)
 
     def publish(self, topic: str, message: Mapping[str, Value], /) -> None:
-        """Raise again what was raised."""
+        """Raise the logged exception again, if there was one."""
         self._raise(0)
 
     def _raise(self, leaf: int) -> None:
@@ -167,21 +167,21 @@ class Played:
             raise type(name, (Exception,), {})(text)
 
     def halt(self, leaf: int, /) -> None:
-        """Nothing is on its way."""
+        """Do nothing: no request is under way."""
 
     def pause(self, leaf: int, /) -> None:
-        """Nothing is on its way."""
+        """Do nothing: no request is under way."""
 
     def resume(self, leaf: int, /) -> None:
-        """Nothing is on its way."""
+        """Do nothing: no request is under way."""
 
     def say(self, event: MissionEvent, /) -> None:
-        """Write it down."""
+        """Record it."""
         self.said.append({"time": self.time, **record_of(event)})
 
 
 def replay(records: Iterable[LogRecord], program: Program, robot: RobotNames) -> list[LogRecord]:
-    """Run a mission again from its log, and return what it says; that is what it said then, if nothing was changed.
+    """Replay a mission from its log and return its events, which are the same as then if nothing was changed.
 
     Raises:
         ReplayError: if the records do not begin with the beginning of a run.

@@ -1,4 +1,4 @@
-"""Tasks around a node that change nothing: they count messages from its start, report its name, let others look."""
+"""Tasks around a node that change nothing: they count messages since its start, report its name, notify an observer."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING
 
 
 class Since(Decorator):
-    """Counts messages from the start of its node, around one that asks `new($x)`."""
+    """Counts messages from the start of a node that uses `new($x)`."""
 
     __slots__ = ("view",)
     saved = ("seen",)
@@ -23,7 +23,7 @@ class Since(Decorator):
 
     @property
     def seen(self) -> dict[str, int]:
-        """Return how many messages of each name had come when it started."""
+        """Return how many messages of each name had arrived when it started."""
         return self.view.seen
 
     @seen.setter
@@ -37,7 +37,7 @@ class Since(Decorator):
 
 
 class Around(Decorator):
-    """Hears when its node starts, ends or is halted; a node that starts again after an interrupt is halted."""
+    """A task notified when its node starts, ends or is halted; a restart after an interrupt counts as halted."""
 
     __slots__ = ()
 
@@ -66,20 +66,20 @@ class Around(Decorator):
         return starts_over
 
     def started(self) -> None:
-        """Hear that the node starts."""
+        """Handle the start of the node."""
         raise NotImplementedError
 
     def ended(self, status: int) -> None:
-        """Hear that the node ended, or was halted (IDLE)."""
+        """Handle the end of the node; IDLE means that it was halted."""
         raise NotImplementedError
 
     def how(self, status: int) -> str:
-        """Return the word for a status with which the node ends: an outcome of its own, if it has one."""
+        """Return the word for how the node ended: its own outcome, if it has one, else its status."""
         return "halted" if status == IDLE else self.engine.outcome or NAMES[status]
 
 
 class NamedObserver(Around):
-    """Says when a node with a name, or a state, starts and ends."""
+    """Reports when a named node or a state starts and ends."""
 
     __slots__ = ("is_state", "name")
 
@@ -89,16 +89,16 @@ class NamedObserver(Around):
         self.is_state = site.node.step.look.form is Form.STATE
 
     def started(self) -> None:
-        """Say it."""
+        """Report it."""
         self.engine.say(NodeStarted(self.number, self.name, self.is_state))
 
     def ended(self, status: int) -> None:
-        """Say it."""
+        """Report it."""
         self.engine.say(NodeEnded(self.number, self.name, self.how(status), self.is_state))
 
 
 class Branch(Around):
-    """Says when a branch of a parallel ends; that all of them start is told by what they do first."""
+    """Reports when a branch of a parallel ends; its start shows in what it does first."""
 
     __slots__ = ("name",)
 
@@ -107,15 +107,15 @@ class Branch(Around):
         self.name = options
 
     def started(self) -> None:
-        """Say nothing."""
+        """Report nothing."""
 
     def ended(self, status: int) -> None:
-        """Say it."""
+        """Report it."""
         self.engine.say(BranchEnded(self.number, self.name, self.how(status)))
 
 
 class Observed(Around):
-    """Tells an observer."""
+    """Notifies an observer."""
 
     __slots__ = ("observer",)
 

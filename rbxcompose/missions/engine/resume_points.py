@@ -1,4 +1,4 @@
-"""Where nodes with a history were when they were halted, so that they take up their place again."""
+"""Where nodes with a history were halted, so that they can resume there."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ HISTORIES = (NO_HISTORY, LAST, DEEP)  # the default first
 
 
 class ResumableTask(Protocol):
-    """A task, as far as places know it."""
+    """A task, as far as resume points know it."""
 
     number: int
 
 
 class ResumePoints:
-    """The tasks that will start again where they were.
+    """The tasks that will resume where they were halted.
 
-    A task keeps its place if it has a history, or if one around it that is `deep` is being halted.
+    A task keeps its place if it has a history, or if a task around it with a `deep` history is being halted.
     """
 
     def __init__(self) -> None:
@@ -30,7 +30,7 @@ class ResumePoints:
             self.kept.add(task)
 
     def take_up(self, task: ResumableTask) -> bool:
-        """Return whether a task that starts has a place to start at; it is told once."""
+        """Return whether a task that starts has a place to resume at, and forget that place."""
         if task in self.kept:
             self.kept.remove(task)
             return True

@@ -1,4 +1,4 @@
-"""One run of one mission: its data, what runs and what was cut short, its interrupts."""
+"""One run of one mission: its data, what runs and what is suspended, its interrupts."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ STILL_HOLDS = "its condition still holds after its reaction; it can act again on
 
 
 class Run(RunBase):
-    """Runs a mission as a whole, or one that another uses: then the times that it is told are those of its caller.
+    """Runs a whole mission, or one that another uses; the times it is given are then those of its caller.
 
-    At a tick the interrupts are looked at, then the course on top is ticked.
+    A tick checks the interrupts, then ticks the course on top.
     """
 
     def __init__(self, engine: EngineBase, program: Program, robot: RobotNames) -> None:
         super().__init__(engine, program, robot)
-        self.failed: Course | None = None  # what made it fail
+        self.failed: Course | None = None  # the one that made it fail
         self.mission = Course(len(program.interrupts))
         self.reactions = [Reaction(order, one, self.scope) for order, one in enumerate(program.interrupts)]
-        self.stack: list[Course] = [self.mission]  # what was cut short, and on top what runs
+        self.stack: list[Course] = [self.mission]  # suspended courses, with the running one on top
         self.returns: list[tuple[int, ...]] = []  # the leaves that each reaction of the stack halted
         self.keepers: list[WithHistory] = []  # the tasks of the main node that can keep a place
 
@@ -45,7 +45,7 @@ class Run(RunBase):
         self.begin_again()
 
     def begin_again(self) -> None:
-        """Start where the nodes are that keep their place, with the data as they are."""
+        """Start again with the current data; nodes that keep their place resume there."""
         self.stack[:], self.returns[:] = [self.mission], []
         for course in (self.mission, *self.reactions):
             course.restart()
@@ -54,7 +54,7 @@ class Run(RunBase):
             reaction.scope.mark()
 
     def tick(self, now: float) -> int:
-        """Look at the interrupts, then continue with the course on top; return the status of the mission."""
+        """Check the interrupts, then continue with the course on top; return the status of the mission."""
         self._look(now)
         course, outer = self.stack[-1], self.engine.time
         self.engine.time = course.time(now)
@@ -77,7 +77,7 @@ class Run(RunBase):
         self.stack[:], self.returns[:] = [self.mission], []
 
     def suspend(self, from_start: bool) -> None:
-        """Stop the leaves that run, and keep the place."""
+        """Stop the running leaves, and keep the place."""
         self.stack[-1].cut(from_start)
 
     def main_tasks(self) -> list[WithHistory]:
@@ -85,7 +85,7 @@ class Run(RunBase):
         return self.keepers
 
     def _look(self, now: float) -> None:
-        """Look at the interrupts: the first that holds, and may, cuts what runs."""
+        """Check the interrupts: the first that holds and may act suspends what runs."""
         highest = self.stack[-1].order
         chosen: Reaction | None = None
         for reaction in self.reactions:
@@ -126,7 +126,7 @@ class Run(RunBase):
         return name not in self.data and name not in self.inputs
 
     def _go_on(self, reaction: Reaction, now: float) -> int:
-        """Do what comes after a reaction; what was cut short goes on after another look at the interrupts."""
+        """Do what follows a reaction; suspended work continues after the interrupts are checked again."""
         if reaction.afterwards == END:
             return self._finish(self.mission, SUCCESS)
         self.stack.pop()
@@ -150,7 +150,7 @@ class Run(RunBase):
         return RUNNING
 
     def _start_over(self, targets: tuple[Target, ...]) -> bool:
-        """Let what is named begin again wherever it runs; tell whether it runs anywhere."""
+        """Restart the targets wherever they run; return whether any of them runs."""
         has_begun = False
         for target in targets:
             for course in self.stack:
@@ -161,7 +161,7 @@ class Run(RunBase):
         return has_begun
 
     def _forget_place_of(self, number: int) -> None:
-        """Forget the place of a node that starts again; those inside it keep the places of their own histories."""
+        """Forget the place of a node that restarts; nodes inside it keep the places of their own histories."""
         node = self.engine.program.nodes[number]
         is_deep = node.step.history == DEEP
         self.engine.places.forget(number, node.end if is_deep else number + 1)

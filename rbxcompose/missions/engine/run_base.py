@@ -1,4 +1,4 @@
-"""One run of one mission as its tasks see it: its data, how texts are filled, how it is ended."""
+"""One run of one mission as its tasks see it: its data, how texts are filled in, how it ends."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rbxcompose.missions.program.program import Program, RobotNames
 
 
 class RunBase(ABC):
-    """What tasks know of the run of their mission, and a `use` of that of another one.
+    """What tasks know about the run of their mission, and a `use` about the run of the mission it uses.
 
-    `begun` counts how often it began.
+    `begun` counts its starts.
     """
 
     def __init__(self, engine: EngineBase, program: Program, robot: RobotNames) -> None:
@@ -37,16 +37,16 @@ class RunBase(ABC):
         }
 
     def show(self, name: str, value: Value) -> str:
-        """Write the value of a name for people."""
+        """Return the value of a name as text for people."""
         return value_text.show_briefly(self._types.get(name), value)
 
     def filled(self, template: Template, scope: MissionScope) -> str:
-        """Return a text for people with its values: names of places have no underscores there."""
+        """Return a text for people with its values filled in; names of places lose their underscores."""
         places = self.engine.robot.places
         return fill(template, scope, lambda name, value: self.show(name, value_text.spoken(value, places)))
 
     def written(self, template: Template, scope: MissionScope) -> str:
-        """Return a text for programs with its values: what was written down as a text stays as it is."""
+        """Return a text for programs with its values filled in; texts among these stay as they are."""
         return fill(template, scope, self.show)
 
     @abstractmethod
@@ -55,11 +55,11 @@ class RunBase(ABC):
 
     @abstractmethod
     def begin_again(self) -> None:
-        """Start where the nodes are that keep their place, with the data as they are."""
+        """Start again with the current data; nodes that keep their place resume there."""
 
     @abstractmethod
     def tick(self, now: float) -> int:
-        """Look at the interrupts, then continue with the course on top; return the status of the mission."""
+        """Check the interrupts, then continue with the course on top; return the status of the mission."""
 
     @abstractmethod
     def halt(self) -> None:
@@ -67,7 +67,7 @@ class RunBase(ABC):
 
     @abstractmethod
     def suspend(self, from_start: bool) -> None:
-        """Stop the leaves that run, and keep the place."""
+        """Stop the running leaves, and keep the place."""
 
     @abstractmethod
     def main_tasks(self) -> Iterable[ResumableTask]:

@@ -22,19 +22,19 @@ class RobotValues(Protocol):
         ...
 
     def count(self, name: str, /) -> int:
-        """Return how many messages have come so far; raise KeyError if there is no such name."""
+        """Return how many messages have arrived so far; raise KeyError if there is no such name."""
         ...
 
 
 class MissionScope(Protocol):
-    """A scope of expressions that also tells how many messages have come."""
+    """A scope of expressions that also counts messages."""
 
     def variable(self, name: str, /) -> Value | NotArrived:
         """Return the value of `$name`."""
         ...
 
     def word(self, name: str, /) -> Value:
-        """Return what a bare word names."""
+        """Return the value that a bare word names."""
         ...
 
     def age(self, name: str, /) -> float | NotArrived:
@@ -42,16 +42,16 @@ class MissionScope(Protocol):
         ...
 
     def is_new(self, name: str, /) -> bool:
-        """Return whether a message of `$name` came since this node started."""
+        """Return whether a message of `$name` has arrived since this node started."""
         ...
 
     def count(self, name: str, /) -> int:
-        """Return how many messages of `$name` have come."""
+        """Return how many messages of `$name` have arrived."""
         ...
 
 
 class RunScope:
-    """What all of a mission sees; `data` is its own, and written by `set`."""
+    """The scope of a whole mission; `data` is its own, and is written by `set`."""
 
     def __init__(
         self, data: dict[str, Value], inputs: Mapping[str, Value], places: Mapping[str, Place], values: RobotValues
@@ -74,47 +74,47 @@ class RunScope:
         return self._places.get(name, name)
 
     def age(self, name: str, /) -> float | NotArrived:
-        """Ask the world."""
+        """Look it up in the world."""
         return self._values.age(name)
 
     def is_new(self, name: str, /) -> bool:
-        """Return whether any message has come since the mission started."""
+        """Return whether any message has arrived since the mission started."""
         return self.count(name) > 0
 
     def count(self, name: str, /) -> int:
-        """Ask the world; what the mission has of its own never comes as a message."""
+        """Look it up in the world; the mission's own data and inputs never arrive as messages."""
         return 0 if name in self.data or name in self._inputs else self._values.count(name)
 
 
 class Inner:
-    """A scope within another one, which it asks for all that it does not know."""
+    """A scope inside another one, in which it looks up everything it does not know."""
 
     def __init__(self, outer: MissionScope) -> None:
         self.outer = outer
 
     def variable(self, name: str, /) -> Value | NotArrived:
-        """Ask the scope around."""
+        """Look it up in the outer scope."""
         return self.outer.variable(name)
 
     def word(self, name: str, /) -> Value:
-        """Ask the scope around."""
+        """Look it up in the outer scope."""
         return self.outer.word(name)
 
     def age(self, name: str, /) -> float | NotArrived:
-        """Ask the scope around."""
+        """Look it up in the outer scope."""
         return self.outer.age(name)
 
     def is_new(self, name: str, /) -> bool:
-        """Ask the scope around."""
+        """Look it up in the outer scope."""
         return self.outer.is_new(name)
 
     def count(self, name: str, /) -> int:
-        """Ask the scope around."""
+        """Look it up in the outer scope."""
         return self.outer.count(name)
 
 
 class ItemScope(Inner):
-    """What the body of a loop sees: also the item."""
+    """The scope of a loop's body, which adds the item."""
 
     def __init__(self, outer: MissionScope, name: str) -> None:
         super().__init__(outer)
@@ -122,12 +122,12 @@ class ItemScope(Inner):
         self.item: Value = None
 
     def variable(self, name: str, /) -> Value | NotArrived:
-        """Return the item, or what the scope around knows."""
+        """Return the item, or look the name up in the outer scope."""
         return self.item if name == self.name else self.outer.variable(name)
 
 
 class SinceScope(Inner):
-    """What a node sees that asks `new($x)`: messages count from its start."""
+    """The scope of a node that uses `new($x)`: messages count from its start."""
 
     def __init__(self, outer: MissionScope, names: frozenset[str]) -> None:
         super().__init__(outer)
@@ -139,12 +139,12 @@ class SinceScope(Inner):
         self.seen = {name: self.outer.count(name) for name in self._names}
 
     def is_new(self, name: str, /) -> bool:
-        """Return whether a message came since `mark`."""
+        """Return whether a message has arrived since `mark`."""
         return self.outer.count(name) > self.seen.get(name, 0)
 
 
 def new_names(expression: Expression) -> frozenset[str]:
-    """Return the names about which an expression asks `new($x)`."""
+    """Return the names that an expression passes to `new($x)`."""
     if not any(call.name == "new" for call in expression.calls):
         return frozenset()
     calls = (node for node, _ in walk(expression.tree) if isinstance(node, FunctionCall) and node.function == "new")

@@ -1,7 +1,7 @@
-"""The state of an engine as plain data, and back: what was saved at a tick continues from there in the same way.
+"""Snapshots of an engine as plain data: a restored engine continues exactly as the saved one would have.
 
-An engine is restored into one that was made from the same program, robot and settings. What runs outside (skills that
-were asked) is the business of its world.
+A snapshot is restored into an engine made from the same program, robot and settings. What runs outside (requested
+skills) is up to its world.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ _RUN = ("begun", "ending", "message")
 _COURSE = ("lost", "left")
 
 
-class NoSnapshot(ValueError):  # noqa: N818 - told to who gives the data
-    """Raised when data are no snapshot of this mission."""
+class NoSnapshot(ValueError):  # noqa: N818 - shown to whoever gives the data
+    """Raised when data are not a snapshot of this mission."""
 
 
 def save(engine: Engine) -> dict[str, Any]:
@@ -63,10 +63,10 @@ def save(engine: Engine) -> dict[str, Any]:
 
 
 def restore(engine: Engine, saved: Mapping[str, Any]) -> None:
-    """Bring an engine into a state that was saved.
+    """Restore a saved state into an engine.
 
     Raises:
-        NoSnapshot: if the data are of another version or mission.
+        NoSnapshot: if the data belong to another version or mission.
     """
     if saved.get("version") != VERSION:
         raise NoSnapshot(f"a snapshot of version {saved.get('version')!r}; this is version {VERSION}")
@@ -126,7 +126,7 @@ def _mapping(value: Value) -> Mapping[str, Value]:
 
 
 def to_plain(value: Value | NotArrived) -> Any:
-    """Return a value as JSON: what JSON does not know is a map of one entry, the name of its class."""
+    """Return a value as data for JSON; what JSON cannot express becomes a map with one entry, named after its class."""
     match value:
         case None | bool() | str() | int():
             return value

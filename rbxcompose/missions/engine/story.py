@@ -1,4 +1,4 @@
-"""The story of a mission: one line of text per event, and how often each skill ran with which result."""
+"""The story of a mission: one line of text per event, and how often each skill ended with each result."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class MissionStory:
         self._results: dict[str, Counter[str]] = {}
 
     def tell(self, event: MissionEvent) -> tuple[Level, str]:
-        """Return the line for an event, empty for one that others tell as well, and how bad it is."""
+        """Return how bad an event is, and its line, which is empty if other events say the same."""
         match event:
             case SkillStarted(leaf=leaf, skill=skill, arguments=arguments):
                 self._labels[leaf] = " ".join([skill, *self._written(skill, arguments)])
@@ -76,7 +76,7 @@ class MissionStory:
         assert_never(event)
 
     def skills(self) -> str:
-        """Return how often each skill ended how: `go_to 12 (11 success, 1 failure), recharge 1 (1 success)`."""
+        """Return how often each skill had each result: `go_to 12 (11 success, 1 failure), recharge 1 (1 success)`."""
         counted = []
         for skill, results in self._results.items():
             each = ", ".join(f"{results[result]} {result}" for result in sorted(results, key=_usual_first))

@@ -20,10 +20,9 @@ from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """What a task is made from: the engine, the run of its mission, its node, what its expressions see, those below.
+    """What a task is made from: the engine, the run of its mission, its node, its scope, the tasks below it.
 
-    `item` is what the tasks below see of a loop, for a node that has one; `inner` is the run of the mission that a
-    `use` runs.
+    `item` is the scope that a loop adds for the tasks below it; `inner` is the run of the mission that a `use` runs.
     """
 
     engine: EngineBase
@@ -36,18 +35,18 @@ class Site:
 
 
 class Task(ABC):
-    """The running side of a node; kinds fill in `begin` and, if they take time, `proceed`.
+    """The running side of a node; kinds implement `begin` and, if they take time, `proceed`.
 
-    `current` is the task below that runs now. A task without one goes on by starting the child that it was at, so
-    that a child which was suspended to start again needs no further bookkeeping. `saved` are the names of what else
-    makes up its state.
+    `current` is the task below that runs now. A task without one continues by starting the child that it was at, so
+    that a child suspended for a restart needs no further bookkeeping. `saved` names the other attributes that make up
+    its state.
     """
 
     __slots__ = ("current", "end", "engine", "number", "run", "scope", "statuses")
     saved: ClassVar[tuple[str, ...]] = ()
-    times: ClassVar[tuple[str, ...]] = ()  # those of them that are times [s]
-    fresh: ClassVar[tuple[str, ...]] = ()  # those that mean nothing before the next start, which computes them
-    told: ClassVar[tuple[str, ...]] = ()  # those that change nothing but what is told
+    times: ClassVar[tuple[str, ...]] = ()  # those of `saved` that are times [s]
+    fresh: ClassVar[tuple[str, ...]] = ()  # those without a meaning until the next start computes them
+    told: ClassVar[tuple[str, ...]] = ()  # those that affect only what is reported
 
     def __init__(self, site: Site) -> None:
         self.engine = site.engine
@@ -92,7 +91,7 @@ class Task(ABC):
             child.halt()
 
     def suspend(self, from_start: bool) -> bool:
-        """Stop the leaves that run, keep the place, and return whether this task is to be started again for that.
+        """Stop the running leaves, keep the place, and return whether this task must be started again.
 
         With `from_start`, a leaf and its modifiers begin again, as after an interrupt; without it, as after
         a pause, a leaf repeats only what it asked of the robot.
@@ -103,7 +102,7 @@ class Task(ABC):
         return False
 
     def restart(self, target: Target) -> bool:
-        """Let what is named begin again, if it runs below; tell whether it does."""
+        """Restart the target if it runs below; return whether it does."""
         child = self.current
         if child is None:
             return False
@@ -114,7 +113,7 @@ class Task(ABC):
         return child.restart(target)
 
     def restored(self) -> None:  # noqa: B027 - most kinds have nothing to do
-        """Bring in order what follows from the state, after it was restored."""
+        """Recompute what follows from the state, after it was restored."""
 
     def result(self) -> Value:
         """Return what `save` keeps of this node."""
@@ -140,10 +139,10 @@ class Task(ABC):
         self.statuses[first : self.end] = [IDLE] * (self.end - first)
 
     def number_of(self, expression: Expression, what: str) -> float:
-        """Return the value of an expression that must be a number from 0 on.
+        """Return the value of an expression that must be a number, at least 0.
 
         Raises:
-            NodeFailed: if it is none.
+            NodeFailed: if it is not.
         """
         value = evaluate(expression, self.scope)
         if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
@@ -154,7 +153,7 @@ class Task(ABC):
         """Return the value of an expression that must be a whole number, at least 0.
 
         Raises:
-            NodeFailed: if it is none.
+            NodeFailed: if it is not.
         """
         value = self.number_of(expression, what)
         if value != int(value):
@@ -163,7 +162,7 @@ class Task(ABC):
 
     @property
     def path(self) -> str:
-        """Return where in the mission it is."""
+        """Return its path in the mission."""
         return self.engine.program.nodes[self.number].path
 
     def cut(self, because: str) -> None:
@@ -174,7 +173,7 @@ class Task(ABC):
         engine.because = engine.outcome = ""
 
     def report(self, error: Exception) -> None:
-        """Say why this task cannot continue."""
+        """Report why this task cannot continue."""
         message = words(error)
         self.engine.reasons[self.number] = message
         self.engine.say(Reported(self.path, message))

@@ -22,7 +22,7 @@ def show(type: Type | None, value: Value) -> str:
 
 
 def spoken(value: Value, places: Collection[str]) -> Value:
-    """Return a value in which texts that name a place are written as people say them: 'living room'."""
+    """Return a value with the names of places written as people say them: 'living room'."""
     match value:
         case str():
             return value.replace("_", " ") if value in places else value
@@ -34,7 +34,7 @@ def spoken(value: Value, places: Collection[str]) -> Value:
 
 
 def show_briefly(type: Type | None, value: Value) -> str:
-    """Return a value as text, a number with three digits or all those before the point: '48.9 %'."""
+    """Return a value as text, a number with three digits, or more if there are more before the point: '48.9 %'."""
     text = show(type, value)
     if not isinstance(value, int | float) or not is_number(value) or not math.isfinite(value):
         return text

@@ -12,22 +12,22 @@ from rbxcompose.missions.engine.scopes import RobotValues
 
 
 class World(RobotValues, Protocol):
-    """What a mission needs from outside: values, skills, topics and services, someone who listens."""
+    """What a mission needs from outside: values, skills, topics, services and a listener for events."""
 
     def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
-        """Start a skill for a leaf; `Engine.ended` tells how it ended."""
+        """Start a skill for a leaf; its result goes to `Engine.ended`."""
         ...
 
     def halt(self, leaf: int, /) -> None:
-        """Stop the skill or the call of a leaf; it is not reported any more."""
+        """Stop the skill or the call of a leaf; its result is no longer reported."""
         ...
 
     def pause(self, leaf: int, /) -> None:
-        """Hold the skill of a leaf, which declares that it can pause."""
+        """Pause the skill of a leaf; the skill declares that it can pause."""
         ...
 
     def resume(self, leaf: int, /) -> None:
-        """Let the skill of a leaf continue that was held."""
+        """Resume the paused skill of a leaf."""
         ...
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
@@ -35,29 +35,29 @@ class World(RobotValues, Protocol):
         ...
 
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
-        """Call a service for a leaf; `Engine.ended` tells how it ended."""
+        """Call a service for a leaf; its result goes to `Engine.ended`."""
         ...
 
     def say(self, event: MissionEvent, /) -> None:
-        """Hear what happens."""
+        """Receive an event."""
         ...
 
 
 class Observer(Protocol):
-    """Who wants to know of each node as it starts and ends; an engine without one does not look."""
+    """An observer of the start and end of each node; an engine without one does not track them."""
 
     def started(self, number: int, /) -> None:
-        """Hear that a node starts."""
+        """Handle the start of a node."""
         ...
 
     def ended(self, number: int, status: int, outcome: str, /) -> None:
-        """Hear that a node ended, with an outcome of its own if it has one; IDLE if it was halted."""
+        """Handle the end of a node, with its own outcome if it has one; IDLE means that it was halted."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How an engine is run: where its chances come from, and who observes each node.
+    """How an engine is run: its random seed, and the observer of each node.
 
     `start_at` are the states in which machines begin the first time, by the number of the machine's node.
     """

@@ -1,1 +1,1 @@
-"""What a mission is once it was read: nodes, kinds and modifiers, and what they answer."""
+"""Missions as they are read: nodes, kinds and modifiers, and the questions these answer."""

@@ -1,4 +1,4 @@
-"""The words in which kinds of nodes and modifiers answer questions about them before a mission runs."""
+"""Types in which kinds of nodes and modifiers answer questions about themselves before a mission runs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Advice(NamedTuple):
 
 
 class Counted(NamedTuple):
-    """A number of a node, what it is called, and the least that has a meaning."""
+    """A number in a node: what it is called, its expression, and the least value that makes sense."""
 
     what: str
     expression: Expression | None
@@ -24,25 +24,25 @@ class Counted(NamedTuple):
 
 
 class NodeFlow(Enum):
-    """How a node goes through those inside it when all goes well."""
+    """How a node goes through its children when all goes well."""
 
     IN_TURN = auto()
     PER_ITEM = auto()  # once for each item of a list
     ONE_OF = auto()  # through one of them
-    OPEN = auto()  # what of them is done, and when, is not written down
+    OPEN = auto()  # the text does not say which of them run, and when
 
 
 class Skipped(Enum):
-    """When a node does nothing, and is skipped itself."""
+    """When a node does nothing, and counts as skipped itself."""
 
     NEVER = auto()
-    WITH_ALL_INSIDE = auto()  # if all that it does is skipped
+    WITH_ALL_INSIDE = auto()  # if everything inside is skipped
     PERHAPS = auto()
 
 
 class ModifierScope(Enum):
-    """For which nodes a modifier is there."""
+    """The nodes that a modifier is meant for."""
 
     ALL = auto()
-    FAILING = auto()  # that may fail
-    REPEATED = auto()  # that are done more than once
+    FAILING = auto()  # those that may fail
+    REPEATED = auto()  # those that run more than once

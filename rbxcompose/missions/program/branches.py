@@ -1,4 +1,4 @@
-"""Branches: what decides between nodes at the same time, the outcomes by conditions over them, cases of a value."""
+"""Branches: what decides between parallel nodes, the outcomes by conditions over them, the cases of a value."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ RESULTS = (NAMES[SUCCESS], NAMES[FAILURE], NAMES[SKIPPED], HALTED)
 
 @dataclass(frozen=True, slots=True)
 class OutcomeRule:
-    """An outcome and the condition for it over the branches; None for `otherwise`."""
+    """An outcome and its condition over the branches, None for `otherwise`."""
 
     name: str
     condition: Expression | None
@@ -30,9 +30,9 @@ class OutcomeRule:
 
 @dataclass(frozen=True, slots=True)
 class Branches:
-    """What decides how nodes end that are done at the same time: `all`, `any`, or a number of them; or one branch.
+    """What decides how parallel nodes end: `all` of them, `any`, a number of them, or one branch.
 
-    `names` are those of the branches, in the order of the children, if they have any.
+    `names` are the names of the branches, if they have any, in the order of the children.
     """
 
     names: tuple[str, ...] = ()
@@ -48,14 +48,14 @@ class Branches:
 
 @dataclass(frozen=True, slots=True)
 class BranchChoice:
-    """What is asked, and the value of each case, in the order of the children."""
+    """The expression to choose by, and the value of each case, in the order of the children."""
 
     asked: Expression
     cases: tuple[Asked, ...] = ()
 
 
 class BranchResult(str):
-    """The result of a branch as a text: one with an outcome of its own also equals what that counts as."""
+    """The result of a branch as a text; an outcome of its own also equals the result it counts as."""
 
     __slots__ = ("counts_as",)
     counts_as: str
@@ -78,14 +78,14 @@ class BranchResult(str):
 
 
 class BranchScope(Inner):
-    """What the conditions of a parallel's outcomes see: also the result of each branch."""
+    """The scope of the conditions of a parallel's outcomes, which adds the result of each branch."""
 
     def __init__(self, outer: MissionScope, ended: Mapping[str, BranchResult]) -> None:
         super().__init__(outer)
         self._ended = ended
 
     def variable(self, name: str, /) -> Value | NotArrived:
-        """Return the result of a branch, or what the scope around knows."""
+        """Return the result of a branch, or look the name up in the outer scope."""
         return self._ended[name] if name in self._ended else self.outer.variable(name)
 
 

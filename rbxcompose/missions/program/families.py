@@ -1,4 +1,4 @@
-"""What kinds of a family have in common, so that each answers only for itself."""
+"""What the kinds of a family have in common, so that each answers only what is its own."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rbxcompose.missions.program.program import MissionNode, RobotNames, Step
 
 
 class LeafStep(Step):
-    """A node with none inside: it does one thing once."""
+    """A node without children: it does one thing once."""
 
     __slots__ = ()
     skipped = Skipped.NEVER
@@ -26,26 +26,26 @@ class LeafStep(Step):
     look = PLAIN
 
     def endless(self, ends: Outcomes) -> None:
-        """Say nothing: it is done once."""
+        """Return nothing: it runs once."""
 
     def possibilities(
         self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
     ) -> Iterator[Possibility]:
-        """Yield nothing: whether it was started at all, the nodes around it tell."""
+        """Yield nothing: the nodes around it cover whether it starts."""
         yield from ()
 
     def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
-        """Return nothing: there is none inside."""
+        """Return nothing: it has no children."""
         return {}
 
     @property
     @abstractmethod
     def lasts(self) -> Expression | None:
-        """Return the time that it takes, if that is written down."""
+        """Return the time that it takes, if the mission says so."""
 
 
 class Deed(LeafStep):
-    """A leaf that does something and has ended at once."""
+    """A leaf that does something and ends immediately."""
 
     __slots__ = ()
     waits = False
@@ -55,47 +55,47 @@ class Deed(LeafStep):
 
 
 class GroupStep(Step):
-    """A node that does nothing by itself: what is done is done by those inside, which see what it sees."""
+    """A node that does nothing by itself: its children do the work, and see what it sees."""
 
     __slots__ = ()
 
     @property
     def only_asks(self) -> bool:
-        """Return that it decides more than an answer."""
+        """Return False: it decides more than the answer to a condition."""
         return False
 
     def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
-        """Return nothing: those inside see what it sees."""
+        """Return nothing: its children see what it sees."""
         return {}
 
     @property
     def waits(self) -> bool:
-        """Return that only those inside take time."""
+        """Return False: only its children take time."""
         return False
 
     @property
     def effects(self) -> NodeEffects:
-        """Return that it has none."""
+        """Return no effects."""
         return NO_EFFECTS
 
     @property
     def has_result(self) -> bool:
-        """Return that only those inside have one."""
+        """Return False: only its children have results."""
         return False
 
 
 class Straight(GroupStep):
-    """A group that goes once through what is inside; tests need not see more of it than that."""
+    """A group that goes through its children once; tests need not see more of it than that."""
 
     __slots__ = ()
 
     @property
     def comes_again(self) -> bool:
-        """Return that it does not."""
+        """Return False: it goes through its children once."""
         return False
 
     def endless(self, ends: Outcomes) -> None:
-        """Say nothing: it is done once."""
+        """Return nothing: it runs once."""
 
     def possibilities(
         self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
@@ -105,7 +105,7 @@ class Straight(GroupStep):
 
 
 class Loop(GroupStep):
-    """A group that comes back to what is inside, or does nothing at all."""
+    """A group that may repeat its children, or do nothing at all."""
 
     __slots__ = ()
     comes_again = True
@@ -114,12 +114,12 @@ class Loop(GroupStep):
     def possibilities(
         self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
     ) -> Iterator[Possibility]:
-        """Yield nothing: how often it comes back is a matter of data."""
+        """Yield nothing: how often it repeats depends on data."""
         yield from ()
 
 
 class Choosing(Straight):
-    """A group that does one of its nodes, or none."""
+    """A group that runs one of its children, or none."""
 
     __slots__ = ()
     skipped = Skipped.PERHAPS
@@ -129,12 +129,12 @@ class Choosing(Straight):
     @property
     @abstractmethod
     def ways(self) -> tuple[str, ...]:
-        """Return its ways in words, in the order of its nodes; the last of them may be that nothing is done."""
+        """Return its alternatives in words, in the order of its children; the last may be that none of them runs."""
 
     def possibilities(
         self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
     ) -> Iterator[Possibility]:
-        """Yield each node, and that nothing fits."""
+        """Yield each child, and the case that nothing fits."""
         for index, word in enumerate(self.ways):
             if index < len(node.children):
                 yield Possibility(node.span, f"{node.path}: {word}", started(node.children[index]))

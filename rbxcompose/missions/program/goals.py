@@ -1,4 +1,4 @@
-"""Actions, services and topics as skills: arguments, the goal that they make, what a result means."""
+"""Actions, services and topics as skills: arguments, the goal made from them, what a result means."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from rbxcompose.units import NUMBER, TIME
 
 M = TypeVar("M", bound=Message)
 
-FRAME = "map"  # that places and poses of missions are in
-SUCCESS = "success"  # the field of an answer that tells it
+FRAME = "map"  # the frame of places and poses in missions
+SUCCESS = "success"  # the field of a response that reports success
 STAMPED, POSED = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Pose"
 LASTING = "builtin_interfaces/msg/Duration"
 
@@ -48,10 +48,10 @@ def skill_of(
     pausable: bool = False,
     outcomes: Mapping[str, str] = MappingProxyType({}),
 ) -> Skill:
-    """Return the skill that an action is: the fields of its goal are the arguments, the first one is the main one.
+    """Return an action as a skill: the fields of its goal are the arguments, the first one is the main one.
 
-    A field of another type than a pose, time, text, flag or number is no argument and keeps its zero value. A pose or
-    a time that is the main argument has to be given.
+    A field that is not a pose, time, text, flag or number is not an argument and keeps its zero value. A main argument
+    that is a pose or a time is required.
     """
     results = typed_fields(action.Result)
     return Skill(name, *_asked(action.Goal), claims, restartable, pausable, dict(outcomes), results)
@@ -66,16 +66,16 @@ def topic_skill(
     *,
     outcomes: Mapping[str, str] = MappingProxyType({}),
 ) -> Skill:
-    """Return the skill that orders on a topic are, whose ends are messages `end`: its arguments are as for an action.
+    """Return orders on a topic as a skill whose ends are messages `end`; its arguments are as for an action.
 
-    Where no ends are told, it has no results.
+    Without `end`, it has no results.
     """
     results = typed_fields(end) if end is not None else {}
     return Skill(name, *_asked(order), claims, restartable, outcomes=dict(outcomes), results=results)
 
 
 def service_skill(service: type[Service[Any, Any]], name: str) -> Skill | None:
-    """Return the skill that a service is, whose answer tells whether it succeeded; None for any other service."""
+    """Return a service as a skill; None if its response does not report success."""
     if service.Response.FIELDS.get(SUCCESS) != "bool":
         return None
     arguments, results = typed_fields(service.Request), typed_fields(service.Response)
@@ -83,7 +83,7 @@ def service_skill(service: type[Service[Any, Any]], name: str) -> Skill | None:
 
 
 def _asked(message: type[Message]) -> tuple[dict[str, Type], str, frozenset[str]]:
-    """Return the arguments that a message has room for, the main one, and those that have to be given."""
+    """Return the arguments that a message has fields for, the main one, and the required ones."""
     arguments = typed_fields(message)
     main = next(iter(arguments), "")
     needed = frozenset({main} if main and message.FIELDS[main] in (STAMPED, POSED, LASTING) else ())
@@ -115,7 +115,7 @@ def message_of(message: type[M], fields: Mapping[str, Value]) -> M:
     """Return a message with fields of any shape, nested ones as maps.
 
     Raises:
-        ValueError: if a field does not exist or a value does not fit into it, in words.
+        ValueError: with the reason, if a field does not exist or a value does not fit into it.
     """
     made, findings = from_plain(
         message, {name: _fitted(message.FIELDS.get(name, ""), one) for name, one in fields.items()}
@@ -126,7 +126,7 @@ def message_of(message: type[M], fields: Mapping[str, Value]) -> M:
 
 
 def _fitted(ros_type: str, value: Any) -> Any:
-    """Return a value of a mission as data for a field: places become poses, whole numbers whole ones."""
+    """Return a value of a mission as data for a field: places become poses, whole floats become integers."""
     if not ros_type:
         return value
     base = parse_type(ros_type).base
@@ -145,7 +145,7 @@ def _fitted(ros_type: str, value: Any) -> Any:
 
 
 def values_of(message: Message | None) -> dict[str, Value]:
-    """Return what a result tells, field by field: lengths of time in [s], other nested messages as maps."""
+    """Return the fields of a result by name: durations in [s], other nested messages as maps."""
     if message is None:
         return {}
     lasting = [attribute(name) for name, ros in message.FIELDS.items() if ros == LASTING]

@@ -1,4 +1,4 @@
-"""What kinds with the option `history` share: they start again where they were halted."""
+"""What kinds with the option `history` share: they resume where they were halted."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ HISTORY = "Where it restarts after it was halted: `last` at the child it was in,
 
 
 def read_history(reader: NodeReader) -> str:
-    """Read the option; `none` if it is not there."""
+    """Read the option; `none` if it is absent."""
     return reader.choice("history", HISTORIES)
 
 
 class WithHistory(Task):
-    """A task that may have a history; kinds set `history` and ask `engine.places.take_up` when they begin."""
+    """A task that may have a history; kinds set `history` and call `engine.places.take_up` when they begin."""
 
     __slots__ = ("history",)
     history: str
@@ -33,6 +33,6 @@ class WithHistory(Task):
         places.is_deep = before
 
     def forget_places(self) -> None:
-        """Forget where this node and those below it were: it has ended."""
+        """Forget the places of this node and those below it, since it has ended."""
         if self.history != NO_HISTORY:
             self.engine.places.forget(self.number, self.end)

@@ -26,7 +26,7 @@ OPTIONS: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class InTurn(Straight):
-    """A list of nodes: the first that ends as `decides` ends the list alike."""
+    """A list of nodes: the first that ends with the result `decides` ends the list with it."""
 
     reactive: bool
     history: str = field()
@@ -44,7 +44,7 @@ class InTurn(Straight):
         return cls(reactive, read_history(reader), reader.choice("order", (WRITTEN, RANDOM)))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return what decides of any child, and all of the last one that is reached."""
+        """Return the deciding outcomes of every child, and all outcomes of the last one that is reached."""
         found, goes_on_never = NEVER, ALWAYS_FAILS if self.decides == FAILS else ALWAYS_SUCCEEDS
         for child in map(endings.of, node.children[:-1]):
             found = found.both(child.of(self.decides))
@@ -54,14 +54,14 @@ class InTurn(Straight):
 
     @property
     def comes_again(self) -> bool:
-        """Return that an earlier condition may let it go back."""
+        """Return whether an earlier condition may make it go back."""
         return self.reactive
 
 
 class InTurnTask(WithHistory):
-    """Does the nodes of a list in order; the first that ends as `decides` ends the list alike.
+    """Runs the nodes of a list in order; the first that ends with the result `decides` ends the list with it.
 
-    If none does, it ends as those that were not skipped did.
+    If none does, the list ends like those that were not skipped.
     """
 
     __slots__ = ("all", "children", "conditions", "did", "index", "is_random", "order")
@@ -73,13 +73,13 @@ class InTurnTask(WithHistory):
         self.is_random = step.order == RANDOM
         self.history = step.history
         self.all = self.children = site.children
-        self.order: list[int] = []  # in which the children are done, if it was drawn
+        self.order: list[int] = []  # of the children, if it was drawn
         self.conditions = _conditions(site) if step.reactive else {}
         self.index = 0
         self.did = SKIPPED
 
     def begin(self) -> int:
-        """Start with the first child, or with the one at which it was halted."""
+        """Start with the first child, or with the one where it was halted."""
         if self.engine.places.kept and self.engine.places.take_up(self):
             self.arrange()
             return self.proceed()
@@ -92,7 +92,7 @@ class InTurnTask(WithHistory):
         return self.proceed()
 
     def restored(self) -> None:
-        """Bring the children into the order that was drawn."""
+        """Put the children back in the order that was drawn."""
         self.arrange()
 
     def arrange(self) -> None:
@@ -101,7 +101,7 @@ class InTurnTask(WithHistory):
             self.children = tuple(self.all[index] for index in self.order)
 
     def proceed(self) -> int:
-        """Continue with the child that runs, and with those behind it as far as they end at once."""
+        """Continue with the running child, then with the next ones as long as each ends immediately."""
         if self.conditions and self.index:
             self.ask_again()
         children, index, child, decides = self.children, self.index, self.current, self.decides
@@ -129,9 +129,9 @@ class InTurnTask(WithHistory):
             self.engine.outcome = ""
 
     def ask_again(self) -> None:
-        """Ask the conditions before the child that runs; go back to the first whose answer is another one.
+        """Evaluate the conditions before the running child again; go back to the first whose result differs.
 
-        The answer of one that was forgotten meanwhile was such that the list went on.
+        If an earlier result was forgotten meanwhile, it was one after which the list continued.
         """
         for index, child in enumerate(self.children[: self.index]):
             if child.number not in self.conditions:
@@ -149,7 +149,7 @@ class InTurnTask(WithHistory):
                 return
 
     def watch_conditions(self) -> None:
-        """Wake when a condition before the child that runs may have changed."""
+        """Wake when a condition before the running child may have changed."""
         for child in self.children[: self.index]:
             for watched in self.conditions.get(child.number, ()):
                 self.engine.watch(watched)
@@ -164,7 +164,7 @@ class InTurnTask(WithHistory):
 
 
 def _conditions(site: Site) -> dict[int, tuple[Watched, ...]]:
-    """Return the children that only ask, by number, with what they ask."""
+    """Return the children that only evaluate conditions, by number, with these conditions."""
     nodes = site.engine.program.nodes
     asking = (nodes[number] for number in site.node.children if _only_asks(nodes, nodes[number]))
     return {node.number: tuple(_asked(nodes[node.number : node.end])) for node in asking}

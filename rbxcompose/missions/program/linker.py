@@ -1,4 +1,4 @@
-"""From a mission and those that it uses to one program with one row of nodes."""
+"""Links a mission and those that it uses into one program with a single row of nodes."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from dataclasses import replace
 
 from rbxcompose.missions.program.program import Interrupt, MissionNode, Program, Target
 
-MOST_NODES = 20_000  # of a mission with all that it uses
+MOST_NODES = 20_000  # of a mission and all missions that it uses
 DEEPEST = 16  # missions within missions
 
 
 def link(program: Program, missions: Mapping[str, Program]) -> Program:
-    """Return the program in which each `use` has the nodes of its mission below it.
+    """Return the program with the nodes of the used mission below each `use`.
 
     Raises:
-        KeyError: if a mission is used that does not exist; checks find that before, and also circles.
+        KeyError: if a used mission does not exist; checks report that earlier, and circles as well.
     """
     if not any(node.step.uses for node in program.nodes):
         return program

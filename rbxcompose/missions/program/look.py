@@ -7,9 +7,9 @@ from enum import StrEnum
 
 
 class Form(StrEnum):
-    """How what is inside a node stands: one after the other, beside each other, as states with transitions.
+    """How the children of a node are arranged: one after the other, side by side, or as states with transitions.
 
-    A state is drawn as one.
+    `STATE` is for a state itself.
     """
 
     AFTER = "after"
@@ -20,7 +20,7 @@ class Form(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class NodeLook:
-    """The sign before the title, the form, and whether the keys of the nodes inside say something."""
+    """The sign before the title, the form, and whether the keys of the children are worth showing."""
 
     sign: str = ""
     form: Form = Form.AFTER

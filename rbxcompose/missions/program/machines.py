@@ -1,4 +1,4 @@
-"""What is written down of a machine and its states."""
+"""A machine and its states, as written."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ MACHINE_KEYS = ("start", "states", "ends", "history")
 
 @dataclass(frozen=True, slots=True)
 class Next:
-    """Where a state leads to, by outcome; the outcome `` stands for every one that is not named."""
+    """Where a state leads to, by outcome; the empty outcome covers all that are not named."""
 
     to: Mapping[str, str] = field(default_factory=dict)
-    spans: Mapping[str, Span] = field(default_factory=dict)  # of the states that are named, by outcome
+    spans: Mapping[str, Span] = field(default_factory=dict)  # of the names of these states, by outcome
     keys: Mapping[str, Span] = field(default_factory=dict)  # of the outcomes
 
 
 @dataclass(frozen=True, slots=True)
 class MachineStates:
-    """The first state, the names of the states in the order of the children, the ends with what they count as."""
+    """The first state, the names of the states in the order of the children, the ends with their results."""
 
     start: str = ""
     names: tuple[str, ...] = ()

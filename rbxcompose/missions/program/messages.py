@@ -1,4 +1,4 @@
-"""Messages that a mission publishes, and requests that it makes, as written: where to, and what is in each field."""
+"""Messages that a mission publishes, and requests that it makes, as written: the target, and each field's value."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rbxcompose.manifest.tree import ScalarNode
 
 @dataclass(frozen=True, slots=True)
 class WrittenValue:
-    """One value as it was written: a text with slots, and an expression if it can be read as one."""
+    """One value as written: a text with slots, and an expression if it can be parsed as one."""
 
     scalar: ScalarNode
     template: Template
@@ -26,9 +26,9 @@ TemplateShape: TypeAlias = "WrittenValue | Mapping[str, TemplateShape] | tuple[T
 
 @dataclass(frozen=True, slots=True)
 class MessageTemplate:
-    """What is sent where; `body` is None for a message whose fields all keep their zero values.
+    """What is sent, and where; `body` is None for a message whose fields all keep their zero values.
 
-    `keys` are the places of the names of fields, by the path to each.
+    `keys` are the spans of the field names, by the path to each.
     """
 
     target: ScalarNode

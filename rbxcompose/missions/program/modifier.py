@@ -15,12 +15,12 @@ from rbxcompose.missions.program.outcomes import Outcomes
 
 
 class Modifier(ABC):
-    """A setting of a node, with its options; what is not abstract, only some modifiers have."""
+    """A setting of a node, with its options; only some modifiers override what is not abstract."""
 
     __slots__ = ()
     name: ClassVar[str]
-    keys: ClassVar[Mapping[str, str]]  # keys beside its own, each with what it is for
-    only_states: ClassVar[bool]  # it belongs to states of machines
+    keys: ClassVar[Mapping[str, str]]  # keys besides its own, each with its purpose
+    only_states: ClassVar[bool]  # it is for states of machines only
 
     @classmethod
     @abstractmethod
@@ -29,7 +29,7 @@ class Modifier(ABC):
 
     @abstractmethod
     def changed(self, inner: Outcomes) -> Outcomes:
-        """Return how a node may end with it; `inner` is how what is inside may."""
+        """Return the outcomes of a node with this modifier; `inner` are those without it."""
 
     @property
     @abstractmethod
@@ -39,7 +39,7 @@ class Modifier(ABC):
     @property
     @abstractmethod
     def serves(self) -> ModifierScope:
-        """Return for which nodes it is there."""
+        """Return which nodes it is meant for."""
 
     @property
     @abstractmethod
@@ -48,27 +48,27 @@ class Modifier(ABC):
 
     @property
     def said(self) -> str:
-        """Return what is written behind its key where it is drawn."""
+        """Return the text to draw behind its key."""
         return self.value.text if self.value else ""
 
     @property
     def repeats(self) -> bool:
-        """Return whether it may start what is inside more than once."""
+        """Return whether it may start the node inside more than once."""
         return False
 
     @property
     def endless(self) -> Advice | None:
-        """Return what to say if what is inside takes no time."""
+        """Return the advice to give if the node inside takes no time."""
         return None
 
     @property
     def numbers(self) -> tuple[Counted, ...]:
-        """Return what it counts."""
+        """Return its numbers, each with the least value that makes sense."""
         return ()
 
     @property
     def limit(self) -> Expression | None:
-        """Return the time that the node may take."""
+        """Return the time limit of the node."""
         return None
 
     @property
@@ -78,7 +78,7 @@ class Modifier(ABC):
 
     @property
     def saved(self) -> ScalarNode | None:
-        """Return the name under which the result is kept."""
+        """Return the name under which the result is saved."""
         return None
 
     @property

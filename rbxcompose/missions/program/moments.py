@@ -11,12 +11,12 @@ from rbxcompose.missions.program.messages import MessageTemplate
 
 LEVELS = ("info", "warn", "error")  # of a log
 DEEDS = ("set", "log", "publish")
-OPTIONS = {"level": "log", "message": "publish"}  # each with the deed that it belongs to
+OPTIONS = {"level": "log", "message": "publish"}  # each with the action that it belongs to
 
 
 @dataclass(frozen=True, slots=True)
 class Deeds:
-    """What is done at one moment; all right sides are computed before anything is set."""
+    """The actions at one moment; all right-hand sides are evaluated before anything is set."""
 
     assignments: tuple[Assignment, ...] = ()
     text: Template | None = None
@@ -26,7 +26,7 @@ class Deeds:
 
 @dataclass(frozen=True, slots=True)
 class Moments:
-    """Deeds by the key of their moment."""
+    """Actions by the key of their moment."""
 
     deeds: Mapping[str, Deeds] = field(default_factory=dict)
 
@@ -38,9 +38,10 @@ class Moments:
 
 @dataclass(frozen=True, slots=True)
 class NodeEffects:
-    """What a node does to the mission and the robot by itself: what it sets, sends and asks.
+    """What a node does to the mission and the robot by itself: what it sets, publishes and calls.
 
-    `shortened` is the name of the data that it takes items out of, empty if it should and names none; None: nothing.
+    `shortened` is the name of the data that it removes items from: empty if it should but names none, None if it does
+    not.
     """
 
     assignments: tuple[Assignment, ...] = ()

@@ -1,4 +1,4 @@
-"""How something may end: in success, in failure, with outcomes of its own."""
+"""How something may end: in success, in failure, or with outcomes of its own."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ SUCCEEDS, FAILS = NAMES[SUCCESS], NAMES[FAILURE]
 
 @dataclass(frozen=True, slots=True)
 class Outcomes:
-    """Whether a node may end in success or in failure, and its outcomes of its own with what each counts as.
+    """Whether a node may end in success or in failure, and its own outcomes with the result each counts as.
 
-    A node that can do neither never ends by itself. Where not all is known, everything is possible.
+    A node that can do neither never ends by itself. Where not everything is known, all outcomes are possible.
     """
 
     succeeds: bool = True
@@ -23,12 +23,12 @@ class Outcomes:
 
     @property
     def words(self) -> Mapping[str, str]:
-        """Return all outcomes with what each counts as."""
+        """Return all outcomes with the result each counts as."""
         plain = {word: word for word, can in ((SUCCEEDS, self.succeeds), (FAILS, self.fails)) if can}
         return {**plain, **self.named}
 
     def both(self, other: Outcomes) -> Outcomes:
-        """Return what either may do."""
+        """Return the outcomes of either."""
         return Outcomes(self.succeeds or other.succeeds, self.fails or other.fails, {**self.named, **other.named})
 
     def of(self, word: str) -> Outcomes:
@@ -42,7 +42,7 @@ class Outcomes:
 
     @property
     def plain(self) -> Outcomes:
-        """Return them without their names."""
+        """Return them as success and failure only."""
         return Outcomes(self.counting_as(SUCCEEDS), self.counting_as(FAILS))
 
 
@@ -53,7 +53,7 @@ ANY = Outcomes()
 
 
 def either(several: Iterable[Outcomes]) -> Outcomes:
-    """Return what any of several may do."""
+    """Return the outcomes of any of several."""
     found = NEVER
     for one in several:
         found = found.both(one)

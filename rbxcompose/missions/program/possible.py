@@ -1,4 +1,4 @@
-"""What a mission may do, so that tests can say which of it they saw: each has a key that a run reports."""
+"""What a mission may do, each with a key that a run reports, so that tests can tell what they covered."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ StateKey: TypeAlias = tuple[Hashable, ...]
 
 
 class Possibility(NamedTuple):
-    """Something that a node may do: its place, in words, and its key."""
+    """Something that a node may do: its span, its description, and its key."""
 
     span: Span
     text: str
@@ -34,7 +34,7 @@ def ended(leaf: int, outcome: str) -> StateKey:
 
 
 def led(machine: int, state: str, to: str, outcome: str = "") -> StateKey:
-    """Return the key of a transition; without an outcome it is that on any."""
+    """Return the key of a transition; without an outcome, of one on any outcome."""
     return ("transition", machine, state, to, *([outcome] if outcome else []))
 
 

@@ -1,4 +1,4 @@
-"""A mission that was read: a flat, frozen tuple of nodes, and the rest of its file."""
+"""A parsed mission: a flat, frozen tuple of nodes, and the rest of its file."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.possible import Possibility
 
 ROOT = 0  # number of the node under `do`
-RATE = 20.0  # [Hz] of conditions that nothing announces
+RATE = 20.0  # [Hz] for polling conditions that change without a message
 NOTHING: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
 class Skill:
-    """What a mission may ask of the robot: typed arguments in order, and the `main` one that a single value is.
+    """What a mission may request of the robot: typed arguments in order, and the `main` one that a single value fills.
 
-    `outcomes` are those beyond `success` and `failure`, each with which of the two it counts as. `claims` is what it
-    needs for itself (base, arm, head, voice), empty for nothing. `results` are the types of what it tells at its end.
+    `outcomes` are those besides `success` and `failure`, each with which of the two it counts as. `claims` is what it
+    needs exclusively (base, arm, head, voice), empty for nothing. `results` are the types of its result values.
     """
 
     name: str
@@ -53,11 +53,11 @@ class Skill:
 
 @dataclass(frozen=True, slots=True)
 class RobotNames:
-    """What the robot gives to every mission: types of its values, its places, its skills, its missions, all by name.
+    """What the robot offers every mission: types of its values, its places, its skills, its missions, all by name.
 
     `topics` and `services` have the ROS names of their types; `unread` are missions whose files could not be read;
-    `removed` are places that a layer has taken away, each with where it did so.
-    It is not complete if a part of the robot has errors: then a skill that is missing may be that part's.
+    `removed` are places that a layer has removed, each with where it did so.
+    It is not complete if a part of the robot has errors: a missing skill may then belong to that part.
     """
 
     values: Mapping[str, Type] = field(default_factory=dict)
@@ -73,7 +73,7 @@ class RobotNames:
 
 @dataclass(frozen=True, slots=True)
 class Datum:
-    """A value that was written down: in SI, with its type and place."""
+    """A value as written: in SI, with its type and span."""
 
     value: Value
     type: Type
@@ -93,7 +93,7 @@ class Input:
 
 
 class Endings(Protocol):
-    """Who knows how the nodes of a mission may end."""
+    """An analyser of how the nodes of a mission may end."""
 
     program: Program
     robot: RobotNames
@@ -110,14 +110,14 @@ class Endings(Protocol):
 class Step(ABC):
     """What a node does: a kind of the language with its options, which are the fields of the subclass.
 
-    What is abstract every kind answers, itself or by its family (`families.py`). What is not is a capability: a kind
-    without it has nothing to say.
+    Every kind answers what is abstract, itself or through its family (`families.py`). The rest are capabilities: a
+    kind without one keeps the default.
     """
 
     __slots__ = ()
     name: ClassVar[str]  # the word of the language
-    options: ClassVar[Mapping[str, str]]  # the keys that belong to it, each with what it is for
-    is_inner: ClassVar[bool]  # it stands only inside another one, as a state in a machine: it has no word
+    options: ClassVar[Mapping[str, str]]  # the keys that belong to it, each with its purpose
+    is_inner: ClassVar[bool]  # it occurs only inside another one, like a state in a machine: it has no word
 
     @classmethod
     @abstractmethod
@@ -126,13 +126,13 @@ class Step(ABC):
 
     @abstractmethod
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return how it may end, its modifiers left aside."""
+        """Return how it may end, without its modifiers."""
 
     @abstractmethod
     def possibilities(
         self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
     ) -> Iterator[Possibility]:
-        """Yield what may come of it, as far as a test should see each of it."""
+        """Yield what it may do, as far as tests should cover it."""
 
     @abstractmethod
     def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
@@ -140,7 +140,7 @@ class Step(ABC):
 
     @abstractmethod
     def endless(self, ends: Outcomes) -> Advice | None:
-        """Return what to say if it goes on for ever without a pause; `ends` is how it may end."""
+        """Return the advice to give if it runs for ever without a pause; `ends` is how it may end."""
 
     @property
     @abstractmethod
@@ -150,7 +150,7 @@ class Step(ABC):
     @property
     @abstractmethod
     def only_asks(self) -> bool:
-        """Return whether all that it does by itself is to ask conditions, which may be done again at any time."""
+        """Return whether by itself it only evaluates conditions, which may be repeated at any time."""
 
     @property
     @abstractmethod
@@ -160,12 +160,12 @@ class Step(ABC):
     @property
     @abstractmethod
     def comes_again(self) -> bool:
-        """Return whether what is inside may be done more than once."""
+        """Return whether its children may run more than once."""
 
     @property
     @abstractmethod
     def effects(self) -> NodeEffects:
-        """Return what it does by itself."""
+        """Return the effects that it has by itself."""
 
     @property
     @abstractmethod
@@ -175,7 +175,7 @@ class Step(ABC):
     @property
     @abstractmethod
     def flow(self) -> NodeFlow:
-        """Return how it goes through those inside."""
+        """Return how it goes through its children."""
 
     @property
     @abstractmethod
@@ -190,17 +190,17 @@ class Step(ABC):
         return self.name
 
     def text(self, node: MissionNode) -> str:
-        """Return what stands in it where it is drawn: its own expressions."""
+        """Return the text to draw in it: its own expressions."""
         return ", ".join(asked.scalar.text for asked in node.asked[: min(node.own, 2)])
 
     @property
     def skill(self) -> str:
-        """Return the skill that it asks; empty for none."""
+        """Return the skill that it runs; empty for none."""
         return ""
 
     @property
     def ends_mission(self) -> str:
-        """Return the result with which it ends the mission that it is part of; empty if it does not."""
+        """Return the result with which it ends its mission; empty if it does not end it."""
         return ""
 
     @property
@@ -210,12 +210,12 @@ class Step(ABC):
 
     @property
     def arguments(self) -> tuple[WrittenArgument, ...]:
-        """Return what it gives to its skill or mission."""
+        """Return the arguments for its skill or mission."""
         return ()
 
     @property
     def reads(self) -> frozenset[str]:
-        """Return the `$names` that it reads beside its expressions, messages and arguments."""
+        """Return the `$names` that it reads besides its expressions, messages and arguments."""
         return NOTHING
 
     @property
@@ -225,37 +225,37 @@ class Step(ABC):
 
     @property
     def numbers(self) -> tuple[Counted, ...]:
-        """Return what it counts."""
+        """Return its numbers, each with the least value that makes sense."""
         return ()
 
     @property
     def history(self) -> str:
-        """Return where it starts again after it was halted, as a word of `HISTORIES`."""
+        """Return where it resumes after it was halted, as a word of `HISTORIES`."""
         return NO_HISTORY
 
     @property
     def goes_on_after(self) -> str:
-        """Return the result of a child after which the next one comes, if they come in their order."""
+        """Return the result of a child after which the next one runs, if they run in order."""
         return ""
 
     @property
     def items(self) -> Expression | tuple[Expression, ...] | None:
-        """Return what it goes through, item by item."""
+        """Return what it iterates over."""
         return None
 
     @property
     def choice(self) -> BranchChoice | None:
-        """Return by which value it chooses one of its children."""
+        """Return the value and the cases by which it chooses one of its children."""
         return None
 
     @property
     def branches(self) -> Branches | None:
-        """Return what decides, if its children run at the same time."""
+        """Return what decides how it ends, if its children run in parallel."""
         return None
 
     @property
     def states(self) -> MachineStates | None:
-        """Return the states that its children are."""
+        """Return its states, if its children are states."""
         return None
 
     @property
@@ -266,12 +266,12 @@ class Step(ABC):
 
 @dataclass(frozen=True, slots=True)
 class MissionNode:
-    """One mission node. Those below it have the numbers from `number + 1` to `end` (exclusive).
+    """One mission node. The nodes below it have the numbers from `number + 1` to `end` (exclusive).
 
-    `step` is what it does; `modifiers` are by key, from the outside in. `asked` are all expressions, for checking, and
-    first those of the step itself, which are `own` in number. `item` is the name that a loop gives to its item. `held`
-    tells where a node that a `run` does stands in the data. `inner` is the mission that a `use` runs, in a program
-    that was linked: its nodes are below this one.
+    `step` is what it does; `modifiers` are by key, from the outside in. `asked` are all expressions, for checking; the
+    first `own` of them belong to the step itself. `item` is the name that a loop gives to its item. `held` is where in
+    the data a node executed by a `run` is. `inner` is the mission that a `use` runs, in a linked program: its nodes are
+    below this one.
     """
 
     number: int
@@ -291,17 +291,17 @@ class MissionNode:
 
     @property
     def skill(self) -> str:
-        """Return the skill that it asks; empty for none."""
+        """Return the skill that it runs; empty for none."""
         return self.step.skill
 
     @property
     def saved(self) -> ScalarNode | None:
-        """Return the name under which it keeps its result."""
+        """Return the name under which it saves its result."""
         return next((one.saved for one in self.modifiers.values() if one.saved), None)
 
     @property
     def limit(self) -> Expression | None:
-        """Return the time that it may take."""
+        """Return its time limit."""
         return next((one.limit for one in self.modifiers.values() if one.limit), None)
 
     @property
@@ -329,10 +329,10 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Interrupt:
-    """A condition that cuts the mission short, and the node that is done then (None: nothing).
+    """A condition that interrupts the mission, and the node that then runs (None: nothing).
 
-    `afterwards` is a word of `AFTERWARDS`; `targets` are all nodes that a restart by name may mean, of which those
-    that run begin again.
+    `afterwards` is a word of `AFTERWARDS`; `targets` are all nodes that a restart by name may mean; those that are
+    running restart.
     """
 
     name: str
@@ -348,8 +348,8 @@ class Interrupt:
 class Program:
     """A mission: its main node has the number `main`, which is 0 unless it is part of a linked program.
 
-    Those of the interrupts follow. `outputs` are what it gives to who uses it. `root` is what it was read from; the
-    rest follows from it.
+    The nodes of the interrupts follow. `outputs` are what it returns to a mission that uses it. `root` is the tree it
+    was read from; everything else follows from that.
     """
 
     name: str
@@ -365,7 +365,7 @@ class Program:
     root: MappingNode = field(default_factory=MappingNode, repr=False)
 
     def asked(self) -> Iterator[tuple[MissionNode | None, Asked]]:
-        """Yield all expressions, with the node that asks; None for an interrupt or an output."""
+        """Yield all expressions, each with its node; None for an interrupt or an output."""
         for node in self.nodes:
             for asked in node.asked:
                 yield node, asked
@@ -380,11 +380,11 @@ class Program:
 
     @property
     def saved(self) -> frozenset[str]:
-        """Return the names under which results are kept."""
+        """Return the names under which results are saved."""
         return frozenset(node.saved.text for node in self.nodes if node.saved)
 
     def reads(self) -> frozenset[str]:
-        """Return all `$names` that are read anywhere, arguments of skills and of missions included."""
+        """Return all `$names` that are read anywhere, including in arguments of skills and missions."""
         read = {name.name for _, asked in self.asked() for name in asked.expression.names}
         for node in self.nodes:
             step, messages = node.step, (node.step.effects.published, node.step.effects.called)

@@ -1,4 +1,4 @@
-"""Finding the kinds of mission nodes: each is one file in `missions/kinds`, entered by one decorator."""
+"""The registry of mission node kinds: each is one file in `missions/kinds`, registered by a decorator."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def kind(
     *,
     is_inner: bool = False,
 ) -> Callable[[type[S]], type[S]]:
-    """Register a kind under its word, with the task that carries it out.
+    """Register a kind under its word, with the task that runs it.
 
-    `options` tells in a sentence what each of its keys is for. One that is `inner` has no word of the language.
+    `options` has a sentence on each of its keys. A kind that `is_inner` has no word in the language.
 
     Raises:
-        TypeError: if the kind leaves something unanswered that every kind answers.
+        TypeError: if the kind does not answer everything that every kind must.
     """
 
     def register(cls: type[S]) -> type[S]:
@@ -54,7 +54,7 @@ def kind(
 
 
 def forget(name: str) -> None:
-    """Take a kind out again, as tests do with theirs."""
+    """Unregister a kind, as tests do with theirs."""
     del _TASKS[KINDS.pop(name)]
     _look_again()
 
@@ -65,13 +65,13 @@ def _look_again() -> None:
 
 
 def task_of(site: Site) -> Task:
-    """Return the task that carries out a node, with nothing around it."""
+    """Return the task that runs a node, with nothing around it."""
     return _TASKS[type(site.node.step)](site)
 
 
 @cache
 def kinds() -> dict[str, StepType]:
-    """Return all kinds that a mission may write, by their word, sorted."""
+    """Return all kinds that a mission may use, by word, sorted."""
     return {name: found for name, found in all_kinds().items() if not found.is_inner}
 
 

@@ -1,4 +1,4 @@
-"""How a skill or a call ended, as its server reports it; and that a node cannot continue."""
+"""How a skill or a call ended, as its server reports it; and the error of a node that cannot continue."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rbxcompose.expressions.values import EvaluationError, NotArrivedError, Valu
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """Success or not, with an outcome of the skill's own if it told one, a reason, and what it found out."""
+    """Success or failure, with the skill's own outcome if it reported one, a reason, and the result values."""
 
     success: bool
     message: str = ""

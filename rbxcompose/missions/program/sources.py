@@ -1,4 +1,4 @@
-"""Where on the bus the values and skills are that a mission names."""
+"""Where on the bus to find the values and skills that a mission names."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from enum import StrEnum
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.missions.program.program import Skill
 
-PAUSE = "pause"  # below the name of an action that can pause: the service by which it does
-OUTCOME = "outcome"  # the field of a result in which an action tells an outcome of its own
+PAUSE = "pause"  # below the name of an action that can pause: the service that pauses it
+OUTCOME = "outcome"  # the field of a result with the action's own outcome
 
 
 @dataclass(frozen=True, slots=True)
 class ValueSource:
     """Where a value comes from: a field (with dots) of the messages on a topic, times `times / per` for SI.
 
-    With `group` it is the level of that group of the diagnostics, as a word.
+    With `group`, it is the level of that group of the diagnostics, as a word.
     """
 
     topic: str
@@ -39,7 +39,7 @@ class SkillWay(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class OrderTopic:
-    """A topic that belongs to orders: its name, the ROS name of its type, the class of its quality."""
+    """A topic that belongs to orders: its name, its ROS type, and its QoS class."""
 
     topic: str
     message: str
@@ -48,9 +48,9 @@ class OrderTopic:
 
 @dataclass(frozen=True, slots=True)
 class Orders:
-    """How orders on a topic are carried out: the class of its quality, and the components that do it.
+    """How orders on a topic are carried out: its QoS class, and the components that do it.
 
-    `ends` is where it is told how an order ended, `halts` where one is given up.
+    `ends` is the topic that reports how an order ended, `halts` the one that cancels an order.
     """
 
     qos: str
@@ -61,9 +61,9 @@ class Orders:
 
 @dataclass(frozen=True, slots=True)
 class SkillSource:
-    """A skill, the ROS name of the type of its action, service or topic, and the name of that; empty for Python.
+    """A skill, and the ROS type and the name of its action, service or topic; empty for Python.
 
-    `orders` belongs to topics only.
+    `orders` is for topics only.
     """
 
     skill: Skill
@@ -75,7 +75,7 @@ class SkillSource:
 
 @dataclass(frozen=True, slots=True)
 class TopicSource:
-    """A topic on which a mission publishes: the ROS name of its type, and the class of its quality."""
+    """A topic on which a mission publishes: its ROS type, and its QoS class."""
 
     message: str
     qos: str = "event"

@@ -1,4 +1,4 @@
-"""Statuses of mission nodes: plain whole numbers, because they are written for every node at every tick."""
+"""Statuses of mission nodes: plain integers, because they are written for every node at every tick."""
 
 from __future__ import annotations
 

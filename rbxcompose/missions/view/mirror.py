@@ -1,4 +1,4 @@
-"""What a viewer sees of a running mission: at first the whole, then what has changed since it looked last.
+"""What a viewer sees of a running mission: first its full state, then what has changed since the last look.
 
 Nothing is done for it between two looks, so it costs nothing while nobody looks.
 """
@@ -11,11 +11,11 @@ from typing import Any
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.snapshot import to_plain
 
-ACTIVE = frozenset({"running", "paused", "waiting"})  # how a mission stands that is not over
+ACTIVE = frozenset({"running", "paused", "waiting"})  # states of a mission that is not over
 
 
 class Mirror:
-    """The statuses and data of an engine, and since which version each is as it is."""
+    """The statuses and data of an engine, each with the version in which it last changed."""
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
@@ -26,10 +26,10 @@ class Mirror:
         self._data_changed: dict[str, int] = {}
 
     def look(self, since: int = 0) -> dict[str, Any]:
-        """Return what is new since a version; 0 gives the whole.
+        """Return what has changed since a version; 0 gives the full state.
 
-        The answer has its `version`, `statuses` by node number, and `data` by name; `whole` tells that what the viewer
-        knew before counts no more.
+        The result has its `version`, `statuses` by node number, and `data` by name; `whole` means that it replaces what
+        the viewer knew before.
         """
         self._take()
         if not 0 < since <= self._version:
@@ -39,7 +39,7 @@ class Mirror:
         return {"version": self._version, "whole": since == 0, "statuses": statuses, "data": data}
 
     def _take(self) -> None:
-        """Compare with what was there at the last look."""
+        """Note what has changed since the last look."""
         now = self._engine.statuses
         data = {name: to_plain(value) for name, value in self._engine.data.items()}
         if now == self._statuses and data == self._data:
@@ -58,7 +58,7 @@ class Mirror:
 
 
 def joined(known: Mapping[str, Any], news: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a viewer knows after an answer; keys of statuses may be texts, as JSON makes them."""
+    """Return what a viewer knows after an update; keys of statuses may be texts, as in JSON."""
     statuses: dict[int, int] = {} if news["whole"] else dict(known["statuses"])
     statuses.update({int(number): status for number, status in news["statuses"].items()})
     data = {**({} if news["whole"] else known["data"]), **news["data"]}

@@ -10,12 +10,12 @@ from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.look import Form
 from rbxcompose.missions.program.program import Interrupt, MissionNode, Program, RobotNames
 
-LONGEST = 60  # characters of what stands in a node
+LONGEST = 60  # characters of the text in a node
 
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """A transition of a machine: on this outcome (empty: on every one) to this state or end."""
+    """A transition of a machine: on this outcome (empty: on any) to this state or end."""
 
     outcome: str
     to: str
@@ -23,9 +23,9 @@ class Arrow:
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """One node: its number in the linked program, what it is, what stands in it, and what is around it.
+    """One node: its number in the linked program, what it is, the text in it, and what is around it.
 
-    `role` tells what it is to its parent (`then`, a branch); an interrupt is a node of its own, without a number.
+    `role` is what it is to its parent (`then`, a branch); an interrupt is a node of its own, without a number.
     `form` is a word of `Form`.
     """
 
@@ -43,7 +43,7 @@ class Drawn:
 
     @property
     def title(self) -> str:
-        """Return the kind with what stands in it."""
+        """Return the kind with the text in it."""
         return f"{self.kind} {self.text}".strip()
 
     def all(self) -> Iterator[Drawn]:
@@ -65,7 +65,7 @@ class MissionPicture:
 
     @property
     def roots(self) -> tuple[Drawn, ...]:
-        """Return what is drawn at the top."""
+        """Return the nodes at the top."""
         return (self.main, *self.interrupts)
 
 
@@ -75,7 +75,7 @@ def picture_to_data(picture: MissionPicture) -> dict[str, Any]:
 
 
 def picture_from_data(data: Mapping[str, Any]) -> MissionPicture:
-    """Return the picture that `picture_to_data` made data of."""
+    """Return the picture from the data that `picture_to_data` made."""
     interrupts = tuple(map(_drawn_from, data["interrupts"]))
     return MissionPicture(data["name"], data["about"], _drawn_from(data["main"]), interrupts, data["count"])
 
@@ -90,7 +90,7 @@ def _drawn_from(data: Mapping[str, Any]) -> Drawn:
 
 
 def picture_of(program: Program, robot: RobotNames) -> MissionPicture:
-    """Return the picture of a mission with all that it uses."""
+    """Return the picture of a mission, including the missions it uses."""
     linked = link(program, robot.missions)
     interrupts = tuple(_interrupt(linked, one) for one in linked.interrupts)
     return MissionPicture(linked.name, linked.about, _drawn(linked, linked.main), interrupts, len(linked.nodes))
@@ -122,7 +122,7 @@ def _drawn(linked: Program, number: int, role: str = "", is_start: bool = False)
 
 
 def _roles(linked: Program, node: MissionNode) -> Sequence[str]:
-    """Return what each child is to its node: the key under which it was written, where that says something."""
+    """Return what each child is to its node: the key under which it was written, where that is worth showing."""
     written = [linked.nodes[child].path.removeprefix(node.path).strip(".").partition(".")[0] for child in node.children]
     return [one if node.step.look.has_roles and not one.isdecimal() else "" for one in written]
 

@@ -1,7 +1,7 @@
-"""What a viewer in another process knows of a mission: a whole state from a query, and all updates since, in order.
+"""What a viewer in another process knows of a mission: its full state from a query, and all updates since, in order.
 
-Messages are those of `bus/window.py`. News that come before the whole wait for it; when some are missing, or the
-mission's process was started again, the whole has to be queried again.
+Messages are those of `bus/window.py`. Updates that arrive before the full state wait for it; when some are missing, or
+the mission's process was restarted, the full state must be queried again.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from typing import Any
 
 from rbxcompose.missions.view.mirror import joined
 
-MOST_WAITING = 100  # news that wait for a whole; if there are more, another whole is asked for
+MOST_WAITING = 100  # updates that wait for a full state; if there are more, it is queried again
 
 
 class Replica:
-    """A copy that is kept up to date; `seen` is empty until the first whole has come."""
+    """A copy that is kept up to date; `seen` is empty until the first full state has arrived."""
 
     def __init__(self) -> None:
         self.seen: Mapping[str, Any] = {}
@@ -24,8 +24,8 @@ class Replica:
         self._waiting: deque[Mapping[str, Any]] = deque(maxlen=MOST_WAITING)
 
     def answered(self, message: Mapping[str, Any]) -> bool:
-        """Take a whole; return whether another one must be asked for."""
-        if message["source"] != self._source or message["sequence"] >= self._sequence:  # else more is known by now
+        """Apply a full state; return whether another one must be queried."""
+        if message["source"] != self._source or message["sequence"] >= self._sequence:  # else more is known already
             self._source, self._sequence = message["source"], message["sequence"]
             self.seen = joined({}, message["value"])
         waiting = [one for one in self._waiting if one["source"] == self._source]
@@ -33,7 +33,7 @@ class Replica:
         return [one for one in waiting if self.heard(one)] != []
 
     def heard(self, message: Mapping[str, Any]) -> bool:
-        """Take news; return whether a whole must be asked for."""
+        """Apply an update; return whether a full state must be queried."""
         is_known = message["source"] == self._source
         if is_known and message["sequence"] <= self._sequence:
             return False
