@@ -20,6 +20,7 @@ from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Command, answers
 from rbxcompose.runtime.process_group.host import Host
+from rbxcompose.runtime.process_group.hosted import Lifecycle
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.worker import LONGEST
 from rbxcompose.runtime.records import Record
@@ -68,7 +69,7 @@ class Planner(Component[NoConfig]):
 
     def configure(self) -> None:
         self.threads: set[str] = {threading.current_thread().name}
-        self.stops = 0
+        self.stops = self.brakes = 0
         self.replies: list[Reply[Trigger.Response]] = []
 
     def on_work(self, message: Float32) -> None:
@@ -87,6 +88,9 @@ class Planner(Component[NoConfig]):
 
     def stop(self) -> None:
         self.stops += 1
+
+    def brake(self) -> None:
+        self.brakes += 1
 
     @answers(PlanRoute)
     def plan_route(self, request: PlanRoute) -> str:
@@ -286,6 +290,15 @@ def test_a_call_that_takes_long_is_told_and_one_that_never_returns_is_a_fault(pr
     process.send("work", 2.0)
     process.until(lambda: done)
     assert done == [2.0]  # and nothing of the one that was left behind
+
+
+def test_one_that_becomes_active_while_the_robot_goes_down_brakes(process: Process) -> None:
+    planner = process.host.hosted["planner"]
+    planner.state = Lifecycle.INACTIVE
+    planner.activate()  # in its thread; that it is active is known only after the next turn
+    process.host.brake()
+    assert process.planner.brakes == 0
+    process.until(lambda: process.planner.brakes == 1)
 
 
 def test_it_says_goodbye_in_order(process: Process) -> None:

@@ -38,7 +38,7 @@ def _removed(value: Value, path: list[Value], item: Value) -> Value:
         key, rest = path[0], path[1:]
         if isinstance(value, dict):
             return {name: _removed(entry, rest, item) if is_same(name, key) else entry for name, entry in value.items()}
-        if isinstance(value, list) and isinstance(key, int | float) and int(key) < len(value):
+        if isinstance(value, list) and isinstance(key, int | float) and key in range(len(value)):
             index = int(key)
             return [*value[:index], _removed(value[index], rest, item), *value[index + 1 :]]
         raise NodeFailed("there is nothing to remove from")

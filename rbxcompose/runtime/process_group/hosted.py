@@ -171,6 +171,8 @@ class Hosted:
             self.do("stop", component.stop)
         if self.host.is_held:
             self.do("hold", component.hold)
+        if self.host.is_braking:
+            self.do("brake", component.brake)
         if self.host.has_started:
             self.do("start", component.start)
             for request in self._repeated:
