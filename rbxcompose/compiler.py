@@ -14,15 +14,28 @@ from types import MappingProxyType
 from rbxcompose.check_runner import run_checks
 from rbxcompose.composition.overlay import SET
 from rbxcompose.composition.robot_file import load_robot
-from rbxcompose.findings import Related, Report, Severity, Span
-from rbxcompose.manifest.limits import PROFILE_BYTES, PROFILES_BYTES
-from rbxcompose.manifest.reader import Texts
+from rbxcompose.findings import Related, Report, Severity, Span, kind
+from rbxcompose.manifest.limits import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES
+from rbxcompose.manifest.reader import ParsedText, Texts
 from rbxcompose.manifest.walk import TWICE
-from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.model.build import build_robot
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.build import build_plan
 from rbxcompose.plan.model import Plan
+
+NOT_TRIED = kind(
+    "RBX7003",
+    """Some profiles were not tried
+
+Without `--profile`, a robot is checked as its file describes it, then again with each of its profiles. With long
+missions or dozens of profiles this would take seconds, so it stops after a number of steps. The profiles that were not
+tried may contain mistakes. Check them by name, one at a time.
+
+Bad: `rbxcompose check`, for a robot with a mission of 9,000 steps and a profile `slow`.
+Good: `rbxcompose check --profile slow`
+""",
+    Severity.WARNING,
+)
 
 
 @dataclass(slots=True)
@@ -54,8 +67,10 @@ def compile_robot(
     replaces. If no profile was chosen, each profile is tried as well, so that a broken one is found before it is used.
     """
 
+    parsed: dict[tuple[str, str], ParsedText] = {}  # a profile changes no text
+
     def compiled(chosen: Sequence[str]) -> Compilation:
-        out = Compilation(sources=Texts(unsaved))
+        out = Compilation(sources=Texts(unsaved, parsed))
         manifest = load_robot(
             path,
             profiles=chosen,
@@ -76,12 +91,12 @@ def compile_robot(
 
     out = compiled(profiles)
     if out.robot is not None and not profiles:
-        left = PROFILES_BYTES
-        for name, span in out.robot.manifest.profiles.items():
-            left -= max(PROFILE_BYTES, sum(map(len, out.sources.values())))
-            if left < 0:
-                message = f"the profiles from '{name}' on cannot be tried: they are too many for a robot of this size"
-                out.report.add(TOO_LARGE.at(span, message, help="take some profiles out"))
+        steps = sum(len(mission.program.nodes) for mission in out.robot.missions.values())
+        steps = max(LEAST_STEPS, steps + sum(map(len, out.sources.values())) // STEP_BYTES)
+        for number, (name, span) in enumerate(out.robot.manifest.profiles.items(), 1):
+            if number * steps > PROFILE_STEPS:
+                message = f"the profiles from '{name}' on were not tried: it would take too long for this robot"
+                out.report.add(NOT_TRIED.at(span, message, help=f"rbxcompose check --profile {name}"))
                 break
             _tell_profile(span, compiled([name]), out, {SET, *out.robot.manifest.overlays})
     if out.robot is not None and not out.report.has_errors:

@@ -38,9 +38,9 @@ def is_private(endpoint: str) -> bool:
     return endpoint.startswith(_UNIX)
 
 
-def folder_of(endpoint: str) -> Path:
-    """Return the folder of a Unix socket."""
-    return Path(endpoint.removeprefix(_UNIX)).parent
+def socket_of(endpoint: str) -> Path:
+    """Return the file of a Unix socket."""
+    return Path(endpoint.removeprefix(_UNIX))
 
 
 def endpoint(text: str) -> str:

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import zenoh
 
 from rbxcompose.bus import shared_memory
-from rbxcompose.endpoints import folder_of, is_private, tcp_endpoint, unix_endpoint
+from rbxcompose.endpoints import is_private, socket_of, tcp_endpoint, unix_endpoint
 
 LEASE = 2000  # [ms] until a silent link counts as lost
 PATIENCE = 1000  # [ms] that a visitor waits for a router
@@ -53,7 +53,7 @@ def _endpoint_beside(router: str) -> str:
     if not is_private(router):
         return tcp_endpoint(0)
     # A session that is opened again must not wait until the stuck one lets go of its socket.
-    return unix_endpoint(folder_of(router), f"{os.getpid()}-{next(_session_numbers)}")
+    return unix_endpoint(socket_of(router).parent, f"{os.getpid()}-{next(_session_numbers)}")
 
 
 def router_settings(endpoint: str) -> dict[str, object]:

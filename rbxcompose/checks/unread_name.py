@@ -41,7 +41,7 @@ def unread_name(robot: Robot) -> Iterator[Finding]:
         if program.file in seen:
             continue  # shares its file with another mission
         seen.add(program.file)
-        read = program.reads()
+        read = program.reads
         for node in program.nodes:
             kept = node.saved
             if kept and kept.text not in read:

@@ -28,7 +28,7 @@ def unread_value(robot: Robot) -> Iterator[Finding]:
       battery: battery.battery_level
     ```
     """
-    read = frozenset[str]().union(*(mission.program.reads() for mission in robot.missions.values()))
+    read = frozenset[str]().union(*(mission.program.reads for mission in robot.missions.values()))
     given = frozenset[str]().union(*(part.values for part in robot.manifest.parts.values()))
     for name in robot.manifest.values if robot.missions else ():
         if name not in read | given:

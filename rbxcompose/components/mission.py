@@ -87,7 +87,7 @@ class MissionConfig(Config):
     @property
     def reads(self) -> frozenset[str]:
         """Return all names that missions read."""
-        return frozenset[str]().union(*(program.reads() for program in self.programs.values()))
+        return frozenset[str]().union(*(program.reads for program in self.programs.values()))
 
     @property
     def used(self) -> dict[str, SkillSource]:

@@ -76,7 +76,7 @@ class MissionRun:
 
     def missing(self) -> list[str]:
         """Return the names that it reads and that have no value yet."""
-        reads = self.engine.program.reads() & self._known
+        reads = self.engine.program.reads & self._known
         return sorted(name for name in reads if self.robot.value(name) is NOT_ARRIVED)
 
     def loses_patience(self, now: float) -> bool:

@@ -222,7 +222,7 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
         lead(WireContent.TOPIC, resolve(name, space), robot.topics[name].message)
     for name in sorted(called & robot.services.keys()):
         lead(WireContent.SERVICE, resolve(name, space), robot.services[name])
-    for name in sorted(mission.program.reads() & robot.values.keys()):
+    for name in sorted(mission.program.reads & robot.values.keys()):
         value = robot.values[name]
         hear(value.topic, value.message, f"${name}")
 
@@ -235,7 +235,7 @@ def _add_look_ups(robot: Robot, found: dict[tuple[WireContent, str], _Open]) -> 
         if any(isinstance(end.port, Looks) for end in component.ends)
     ]
     boxes = [name for name in boxes if name != MISSION]
-    boxes += [key_of(name) for name in _programs(robot) if POSE in robot.missions[name].program.reads()]
+    boxes += [key_of(name) for name in _programs(robot) if POSE in robot.missions[name].program.reads]
     for topic in TRANSFORMS:
         if (wire := found.pop((WireContent.TOPIC, topic), None)) is not None:
             wire.targets += [Tip(name) for name in boxes]

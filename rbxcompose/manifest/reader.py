@@ -47,23 +47,31 @@ missions:
 )
 
 INDENT = "  "  # of one level
+ParsedText = tuple[TreeNode | None, list[Finding]]
 
 
 class Texts(dict[str, str]):
     """The texts of the files that were read, by the names used in findings.
 
-    `unsaved` are texts in an editor: each replaces that of its file.
+    `unsaved` are texts in an editor: each replaces that of its file. `parsed` are trees of texts that were read before.
     """
 
-    def __init__(self, unsaved: Mapping[Path, str]) -> None:
+    def __init__(self, unsaved: Mapping[Path, str], parsed: dict[tuple[str, str], ParsedText] | None = None) -> None:
         super().__init__()
         self.unsaved = unsaved
+        self.parsed = {} if parsed is None else parsed
 
 
-def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> tuple[TreeNode | None, list[Finding]]:
+def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> ParsedText:
     """Read one manifest and enter its text into `sources` under the name that findings show."""
     text, findings = read_source(path, shown, sources)
-    return (None, findings) if text is None else read_text(text, shown)
+    if text is None:
+        return None, findings
+    if not isinstance(sources, Texts):
+        return read_text(text, shown)
+    if (shown, text) not in sources.parsed:
+        sources.parsed[shown, text] = read_text(text, shown)
+    return sources.parsed[shown, text]
 
 
 def read_source(
@@ -123,7 +131,7 @@ def _decode(data: bytes, file: str) -> tuple[str, list[Finding]]:
         return text, [NOT_UTF8.at(span, message, label=f"byte 0x{data[error.start]:02x}", help="save it as UTF-8")]
 
 
-def read_text(text: str | bytes, file: str) -> tuple[TreeNode | None, list[Finding]]:
+def read_text(text: str | bytes, file: str) -> ParsedText:
     """Read the text of one manifest into a located tree; columns count characters from 1.
 
     The tree is None if the text cannot be read to its end; with other findings it holds what could be read.

@@ -39,7 +39,7 @@ class MissionFacts:
                 named[node.name] = {**named.get(node.name, {}), **own}
         skills = {node.skill: robot.skills[node.skill] for node in program.nodes if node.skill in robot.skills}
         published, called = sent_by([program])
-        read = frozenset[str]().union(*(one.reads() for one in missions_in(program)))
+        read = frozenset[str]().union(*(one.reads for one in missions_in(program)))
         return cls(
             skills,
             frozenset(called),

@@ -26,7 +26,7 @@ def representatives(linked: Program, robot: RobotNames, inputs: Mapping[str, Val
         for _, asked in program.asked():
             for name, value in _compared(asked.expression, constants):
                 compared.setdefault(name, set()).add(value)
-    read = frozenset[str]().union(*(one.reads() for one in missions_in(linked)))
+    read = frozenset[str]().union(*(one.reads for one in missions_in(linked)))
     found = {name: _values(robot, name, compared.get(name, set())) for name in sorted(read & robot.values.keys())}
     if POSE in read and robot.places:
         found[POSE] = tuple(robot.places.values())[:MOST_PLACES]

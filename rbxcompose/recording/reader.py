@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+import io
 import struct
-from collections.abc import Collection, Iterator
-from dataclasses import replace
+import zlib
+from collections.abc import Collection, Iterable, Iterator
 from typing import IO
 
 import lz4.frame
 import zstandard
-from mcap.exceptions import McapError
+from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 
 from rbxcompose.printable import plain
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.topics import HASH, NODE, RecordedTopic, qos_of_metadata
 
 LARGEST = 64 * 1024 * 1024  # bytes of a record, and of an unpacked chunk
+# No recording compresses better than this. A file that does was made to take memory and time.
+_MOST_PACKED = 1000  # unpacked bytes per byte of the file, beyond `LARGEST`
+_MOST_MESSAGES = 100_000  # beyond one per byte of the file: each differs from the one before in its time at least
 _MAGIC = b"\x89MCAP0\r\n"
 
 # Besides their own errors, the readers of MCAP and of its compressions raise these for invalid bytes.
 _BROKEN = (McapError, ValueError, struct.error, OverflowError, RuntimeError, EOFError, zstandard.ZstdError)
+
+
+class _BombError(ValueError):
+    """Raised for content that would take more memory or time than its size explains."""
 
 
 class NotARecordingError(ValueError):
@@ -50,26 +58,43 @@ class RecordingReader:
         self.attachments: dict[str, bytes] = {}  # by name, in the part read so far
         self._file = file
         self._reader = StreamReader(file, emit_chunks=True, record_size_limit=LARGEST)
-        self._schemas: dict[int, Schema] = {}
+        self._schemas: dict[int, tuple[str, str]] = {}  # name and definition
         self._channels: dict[int, RecordedTopic] = {}
+        self._unpacked = 0  # [bytes] so far
+        self._count = 0  # of messages so far
 
     def messages(self) -> Iterator[Recorded]:
         """Yield the messages in the order of the file, until it ends or becomes invalid."""
         try:
             for record in self._reader.records:
                 if isinstance(record, Chunk):
-                    yield from self._messages_of(breakup_chunk(_unpacked(record), validate_crc=True))
+                    yield from self._messages_of(self._records_of(record))
                 else:
                     yield from self._messages_of([record])
         except _BROKEN as error:
             # A truncated file gives many kinds of error: numbers that are too short, chunks that do not unpack.
-            is_cut = not self._file.read(1)
+            is_cut = not isinstance(error, _BombError) and not self._file.read(1)
             self.damage = "it ends in the middle" if is_cut else f"a part makes no sense ({plain(str(error), 100)})"
 
-    def _messages_of(self, records: list[McapRecord]) -> Iterator[Recorded]:
+    def _records_of(self, chunk: Chunk) -> Iterator[McapRecord]:
+        """Yield the records of a chunk one by one: they would take several times its memory."""
+        data = _unpacked(chunk)
+        self._unpacked += len(data)
+        if self._unpacked > LARGEST + _MOST_PACKED * self._file.tell():
+            raise _BombError("it unpacks to more than a recording would")
+        if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+            raise ValueError("the checksum of a chunk is wrong")
+        stream = io.BytesIO(data)
+        try:
+            yield from StreamReader(stream, skip_magic=True, record_size_limit=LARGEST).records
+        except EndOfFile:
+            if stream.tell() < len(data):
+                raise
+
+    def _messages_of(self, records: Iterable[McapRecord]) -> Iterator[Recorded]:
         for record in records:
             if isinstance(record, Schema):
-                self._schemas[record.id] = record
+                self._schemas[record.id] = record.name, record.data.decode()
             elif isinstance(record, Channel):
                 self._channels[record.id] = self._topic(record)
             elif isinstance(record, Attachment):
@@ -77,6 +102,9 @@ class RecordingReader:
             elif isinstance(record, Message):
                 if record.channel_id not in self._channels:
                     raise ValueError("a message of an unknown channel")
+                self._count += 1
+                if self._count > _MOST_MESSAGES + self._file.tell():
+                    raise _BombError("it holds more messages than a recording would")
                 yield Recorded(
                     self._channels[record.channel_id],
                     record.log_time,
@@ -86,29 +114,28 @@ class RecordingReader:
                 )
 
     def _topic(self, channel: Channel) -> RecordedTopic:
-        schema = self._schemas.get(channel.schema_id)
+        name, definition = self._schemas.get(channel.schema_id, ("", ""))
         return RecordedTopic(
             channel.topic,
-            schema.name if schema else "",
+            name,
             channel.metadata.get(HASH, ""),
             qos_of_metadata(channel.metadata),
-            schema.data.decode() if schema else "",
+            definition,
             channel.message_encoding,
             channel.metadata.get(NODE, ""),
         )
 
 
-def _unpacked(chunk: Chunk) -> Chunk:
-    """Unpack a chunk, but never to more than `LARGEST` bytes, whatever size it claims."""
+def _unpacked(chunk: Chunk) -> bytes:
+    """Return the content of a chunk, but never to more than `LARGEST` bytes, whatever size it claims."""
     if chunk.compression == "zstd":
         size = zstandard.get_frame_parameters(chunk.data).content_size
         if size != zstandard.CONTENTSIZE_UNKNOWN and size > LARGEST:
-            raise ValueError("a chunk is too large")
-        data = zstandard.ZstdDecompressor().decompress(chunk.data, min(chunk.uncompressed_size, LARGEST))
-    elif chunk.compression == "lz4":
-        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, LARGEST)
-    elif not chunk.compression:
-        data = chunk.data
-    else:
-        raise ValueError("a chunk has an unknown compression")
-    return replace(chunk, compression="", data=data)
+            raise _BombError("a chunk is too large")
+        return zstandard.ZstdDecompressor().decompress(chunk.data, min(chunk.uncompressed_size, LARGEST))
+    if chunk.compression == "lz4":
+        data: bytes = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, LARGEST)
+        return data
+    if not chunk.compression:
+        return chunk.data
+    raise ValueError("a chunk has an unknown compression")

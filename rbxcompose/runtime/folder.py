@@ -210,7 +210,7 @@ class RobotFolder:
 
     def has_lost(self, lock: int) -> bool:
         """Return whether somebody has removed files of a running robot, which holds `lock`."""
-        return self.has_lost_lock(lock) or not all((self.path / name).exists() for name in (STATE, SOCKET))
+        return self.has_lost_lock(lock) or not all((self.path / name).exists() for name in (STATE, SOCKET, _BUS))
 
     def has_lost_lock(self, lock: int) -> bool:
         """Return whether the lock that is held is no longer the one that others would try to hold."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from rbxcompose.endpoints import endpoint, folder_of, is_private, tcp_endpoint, unix_endpoint
+from rbxcompose.endpoints import endpoint, is_private, socket_of, tcp_endpoint, unix_endpoint
 
 FINE = [
     "tcp/127.0.0.1:7447",
@@ -50,7 +50,7 @@ def test_what_is_no_endpoint_is_refused(text: str) -> None:
 def test_ours_are_endpoints(tmp_path: Path) -> None:
     made = unix_endpoint(Path("/run/user/7/bus"), "router")
     assert endpoint(made) == made
-    assert (is_private(made), folder_of(made)) == (True, Path("/run/user/7/bus"))
+    assert (is_private(made), socket_of(made)) == (True, Path("/run/user/7/bus/router"))
     assert (endpoint(tcp_endpoint(7447)), is_private(tcp_endpoint(7447))) == ("tcp/127.0.0.1:7447", False)
 
 

@@ -64,6 +64,13 @@ def test_a_killed_process_and_a_killed_router_come_back(robot: Robot) -> None:
     assert robot.ps()["router"]["endpoint"] == endpoint
 
 
+def test_sockets_that_somebody_removed_come_back(robot: Robot) -> None:
+    endpoint = robot.ps()["router"]["endpoint"]
+    shutil.rmtree(robot.folder.sockets)
+    eventually(lambda: answers(endpoint, robot.name))
+    assert robot.has_logged("files of the running robot were removed; they are restored")
+
+
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can become somebody else")
 def test_another_user_does_not_reach_it(robot: Robot) -> None:
     endpoint = robot.ps()["router"]["endpoint"]

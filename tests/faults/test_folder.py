@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 
 import pytest
@@ -31,10 +32,10 @@ def test_of_many_that_start_it_at_once_one_does(robot: Robot) -> None:
 @pytest.mark.parametrize("removed", ["state.json", "control.sock", "lock", "*"])
 def test_a_robot_whose_files_were_removed_is_found_and_restores_them(robot: Robot, removed: str) -> None:
     robot.up_detached()
-    for path in robot.folder.path.glob(removed):
-        path.unlink()
     if removed == "*":
-        robot.folder.path.rmdir()
+        shutil.rmtree(robot.folder.path)
+    else:
+        (robot.folder.path / removed).unlink()
     eventually(lambda: robot.has_logged("files of the running robot were removed; they are restored"))
     assert len(robot.ps()["components"]) == 2
     assert robot.do("stop").returncode == 0

@@ -225,7 +225,7 @@ PROJECTS: dict[str, Project] = {
     "9,000 misspelt names": Project("RBX4102", mission("do:\n" + "".join(f"  - fly_{n}: x\n" for n in range(9_000)))),
     "60,000 steps": Project("RBX1103", mission("do:\n" + "  - wait: 1 s\n" * 60_000)),
     "1,000 profiles": Project(
-        "RBX1103", robot("profiles:\n" + "".join(f"  p{n}: {{about: {n}}}\n" for n in range(1_000)))
+        "RBX7003", robot("profiles:\n" + "".join(f"  p{n}: {{about: {n}}}\n" for n in range(1_000)))
     ),
     "90,000 unknown keys": Project("RBX1103", robot("".join(f"k{n}: 1\n" for n in range(90_000)))),
     "a loop over 30,000 items": Project("RBX4102", mission("do: [{for: x, in: [" + "1," * 30_000 + "], do: fly}]\n")),

@@ -25,7 +25,7 @@ def test_the_patrol_is_a_flat_tuple_of_nodes_in_the_order_of_the_text() -> None:
         "low": (TYPES["ratio"], 0.5),
     }
     assert [interrupt.name for interrupt in program.interrupts] == ["battery_low"]
-    assert program.reads() == {"rounds", "corner", "battery", "low"}
+    assert program.reads == {"rounds", "corner", "battery", "low"}
 
 
 def test_names_stand_in_paths_in_place_of_kind_and_index() -> None:

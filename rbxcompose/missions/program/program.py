@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import ClassVar, Protocol, Self
 
 from rbxcompose.config import Place
@@ -344,7 +345,7 @@ class Interrupt:
     targets: tuple[Target, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Program:
     """A mission: its main node has the number `main`, which is 0 unless it is part of a linked program.
 
@@ -378,11 +379,12 @@ class Program:
         """Return a node and all below it."""
         return self.nodes[number : self.nodes[number].end]
 
-    @property
+    @cached_property
     def saved(self) -> frozenset[str]:
         """Return the names under which results are saved."""
         return frozenset(node.saved.text for node in self.nodes if node.saved)
 
+    @cached_property
     def reads(self) -> frozenset[str]:
         """Return all `$names` that are read anywhere, including in arguments of skills and missions."""
         read = {name.name for _, asked in self.asked() for name in asked.expression.names}

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from types import FrameType
 
 from rbxcompose.clock import MonotonicClock
+from rbxcompose.endpoints import is_private, socket_of
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime import channel as say
@@ -261,12 +262,19 @@ class Supervisor:
                 os.close(self._lock)
                 self._lock = lock
             self._control.open_again()
+            self._restore_router()
             self._folder.write_state(self.state())
         except OSError as error:
             self._complain(f"files of the robot were removed and cannot be restored: {error}")
         else:
             self._complained = ""
             self.log(Level.WARN, "files of the running robot were removed; they are restored")
+
+    def _restore_router(self) -> None:
+        """Restart a router whose socket was removed, so that programs of this user find it again."""
+        endpoint = self.conductor.endpoint
+        if endpoint is not None and is_private(endpoint) and not socket_of(endpoint).exists():
+            self.kill(ROUTER)
 
     def _complain(self, text: str) -> None:
         """Warn about something that is retried, once for each reason."""
