@@ -33,7 +33,7 @@ FAMILIES = {
     "93": "plug-ins of other packages",
     "94": "this machine, and what runs on it",
 }
-"""What the first two digits of a code stand for."""
+"""Meaning of the first two digits of a code."""
 
 _DECLARES = re.compile(r"^(\w+ = kind\(|@check\()", re.MULTILINE)
 _BLOCK = re.compile(r"^```\w*\n(.*?)^```$", re.MULTILINE | re.DOTALL)

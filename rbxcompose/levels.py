@@ -16,7 +16,7 @@ class Level(IntEnum):
 
 
 LOG_LEVELS = {"info": Level.OK, "warn": Level.WARN, "error": Level.ERROR}
-"""Levels of lines of the log, by the words that people write for them."""
+"""Log levels by the words that people write."""
 
 
 def log_word(level: Level) -> str:

@@ -18,16 +18,16 @@ ANALYZER, ARGUMENT, INSTANCE = "analyzer", "argument", "instance"
 PORT = "port"
 """A component, or `component.port`."""
 RUNNING = "running"
-"""Everything that runs: what users wrote, and what every robot has."""
+"""All components: those of the user and those of every robot."""
 TOPIC, FILE, ANYTHING = "topic", "file", "anything"
 """A topic; a path relative to the file that writes it; a word that may be a name of any kind."""
 
 NAMES = "x-names"
-"""The keyword of schemas that says of what the name stands there."""
+"""The schema keyword that gives the kind of a name."""
 _HIDDEN = (TOPIC, ANYTHING)  # kinds whose names editors do not know
 
 Known = Mapping[str, Mapping[str, object]]
-"""The context of a validation: kind of name -> name -> what it stands for."""
+"""The context of a validation: kind of name -> name -> its meaning."""
 T = TypeVar("T")
 
 

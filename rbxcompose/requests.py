@@ -26,7 +26,7 @@ class Request(Generic[A]):
     """A request whose answer is an `A`; subclass `Command` or `Query`."""
 
     about: ClassVar[str]
-    """What it is about: who takes it is said to be of this type."""
+    """Its subject; findings name this as the type of its receiver."""
 
     @classmethod
     def name(cls) -> str:

@@ -15,9 +15,9 @@ class Restart(Config):
     """When a failed component is restarted."""
 
     when: When = "on_failure"
-    """`on_failure` ends the robot after `max` failures, `always` never gives up, `never` leaves it failed."""
+    """`on_failure` ends the robot after `max` failures, `always` keeps trying, `never` leaves it failed."""
     max: int = Field(5, ge=1, le=100)
-    """The failure, within the time `within`, after which there is no further try."""
+    """Number of failures within `within` after which it is not restarted again."""
     within: Time = Field(60.0, gt=0)
     """The time in which failures are counted."""
     backoff: Time = Field(0.1, ge=0)
@@ -25,4 +25,4 @@ class Restart(Config):
 
 
 DEFAULT = Restart()
-"""What holds where a manifest says nothing."""
+"""The policy if a manifest gives none."""

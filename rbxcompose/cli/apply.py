@@ -1,7 +1,8 @@
-"""Change a running robot to what its files say now; restart only what has changed.
+"""Apply the changed files of a running robot; restart only what has changed.
 
-First it shows the difference, component by component with the reason; on a terminal it asks for confirmation. A
-manifest with errors changes nothing. What is unsafe while the robot moves or a mission runs is refused with the reason.
+It first shows the differences, component by component with the reason, and on a terminal asks for confirmation. A
+manifest with errors changes nothing. Changes that are unsafe while the robot moves or a mission runs are refused with
+the reason.
 """
 
 from __future__ import annotations

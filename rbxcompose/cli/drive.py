@@ -1,7 +1,7 @@
 """Drive with the keyboard: arrows or w, a, s, d; space stops, q quits.
 
-It is the input `teleop` of the mux for `cmd_vel`. The robot moves only while a key is pressed: 0.3 s after the last one
-it is told to stop, and then nothing more, so that the mux lets others through.
+It publishes on the input `teleop` of the mux for `cmd_vel`. The robot moves only while a key is pressed: 0.3 s after
+the last one it is sent a stop. Then nothing more is published, so that the mux lets other inputs through.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Hold everything that moves, at once, until `release`.
+"""Stop everything that moves immediately, until `release`.
 
-It brakes the base, cancels the actions that claim what moves and pauses the missions. It is a protective stop in
+The base brakes, actions that claim what moves are cancelled, and missions pause. This is a protective stop in
 software, not an emergency stop.
 """
 

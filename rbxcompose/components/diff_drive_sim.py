@@ -45,7 +45,7 @@ class DiffDriveSimConfig(Config):
     max_turn_rate: Annotated[AngularSpeed, Live()] = Field(math.pi / 2, gt=0)
     """Largest turn rate."""
     acceleration: Annotated[Acceleration, Live()] = Field(1.0, gt=0)
-    """Acceleration of speeding up and of braking."""
+    """Acceleration when speeding up and braking."""
     turn_acceleration: Annotated[AngularAcceleration, Live()] = Field(3.0, gt=0)
     """Acceleration when starting and stopping to turn."""
     command_timeout: Annotated[Time, Live()] = Field(0.5, gt=0)

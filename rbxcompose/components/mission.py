@@ -70,7 +70,7 @@ class MissionConfig(Config):
     programs: dict[str, Made[Program]] = {}
     """Missions by name."""
     start: str | None = None
-    """The one that runs by itself."""
+    """The mission that starts by itself."""
     inputs: dict[str, dict[str, Any]] = {}
     """Values of the inputs, by mission and name."""
     values: dict[str, Made[ValueSource]] = {}

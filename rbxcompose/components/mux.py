@@ -19,9 +19,9 @@ class MuxSourceConfig(Config):
     """An input or a lock."""
 
     priority: int
-    """The larger one wins."""
+    """The input with the highest priority wins."""
     timeout: Time = Field(gt=0)
-    """After this long without a message it counts as gone."""
+    """The input counts as silent after this long without a message."""
 
 
 class MuxInputConfig(MuxSourceConfig):
@@ -35,7 +35,7 @@ class MuxConfig(Config):
     """The output, its inputs and locks, and their priorities."""
 
     output: str
-    """Topic that the winner's messages go to."""
+    """Topic to which the winner's messages are forwarded."""
     message: str = "geometry_msgs/msg/Twist"
     """ROS name of the message type."""
     inputs: dict[str, MuxInputConfig]

@@ -15,7 +15,7 @@ class TransformsConfig(Config):
     map: str = "map"
     """Frame of places."""
     odom: str = "odom"
-    """Frame in which the base counts its way."""
+    """Frame of the base's odometry."""
 
 
 @component("transforms")

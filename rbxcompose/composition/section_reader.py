@@ -44,7 +44,7 @@ ALWAYS_THERE = ("transforms", "mission")
 """Components that every robot runs, beside `diagnostics`."""
 
 RESERVED = ("buses", "actuators", "joints", "controllers", "safety", "devices", "console", "security", "record")
-"""The words of sections that a robot's file will have."""
+"""Names of sections that are reserved for later."""
 
 
 def read_sections(root: MappingNode, file: Path, sim: bool, documents: Documents) -> RobotManifest:

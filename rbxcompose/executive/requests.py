@@ -13,7 +13,7 @@ MISSION = "mission"
 _SET, _FROM = "--set", "--from"
 
 Seen = Mapping[str, Any]
-"""How a mission stands, as `Running.seen` returns it."""
+"""The state of a mission, as `Running.seen` returns it."""
 PictureData = Mapping[str, Any]
 """A picture of a mission, as `picture_to_data` returns it."""
 

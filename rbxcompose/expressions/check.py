@@ -73,7 +73,7 @@ class ExpressionProblem:
     end: int
     help: str = ""
     meant: str = ""
-    """What can only have been meant in its place, if that is known."""
+    """The only possible correction, if there is one."""
 
 
 def check(expression: Expression, scope: StaticScope) -> tuple[Type, list[ExpressionProblem]]:

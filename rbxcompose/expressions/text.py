@@ -15,7 +15,7 @@ from rbxcompose.expressions.values import LONGEST_TEXT, EvaluationError, Located
 from rbxcompose.units import format_number
 
 Show: TypeAlias = Callable[[str, Value], str]
-"""Writes the value of a name (`battery`, `result.count`) for people."""
+"""Formats the value of a name (`battery`, `result.count`) for people."""
 
 _SLOT = re.compile(rf"\$(?:(?P<dollar>\$)|(?P<path>{NAME}(?:\.{NAME})*))")
 

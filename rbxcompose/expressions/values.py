@@ -21,7 +21,7 @@ class NotArrived(Enum):
 
 
 NOT_ARRIVED: Final = NotArrived.NOT_ARRIVED
-"""Stands for a value of which no message has come yet."""
+"""Represents a value whose first message has not arrived."""
 
 
 @runtime_checkable

@@ -32,9 +32,9 @@ class ArgumentModel(Config):
     """A typed argument of a robot or part, or a typed input of a mission."""
 
     type: str = Field(json_schema_extra={"enum": [*TYPES, CHOICE]})
-    """What it is: a dimension, `count`, `number`, `text`, `flag`, `place`, `pose`, `choice`, `list` or `map`."""
+    """Its type: a dimension, `count`, `number`, `text`, `flag`, `place`, `pose`, `choice`, `list` or `map`."""
     default: Any = None
-    """Its value if none is given."""
+    """Value if none is given."""
     min: Any = None
     """Smallest value; for quantities, counts and numbers."""
     max: Any = None
@@ -42,7 +42,7 @@ class ArgumentModel(Config):
     choices: list[str] = []
     """The words that a `choice` takes."""
     about: str = ""
-    """What it is for."""
+    """Its purpose."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ class ComponentOptions(Config):
     starts_after: tuple[ComponentName, ...] = ()
     """Components that must be active before this one starts."""
     restart: RestartModel = DEFAULT
-    """When it restarts after a failure: a word, or a map with `when`, `max`, `within` and `backoff`."""
+    """Whether and when it restarts after a failure: a word, or a map with `when`, `max`, `within` and `backoff`."""
     log: Literal["info", "warn", "error"] = "info"
     """The lowest level that it logs."""
     connect: dict[Annotated[Name, Refers(OWN_PORT, is_told=True)], TopicName] = {}

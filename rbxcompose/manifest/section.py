@@ -51,9 +51,9 @@ class Short:
 
     key: str
     is_merged: bool = True
-    """Whether layers may change a part of such an entry; else they replace it as a whole."""
+    """Whether layers may change single keys of such an entry; otherwise they replace it as a whole."""
     only_over: str = ""
-    """What the word is, where only an overlay may be so short."""
+    """Meaning of the word, if only an overlay may use the short form."""
 
 
 @cache
@@ -78,25 +78,25 @@ class Declaration(Generic[M]):
     model: type[M]
     _: KW_ONLY
     files: tuple[str, ...] = EVERYWHERE
-    """Kinds of manifests in which it may stand."""
+    """Kinds of manifests that may contain it."""
     order: int = 95
     """Its place among the others: in schemas, in the reference, and when components are made."""
 
     names: str = ""
-    """The kind of name that its keys are; empty if they are fixed."""
+    """Kind of name that its keys define; empty if the keys are fixed."""
     runs: bool = False
     """Whether each entry is a component that runs under the entry's name."""
     at: tuple[str, ...] = ()
-    """Where in the section these keys stand, if not directly below it."""
+    """Path to these keys within the section, if they are not directly below it."""
     entry: str = ""
     """What findings call an entry."""
     short: Short | None = None
     needs: str = ""
-    """The key that a new entry must have in an overlay; without it, it was to change an old one."""
+    """The key that every new entry in an overlay has; an entry without it was meant to change an existing one."""
     scope: SetScope = SetScope.ANYTHING
 
     is_composed: bool = True
-    """Whether it is part of the composed robot; else composition itself is what reads it."""
+    """Whether it is part of the composed robot; otherwise only composition reads it."""
     shared: tuple[tuple[str, ...], ...] | None = None
     """Maps to which several parts may add, as paths below the section, with `ANY` for any key; `()` is the section.
 
@@ -106,18 +106,18 @@ class Declaration(Generic[M]):
     clash: Callable[[Sequence[str]], tuple[str, str] | None] = lambda names: None
     """Tells of what two parts bring under a path in the section: what it is, and what helps."""
     models: Callable[[TreeNode], Iterable[Any]] | None = None
-    """The models of one entry, where they depend on what stands in it."""
+    """Returns the models of one entry, if they depend on its content."""
     rename: Callable[[Renames, str, TreeNode], TreeNode] = lambda renames, name, node: node
-    """What else changes in an entry of a part, whose references have been renamed."""
+    """Further changes to an entry of a part after its references were renamed."""
     topics: Callable[[str, TreeNode], Iterable[str]] = lambda name, node: ()
-    """The topics that an entry has, as `connect:` of an instance may name them."""
+    """Topics of an entry that `connect:` of an instance may name."""
 
     brings: tuple[str, ...] = ()
-    """Names of components that it brings, where it is written."""
+    """Names of the components that it adds if it is present."""
     components: Callable[[Contents, Wiring], Iterable[WantedComponent]] = lambda contents, wiring: ()
-    """The components that it becomes."""
+    """Returns the components that it defines."""
     connects: Callable[[Contents], Mapping[str, Mapping[str, str]]] = lambda contents: {}
-    """Topics that it gives to the ports of components: component -> port -> topic."""
+    """Topics that it assigns to ports: component -> port -> topic."""
     details: Callable[[Any], Mapping[str, str]] = lambda read: {}
     """A few words on each of its names, for editors; it is given what was read."""
 
@@ -184,7 +184,7 @@ class Section(Declaration[M], Generic[M, R]):
     """A section of the manifest; `R` is the type of what is read from it."""
 
     doc: str
-    """What it is for: shown by editors and the reference."""
+    """Its purpose, shown in editors and in the reference."""
     example: str
     """YAML for the reference; a test compiles it within the patrol robot."""
     read: Callable[[Reading[M]], R]

@@ -35,9 +35,9 @@ class TrialFile(ManifestHeader):
     with_: Any = Field(None, alias="with")
     """Values of its inputs, by name, instead of those of the robot."""
     mocks: Any = None
-    """Skills and services that the test answers itself, by name; all others run for real."""
+    """Skills and services that the test mocks, by name; all others run for real."""
     events: Any = None
-    """What happens to the robot from outside, and when."""
+    """Events from outside, and when they happen."""
     expect: Any = None
     """What must have happened in the end."""
 
@@ -67,7 +67,7 @@ class SentModel(Config):
     topic: TopicName
     """Where it is published."""
     message: Any = None
-    """Its fields; a single value stands for the only one."""
+    """Its fields; a single value sets the only field."""
 
 
 class EventModel(Config):
@@ -117,8 +117,8 @@ def _in_full(value: object) -> object:
 
 
 ShortMock = Annotated[MockModel, BeforeValidator(_in_full, json_schema_input_type=MockModel | Name | None)]
-"""A mock, or the word for its result, or nothing: it succeeds at once."""
+"""A mock, its result as a word, or nothing: it then succeeds immediately."""
 
 SECTIONS = {"mocks": dict[Name, ShortMock], "events": tuple[EventModel, ...], "expect": ExpectModel}
-"""What stands in each section."""
+"""Content of each section."""
 STEP_KEYS = ("ended", "at")  # beside the name of a step

@@ -9,7 +9,7 @@ from rbxcompose.findings import Span
 
 NODE_BYTES = 40  # counted for a node in addition to its text
 BROKEN = object()
-"""What `Scalar.filled` holds of a value of which all was said: filling it in has failed, or it was a slip."""
+"""Value of `ScalarNode.filled` after a reported error: it could not be filled in, or was a slip."""
 
 Key = str | int
 KeyPath = tuple[Key, ...]  # from the root of a file: ("components", "base", "max_speed") or ("do", 0, "go_to")

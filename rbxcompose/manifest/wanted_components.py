@@ -18,7 +18,7 @@ class WantedComponent:
     name: str
     type_name: str
     config: Config | Mapping[str, object]
-    """Its configuration, or what its type is to make one of."""
+    """Its configuration, or the data from which its type makes one."""
     path: KeyPath
     options: ComponentOptions = field(default_factory=ComponentOptions)
 

@@ -24,13 +24,13 @@ class GoToSettings:
     """How to drive; all above zero."""
 
     speed: float = 0.3
-    """Most speed forwards [m/s]."""
+    """Largest speed forwards [m/s]."""
     turn_rate: float = math.radians(60)
-    """Most turn rate [rad/s]."""
+    """Largest turn rate [rad/s]."""
     deceleration: float = 0.5
-    """Braking that is counted on [m/s^2]; a base that can do more stops nearer to the goal."""
+    """Assumed deceleration [m/s^2]; a base that can do more stops nearer to the goal."""
     turn_deceleration: float = 1.5
-    """Braking of a turn that is counted on [rad/s^2]."""
+    """Assumed deceleration of turns [rad/s^2]."""
     distance_tolerance: float = 0.05
     """How far from the goal the base may end [m]."""
     heading_tolerance: float = math.radians(3)

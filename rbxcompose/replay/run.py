@@ -26,7 +26,7 @@ FRAMES = ("/tf", "/tf_static")
 
 
 @dataclass(frozen=True, slots=True)
-class Rerun:
+class ReplayResult:
     """The result: the number of messages that were as recorded, the first that was not, and what went wrong."""
 
     equal: int
@@ -47,9 +47,9 @@ def missing_topics(plan: Plan, instance: Instance, topics: Iterable[RecordedTopi
     return sorted(wanted - recorded)
 
 
-def rerun(
+def replayed(
     plan: Plan, instance: Instance, records: Iterable[Recorded], keep: Callable[[Recorded], None] | None = None
-) -> Rerun:
+) -> ReplayResult:
     """Give a component its recorded inputs at their instants and compare its outputs.
 
     It stops at the first difference, unless there is a `keep`, which receives all outputs.
@@ -83,4 +83,4 @@ def rerun(
         clock.advance_to(max(due, clock.now()))
         scheduler.advance(clock.now())
     comparison.end(feed.cut_at)
-    return Rerun(comparison.equal, comparison.difference, tuple(errors))
+    return ReplayResult(comparison.equal, comparison.difference, tuple(errors))

@@ -26,7 +26,7 @@ MAKERS: Mapping[str, Callable[[Iterable[str]], Schema]] = {
     "Mission": mission_schema,
     "Test": trial_schema,
 }
-"""How the schema of a kind is made from the names of component types."""
+"""Makes the schema of a kind from the names of component types."""
 
 _WIDTH = 120  # of a line in a file
 

@@ -38,19 +38,19 @@ class Drives(Capability):
 
     commands: str
     odometry: str = ""
-    """The output that tells how it moves."""
+    """The output with its motion."""
     max_speed: Setting[float] | None = None
-    """It cuts faster commands to this [m/s]."""
+    """It limits faster commands to this [m/s]."""
     max_turn_rate: Setting[float] | None = None
-    """It cuts faster turns to this [rad/s]."""
+    """It limits faster turns to this [rad/s]."""
     drops_above: Setting[float] | None = None
-    """It drops commands above this many times its limits instead of cutting them."""
+    """It ignores commands above this multiple of its limits instead of limiting them."""
     stops_after: Setting[float] | None = None
-    """It brakes when no command came for so long [s]."""
+    """It brakes when no command has arrived for this long [s]."""
     acceleration: Setting[float] | None = None
-    """Also that of braking [m/s^2]."""
+    """Acceleration, also of braking [m/s^2]."""
     turn_acceleration: Setting[float] | None = None
-    """Also that of braking [rad/s^2]."""
+    """Angular acceleration, also of braking [rad/s^2]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class Navigates(Capability):
     tolerance: Setting[float] | None = None
     """How far from the goal it may end [m]."""
     max_speed: Setting[float] | None = None
-    """[m/s], unless it tells that as what it commands."""
+    """[m/s], unless declared as what it commands."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,11 +94,11 @@ class Charges(Capability):
 
     goals: str
     place: Setting[Place] | None = None
-    """The only place where it does."""
+    """The place where it charges."""
     reach: Setting[float] | None = None
-    """How far from there the robot may be [m]."""
+    """Largest distance from that place [m]."""
     until: Setting[float] | None = None
-    """It is done at or above this charge (a ratio)."""
+    """It ends at or above this charge (a ratio)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ class BusModel(Config):
     """How the robot's messages travel."""
 
     domain: int = Field(0, ge=0, le=232)
-    """ROS domain; robots of different domains do not hear each other."""
+    """ROS domain; robots of different domains do not see each other."""
     namespace: TopicName | None = None
     """Prefix of all relative topics."""
     port: int = Field(7447, ge=1, le=65535)

@@ -15,7 +15,7 @@ from rbxcompose.manifest.tree import Entry
 from rbxcompose.references import INSTANCE, Refers
 
 PART_ARGUMENT = "part argument"
-"""An argument of the part that an instance is of."""
+"""An argument of the instance's part."""
 
 
 class Include(Config):

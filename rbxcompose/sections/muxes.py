@@ -26,9 +26,9 @@ class MuxInput(Config):
     """One source of a mux."""
 
     priority: int
-    """The larger one wins."""
+    """The input with the highest priority wins."""
     timeout: Time = Field(gt=0)
-    """It loses its turn after this long without a message."""
+    """The input counts as silent after this long without a message."""
     source: PortName | None = Field(None, alias="from")
     """The component, or `component.port`, whose output this is; without it the input is open to the outside."""
     max_rate: Frequency | None = Field(None, gt=0)
@@ -39,9 +39,9 @@ class MuxLock(Config):
     """A heartbeat that locks while it is silent."""
 
     priority: int
-    """Inputs of a lower priority are locked."""
+    """Inputs with a lower priority are locked."""
     timeout: Time = Field(gt=0)
-    """Silence that locks."""
+    """The lock engages after this long without a message."""
 
 
 class MuxModel(Config):

@@ -19,7 +19,7 @@ class ValueModel(Config):
     field: DottedName | None = None
     """Field of its message; without it, `data`."""
     type: str | None = None
-    """What it is: a dimension, `number`, `text`, `flag`, ..."""
+    """Its type: a dimension, `number`, `text`, `flag`, ..."""
     unit: str | None = None
     """Unit of the message, if it differs from that of the type."""
 

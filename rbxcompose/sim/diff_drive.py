@@ -23,11 +23,11 @@ class DiffDriveSettings:
     max_turn_rate: float = math.radians(90)
     """[rad/s]."""
     acceleration: float = 1.0
-    """Of speeding up and of braking [m/s^2]."""
+    """Acceleration when speeding up and braking [m/s^2]."""
     turn_acceleration: float = 3.0
-    """Of turning faster and slower [rad/s^2]."""
+    """Angular acceleration [rad/s^2]."""
     command_timeout: float = 0.5
-    """A command that is older than this no longer holds, and the base brakes [s]."""
+    """The base brakes when its last command is older than this [s]."""
 
 
 class DiffDriveCore:

@@ -7,21 +7,26 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import deque
 from functools import partial
 from typing import Any
 
 from rbxcompose.bus.attachment import Attachment
-from rbxcompose.bus.names import ActionNames, data_key
-from rbxcompose.bus.transport import TransportReply
+from rbxcompose.bus.classes import ros_qos
+from rbxcompose.bus.names import ActionNames, data_key, dds_type
+from rbxcompose.bus.tokens import EntityKind, NodeToken
+from rbxcompose.bus.transport import Closable, TransportReply
+from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.msgs.cdr import encode
-from rbxcompose.msgs.geometry_msgs import PoseStamped
+from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rbxcompose_msgs import SetBatteryLevel
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.msgs.unique_identifier_msgs import UUID
+from rbxcompose.qos import Qos
 
 OPEN = 1000
 GID = bytes(range(16))
@@ -44,17 +49,40 @@ def question(what: str, number: int) -> tuple[str, bytes]:
 
 
 def main(router: str, what: str, seconds: float) -> None:
-    """Ask until the time is over."""
+    """Begin, go on until the time is over, and say how much it was."""
     transport = ZenohTransport(open_peer(router), lambda owner, callback: None)
-    waiting: set[int] = set()
     sys.stdout.write("it begins\n")
     sys.stdout.flush()
-    began, asked = time.monotonic(), 0
+    count = (announce if what == "tokens" else partial(ask, what=what))(transport, time.monotonic() + seconds)
+    sys.stdout.write(f"{count}\n")
+    sys.stdout.flush()
+    transport.close()
+
+
+def announce(transport: ZenohTransport, until: float) -> int:
+    """Appear as ever new publishers and subscribers of the commands, and disappear again."""
+    there: deque[Closable] = deque()
+    qos = WIRE_PROFILES["jazzy"].qos_text(ros_qos(Qos.COMMAND))
+    count = 0
+    while time.monotonic() < until:
+        count += 1
+        node = NodeToken(0, transport.session, count, f"nobody_{count}", "")
+        kind = (EntityKind.PUBLISHER, EntityKind.SUBSCRIPTION)[count % 2]
+        there.append(transport.announce(node.endpoint_key(kind, 1, "/cmd_vel", dds_type(Twist.TYPE), Twist.HASH, qos)))
+        if len(there) > OPEN:
+            there.popleft().close()
+    return count
+
+
+def ask(transport: ZenohTransport, until: float, what: str) -> int:
+    """Ask as fast as it can."""
+    waiting: set[int] = set()
+    asked = 0
 
     def ended(number: int, answer: TransportReply) -> None:
         waiting.discard(number)
 
-    while time.monotonic() - began < seconds:
+    while time.monotonic() < until:
         if len(waiting) > OPEN:
             time.sleep(0.001)
             continue
@@ -62,9 +90,7 @@ def main(router: str, what: str, seconds: float) -> None:
         waiting.add(asked)
         key, payload = question(what, asked)
         transport.ask(key, payload, Attachment(asked, 0, GID).encode(), partial(ended, asked))
-    sys.stdout.write(f"{asked}\n")
-    sys.stdout.flush()
-    transport.close()
+    return asked
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ from rbxcompose.recording.recorder import Recorder
 from rbxcompose.recording.tape import PLAN
 from rbxcompose.regular_files import open_regular
 from rbxcompose.replay.comparison import RunDifference
-from rbxcompose.replay.run import Rerun, missing_topics, rerun
+from rbxcompose.replay.run import ReplayResult, missing_topics, replayed
 
 HOW = "'rbxcompose up PATH --rate max --record FILE' records everything that is needed"
 
@@ -43,7 +43,7 @@ def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader
         names = plain(", ".join(missing))
         raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(str(path))}' lacks inputs of '{instance.name}': {names}"))
     with open_regular(path) as file, _kept(arguments.write) as keep:
-        found = rerun(plan, instance, RecordingReader(file).messages(), keep)
+        found = replayed(plan, instance, RecordingReader(file).messages(), keep)
     return _told(arguments, instance.name, found)
 
 
@@ -109,7 +109,7 @@ def _kept(path: Path | None) -> Iterator[Callable[[Recorded], None] | None]:
         raise NotDoneError(UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {reason}")) from error
 
 
-def _told(arguments: argparse.Namespace, name: str, found: Rerun) -> int:
+def _told(arguments: argparse.Namespace, name: str, found: ReplayResult) -> int:
     for text in found.errors:
         tell(plain(text))
     if arguments.json:

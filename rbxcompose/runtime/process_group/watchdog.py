@@ -15,7 +15,7 @@ import time
 HANG = 2.0  # [s] without an iteration of the loop after which the process ends itself
 PERIOD = 0.25  # [s] between two wake-ups
 MARK = "the loop did not run for "
-"""What the process prints before the places where its threads are."""
+"""First line of the dump of all threads."""
 
 
 class Watchdog:

@@ -26,7 +26,7 @@ from rbxcompose.recording.recovery import recover
 from rbxcompose.recording.tape import ORDERS, PLAN
 from rbxcompose.recording.topics import RecordedTopic
 from rbxcompose.recording.writer import RecordingWriter
-from rbxcompose.replay.run import Rerun, missing_topics, rerun
+from rbxcompose.replay.run import ReplayResult, missing_topics, replayed
 from rbxcompose.requests import as_data
 
 ROOT = Path(__file__).parents[2]
@@ -45,8 +45,8 @@ class Recording:
     def instance(self, name: str) -> Instance:
         return next(one for one in self.plan.instances if one.name == name)
 
-    def again(self, name: str, records: list[Recorded] | None = None) -> Rerun:
-        return rerun(self.plan, self.instance(name), self.records if records is None else records)
+    def again(self, name: str, records: list[Recorded] | None = None) -> ReplayResult:
+        return replayed(self.plan, self.instance(name), self.records if records is None else records)
 
     def write(self, path: Path, records: list[Recorded]) -> Path:
         """Write a recording of the same robot with other records."""
@@ -130,7 +130,7 @@ def test_an_output_that_is_too_few_or_too_many_is_told(recording: Recording) -> 
     assert again.now == "nothing"
 
 
-def commanded(recording: Recording, data: object) -> Rerun:
+def commanded(recording: Recording, data: object) -> ReplayResult:
     """Run the missions again as if a command had come right after the start."""
     orders = [number for number, one in enumerate(recording.records) if one.topic.name == ORDERS]
     start = next(number for number in orders if b'"start"' in recording.records[number].payload)
