@@ -164,6 +164,11 @@ class Parts:
 
     def _read(self, path: Path, span: Span) -> _File | None:
         """Return a part's file, read only once; None after findings. `span` is that of the path that names it."""
+        known = self._files.get(path)
+        if known is not None and (finding := self.documents.use(path, known.root)):
+            self.documents.report.add(replace(finding, span=span))
+            self.is_complete = False
+            return None
         if path not in self._files:
             root = self.documents.read(path, PART, span)
             if root is not None:

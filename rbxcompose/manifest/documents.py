@@ -10,7 +10,7 @@ from typing import Any
 from rbxcompose.findings import Finding, Related, Report, Span, kind
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.header import ManifestHeader
-from rbxcompose.manifest.reader import read_file
+from rbxcompose.manifest.reader import Texts, read_file
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.manifest.validate import validate
 
@@ -59,6 +59,10 @@ class Documents:
             self.report.add(changed(finding, related=(*finding.related, *related)))
             return None
         return root if isinstance(root, MappingNode) else None
+
+    def use(self, file: Path, root: MappingNode) -> Finding | None:
+        """Count a file that is used once more; return the finding if the robot has become too large."""
+        return self.sources.use(shown_name(file), root) if isinstance(self.sources, Texts) else None
 
     def writer(self, span: Span, robot: Path) -> Path:
         """Return the file that a value was written in; the robot's file for a value from the command line."""

@@ -3,6 +3,7 @@
 FILE_BYTES = 2_000_000
 URDF_BYTES = 4_000_000
 ALL_BYTES = 8_000_000  # sum over the files of one robot
+ALL_VALUES = 20_000  # of the files of one robot; a file counts each time that it is used
 FILES = 500
 INSTANCES = 500  # of parts; each counts the text of its file towards `ALL_BYTES`
 INCLUDE_DEPTH = 16
@@ -11,6 +12,7 @@ LEAST_STEPS, STEP_BYTES = 160, 250  # what each profile counts at least, and wha
 SECRET = 64_000  # bytes of a secret's file
 NODES = 40_000  # values per file
 URDF_ELEMENTS = 200_000
+KEYS = 1_000  # of one map, such as the components of a robot or the states of a machine
 DEPTH = 64
 ALIAS_NODES = 10_000  # reached through aliases and merge keys
 DATA_NODES = 10_000  # of one datum or input of a mission, which is read, checked and copied as a whole

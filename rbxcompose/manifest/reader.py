@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
 
 from rbxcompose.findings import Edit, Finding, Fix, Span, kind
-from rbxcompose.manifest.limits import ALL_BYTES, FILE_BYTES, FILES
+from rbxcompose.manifest.limits import ALL_BYTES, ALL_VALUES, FILE_BYTES, FILES
 from rbxcompose.manifest.parser_error import NOT_YAML
-from rbxcompose.manifest.tree import TreeNode
+from rbxcompose.manifest.tree import TreeNode, count
 from rbxcompose.manifest.walk import CHARACTER, Walk
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE, compose
 from rbxcompose.printable import FORBIDDEN, code_point
@@ -60,6 +60,14 @@ class Texts(dict[str, str]):
         super().__init__()
         self.unsaved = unsaved
         self.parsed = {} if parsed is None else parsed
+        self.total_values = 0  # of all uses of these files
+
+    def use(self, shown: str, root: TreeNode) -> Finding | None:
+        """Count the values of a file that is used once more; return the finding if they are too many."""
+        self.total_values += count(root)
+        if self.total_values <= ALL_VALUES:
+            return None
+        return TOO_LARGE.at(None, f"with '{shown}' this robot has more than {ALL_VALUES:,} values")
 
 
 def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> ParsedText:
@@ -69,9 +77,13 @@ def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> Pars
         return None, findings
     if not isinstance(sources, Texts):
         return read_text(text, shown)
+    if sources.total_values > ALL_VALUES:
+        return None, []  # reported with the file before
     if (shown, text) not in sources.parsed:
         sources.parsed[shown, text] = read_text(text, shown)
-    return sources.parsed[shown, text]
+    root, findings = sources.parsed[shown, text]
+    finding = sources.use(shown, root) if root is not None else None
+    return (None, [*findings, finding]) if finding else (root, findings)
 
 
 def read_source(

@@ -105,6 +105,15 @@ def size(node: TreeNode) -> int:
     return total
 
 
+def count(node: TreeNode) -> int:
+    """Return how many values a tree has, with its root."""
+    total, waiting = 0, [node]
+    while waiting:
+        total += 1
+        waiting += (child for _, child in children(waiting.pop()))
+    return total
+
+
 def is_larger(node: TreeNode, most: int) -> bool:
     """Return whether a tree has more than `most` nodes below its root; counting stops there."""
     count, waiting = 0, [node]

@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from rbxcompose.findings import Finding, Related, Severity, Span, kind
-from rbxcompose.manifest.limits import ALIAS_NODES, DEPTH, KEY, TEXT
+from rbxcompose.manifest.limits import ALIAS_NODES, DEPTH, KEY, KEYS, TEXT
 from rbxcompose.manifest.parser_error import QUOTE_HELP, QUOTES_NEEDED
 from rbxcompose.manifest.scalars import number_trouble
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
@@ -304,7 +304,10 @@ class Walk:
         if node.flow_style:
             self._check_cut([part for pair in node.value for part in pair])
         is_cut = len(self.findings) > cut
-        for key_node, value_node in node.value:
+        if len(node.value) > KEYS:
+            last = span_of(node.value[KEYS][0], self.file)
+            self.add(TOO_LARGE.at(last, f"more than {KEYS:,} keys in one map; those from here on are not read"))
+        for key_node, value_node in node.value[:KEYS]:
             value, value_size, value_height = self._visit(value_node)
             size += value_size + 1
             height = max(height, value_height)

@@ -221,14 +221,33 @@ PROJECTS: dict[str, Project] = {
         },
     ),
     "10,000 states": Project("RBX1103", mission(states(10_000))),
-    "3,000 states in a row": Project("RBX4102", mission(states(3_000, "fly"))),
+    "900 states in a row": Project("RBX4102", mission(states(900, "fly"))),
     "9,000 misspelt names": Project("RBX4102", mission("do:\n" + "".join(f"  - fly_{n}: x\n" for n in range(9_000)))),
     "60,000 steps": Project("RBX1103", mission("do:\n" + "  - wait: 1 s\n" * 60_000)),
+    "30,000 values in a mission": Project("RBX1103", mission("do:\n" + "  - fly\n" * 30_000)),
+    "a mission of 9,000 values listed 400 times": Project(
+        "RBX1103",
+        {
+            **robot("missions:\n" + "".join(f"  m{n}: ../../missions/bad.yaml\n" for n in range(400))),
+            "missions/bad.yaml": "rbx: 1\nkind: Mission\nname: bad\ndo:\n" + "  - wait: 1 s\n" * 4_500,
+        },
+    ),
+    "a part of 5,000 values included 100 times": Project(
+        "RBX1103",
+        {
+            **robot("include:\n" + "".join(f"  p{n}: ../../parts/p.yaml\n" for n in range(100))),
+            "parts/p.yaml": "rbx: 1\nkind: Part\nname: p\nplaces:\n"
+            + "".join(f"  q{n}: {{x: 1 m, y: 1 m}}\n" for n in range(900)),
+        },
+    ),
+    "1,100 components": Project(
+        "RBX1103", robot("components:\n" + "".join(f"  c{n}: {{type: go_to}}\n" for n in range(1_100)))
+    ),
     "1,000 profiles": Project(
         "RBX7003", robot("profiles:\n" + "".join(f"  p{n}: {{about: {n}}}\n" for n in range(1_000)))
     ),
     "90,000 unknown keys": Project("RBX1103", robot("".join(f"k{n}: 1\n" for n in range(90_000)))),
-    "a loop over 30,000 items": Project("RBX4102", mission("do: [{for: x, in: [" + "1," * 30_000 + "], do: fly}]\n")),
+    "a loop over 19,000 items": Project("RBX4102", mission("do: [{for: x, in: [" + "1," * 19_000 + "], do: fly}]\n")),
     "50,000 items inside each other": Project(
         "RBX1103", mission("data:\n  a: [" + "[1, 2, 3, 4]," * 10_000 + "]\ndo: [{log: $a}]\n")
     ),
