@@ -85,6 +85,19 @@ def quaternion_from_yaw(yaw: float) -> Quaternion:
     return (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
 
 
+def quaternion_about(axis: Vector3, angle: float) -> Quaternion:
+    """Return the rotation by `angle` [rad] about a unit vector."""
+    sine = math.sin(angle / 2)
+    return (axis[0] * sine, axis[1] * sine, axis[2] * sine, math.cos(angle / 2))
+
+
+def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """Return the rotation by `roll` about x, then `pitch` about y, then `yaw` about z [rad], as URDF has it."""
+    about_x = quaternion_about((1.0, 0.0, 0.0), roll)
+    about_y = quaternion_about((0.0, 1.0, 0.0), pitch)
+    return multiply(quaternion_from_yaw(yaw), multiply(about_y, about_x))
+
+
 def yaw_of(rotation: Quaternion) -> float:
     """Return the yaw [rad] of a unit quaternion: the direction of its x axis seen from above."""
     x, y, z, w = rotation

@@ -1,26 +1,48 @@
-"""Fixed frames."""
+"""The frames of the body, and frames that coincide."""
 
 from __future__ import annotations
 
-from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped
+import math
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import Any
+
+from rbxcompose.body.model import Body, BodyJoint
+from rbxcompose.body.urdf import read_body
+from rbxcompose.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.geometry import Transform3
+from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
+from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.sdk import Capability, Component, Config, Out, Setting, WritesFrame, component
+from rbxcompose.sdk import Capability, Component, Config, In, Out, Port, Setting, WritesFrame, component
+
+PERIOD = 0.1  # [s] after which the frames of all joints are published again
+JOINT_STATES, TF = "joint_states", "tf"
+MOVING: dict[str, Port[Any]] = {
+    JOINT_STATES: In(JointState, JOINT_STATES, is_open=True).named(JOINT_STATES),
+    TF: Out(TFMessage, "/tf").named(TF),
+}
 
 
 class TransformsConfig(Config):
-    """The frames that coincide."""
+    """The frames that coincide, and the body."""
 
     map: str = "map"
     """Frame of places."""
     odom: str = "odom"
     """Frame of the base's odometry."""
+    urdf: str = ""
+    """Text of the URDF of a body whose frames it publishes."""
 
 
 @component("transforms")
 class Transforms(Component[TransformsConfig]):
-    """Publishes the frames that never move. While nothing localises the robot, `odom` coincides with `map`.
+    """Publishes where the links of the body are, and the frames that never move.
+
+    Joints are where `joint_states` has them, from as many sources as there are; one that none has reported is at rest:
+    at 0, or at the limit nearest to it. While nothing localises the robot, `odom` coincides with `map`.
 
     Example:
         frames: {type: transforms, map: building, odom: map}
@@ -30,15 +52,71 @@ class Transforms(Component[TransformsConfig]):
     tf_static = Out(TFMessage, "/tf_static", qos="latched")
 
     @classmethod
+    def ports(cls, config: TransformsConfig) -> dict[str, Port[Any]]:
+        """Return the ports: those for joints only if the body has some that move."""
+        return super().ports(config) | (MOVING if body_of(config.urdf).moving else {})
+
+    @classmethod
     def capabilities(cls, config: TransformsConfig) -> tuple[Capability, ...]:
-        """Declare the frame that it fixes."""
-        return (WritesFrame("tf_static", Setting(config.map, "map"), Setting(config.odom, "odom")),)
+        """Declare the frames that it writes."""
+        body = body_of(config.urdf)
+        joints = [WritesFrame(_port(one), Setting(one.parent), Setting(one.child)) for one in body.joints.values()]
+        return (WritesFrame("tf_static", Setting(config.map, "map"), Setting(config.odom, "odom")), *joints)
+
+    def configure(self) -> None:
+        """Read the body; no joint has been reported yet."""
+        self.body = body_of(self.config.urdf)
+        self.positions: dict[str, float] = {}
+        self.moving = [one for one in self.body.joints.values() if one.moves]
 
     def activate(self) -> None:
-        """Publish once; late subscribers receive it, too."""
-        link = TransformStamped(
-            header=Header(stamp=to_time(self.stamp), frame_id=self.config.map),
-            child_frame_id=self.config.odom,
-            transform=Transform(rotation=Quaternion(w=1.0)),
+        """Publish the fixed frames once; late subscribers receive them, too."""
+        fixed = (one for one in self.body.joints.values() if one.kind == "fixed")
+        coinciding = self.link(self.config.map, self.config.odom, Transform3())
+        self.tf_static(TFMessage(transforms=(coinciding, *self.links(fixed))))
+        self.wake()
+
+    def on_joint_states(self, message: JointState) -> None:
+        """Publish the links that joints have moved."""
+        moved = {}
+        for name, position in zip(message.name, message.position, strict=False):
+            if math.isfinite(position) and (joint := self.body.joints.get(name)) and joint.moves:
+                moved[name] = float(position)
+        if moved:
+            self.positions |= moved
+            affected = (one for one in self.moving if (one.mimic.joint if one.mimic else one.name) in moved)
+            self.publish(affected)
+
+    def wake(self) -> None:
+        """Publish all that moves, so that a late subscriber has it soon."""
+        if self.moving:
+            self.publish(self.moving)
+            self.context.wake_at(self.now + PERIOD)
+
+    def publish(self, joints: Iterable[BodyJoint]) -> None:
+        """Publish where the children of joints are now."""
+        self.bound[TF](TFMessage(transforms=tuple(self.links(joints))))
+
+    def links(self, joints: Iterable[BodyJoint]) -> Iterable[TransformStamped]:
+        """Yield where the children of joints are now."""
+        for one in joints:
+            yield self.link(one.parent, one.child, one.at(self.body.position(one, self.positions)))
+
+    def link(self, parent: str, child: str, at: Transform3) -> TransformStamped:
+        """Return the pose of a frame in another one as a message."""
+        return TransformStamped(
+            header=Header(stamp=to_time(self.stamp), frame_id=parent),
+            child_frame_id=child,
+            transform=Transform(translation=Vector3(*at.translation), rotation=Quaternion(*at.rotation)),
         )
-        self.tf_static(TFMessage(transforms=(link,)))
+
+
+@lru_cache(maxsize=4)
+def body_of(urdf: str) -> Body:
+    """Return the body that a checked URDF describes; one without links for an empty text."""
+    root = read_urdf(urdf, "") if urdf else None
+    return read_body(root)[0] if isinstance(root, XmlElement) else Body("")
+
+
+def _port(joint: BodyJoint) -> str:
+    return TF if joint.moves else "tf_static"

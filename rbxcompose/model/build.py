@@ -88,7 +88,7 @@ def own_components(manifest: RobotManifest, written: Mapping[str, RobotComponent
     names = [*written, *ALWAYS, *([MISSION] if manifest.missions else [])]
     analyzers = {name: one.model_dump(exclude_none=True) for name, one in manifest.diagnostics.analyzers.items()}
     return {
-        "transforms": _own(manifest, "transforms", {}),
+        "transforms": _own(manifest, "transforms", {"urdf": manifest.body.text if manifest.body else ""}),
         "diagnostics": _own(manifest, "diagnostics", {"analyzers": analyzers, "expected": names}),
     }
 

@@ -2,50 +2,73 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
+from pydantic import Field, model_validator
+
+from rbxcompose.body.model import Body
+from rbxcompose.body.urdf import read_body
+from rbxcompose.body.xacro import expand
+from rbxcompose.body.xml_reader import read_urdf
 from rbxcompose.config import Config
-from rbxcompose.findings import Finding
+from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.fields import FileName
-from rbxcompose.manifest.files import resolve, shown_name
+from rbxcompose.manifest.files import project_of, resolve, shown_name
+from rbxcompose.manifest.library import library_root
 from rbxcompose.manifest.limits import URDF_BYTES
-from rbxcompose.manifest.reader import read_source
+from rbxcompose.manifest.reader import UNREADABLE, read_source
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import value_span
-from rbxcompose.manifest.urdf import mistake_in_urdf
+from rbxcompose.manifest.tree import TreeNode, value_span
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
+from rbxcompose.printable import plain
 
 DESCRIPTION = "robot_description"
 """The component that a robot with a body runs."""
+LIBRARY = "rbxcompose"  # the package of the shipped library, for `$(find rbxcompose)`
 
 
-class Body(Config):
-    """What the robot looks like and how it moves."""
+class BodyModel(Config):
+    """What the robot looks like and how it moves: a URDF, or a xacro file that expands to one."""
 
-    urdf: FileName
+    urdf: FileName | None = None
     """The URDF file, relative to this one; it is published unchanged on `robot_description`."""
+    xacro: FileName | None = None
+    """The xacro file, relative to this one; its expansion is published."""
+    with_: dict[str, Any] = Field({}, alias="with")
+    """Values of the xacro's arguments: texts, flags, and numbers in SI units."""
+    packages: dict[str, str] = {}
+    """Folders by the names of ROS packages, for `$(find NAME)` and `package://NAME`, relative to this file."""
+
+    @model_validator(mode="after")
+    def _one_file(self) -> BodyModel:
+        if (self.urdf is None) == (self.xacro is None):
+            raise ValueError("a body has either 'urdf' or 'xacro'")
+        return self
 
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """The description of the robot's body: a URDF file and its text, which was read without mistakes."""
+    """The description of the robot's body: its file, its URDF as text, and the links and joints in that."""
 
     path: Path
     text: str
+    body: Body
+    key: str  # `urdf` or `xacro`
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     """Yield the component that publishes the description."""
     if found := contents.of(body):
-        yield WantedComponent(DESCRIPTION, DESCRIPTION, {"urdf": found.text}, ("body", "urdf"))
+        yield WantedComponent(DESCRIPTION, DESCRIPTION, {"urdf": found.text}, ("body", found.key))
 
 
-@section("body", Body, order=30, brings=(DESCRIPTION,), components=_components)
-def body(reading: Reading[Body]) -> Description | None:
-    """What the robot looks like and how it moves: its URDF file, published for viewers and other programs.
+@section("body", BodyModel, order=30, brings=(DESCRIPTION,), components=_components)
+def body(reading: Reading[BodyModel]) -> Description | None:
+    """What the robot looks like and how it moves: links and joints, published for viewers and other programs.
 
     Example:
         body:
@@ -54,14 +77,68 @@ def body(reading: Reading[Body]) -> Description | None:
     read, report = reading.whole(), reading.report
     if read is None or reading.node is None:
         return None
-    documents, span = reading.contents.documents, value_span(reading.node, ("urdf",))
-    path = resolve(read.urdf, documents.writer(span, reading.contents.file), span)
-    if isinstance(path, Finding):
-        report.add(path)
+    found = _urdf(reading, reading.node, read) if read.urdf else _xacro(reading, reading.node, read)
+    if isinstance(found, Finding):
+        report.add(found)
         return None
+    path, text, located, shown = found
+    root = read_urdf(located, shown)
+    if isinstance(root, Finding):
+        report.add(root)
+        return None
+    made, findings = read_body(root)
+    report.extend(findings)
+    return None if findings else Description(path, text, made, "urdf" if read.urdf else "xacro")
+
+
+_Found = tuple[Path, str, str, str]  # the file, its URDF, that with places, and the file's name in findings
+
+
+def _file(reading: Reading[BodyModel], node: TreeNode, key: str, written: str) -> tuple[Path, Span, Path] | Finding:
+    """Return the file that a key names, the place of the key's value, and the file that was written in."""
+    span = value_span(node, (key,))
+    writer = reading.contents.documents.writer(span, reading.contents.file)
+    path = resolve(written, writer, span)
+    return path if isinstance(path, Finding) else (path, span, writer)
+
+
+def _urdf(reading: Reading[BodyModel], node: TreeNode, read: BodyModel) -> _Found | Finding:
+    named = _file(reading, node, "urdf", read.urdf or "")
+    if isinstance(named, Finding):
+        return named
+    path, span, _ = named
     shown = shown_name(path)
-    text, findings = read_source(path, shown, documents.sources, URDF_BYTES, "a URDF file")
-    if text is not None and (mistake := mistake_in_urdf(text, shown)):
-        findings = [mistake]
-    report.extend(replace(one, span=one.span or span) for one in findings)
-    return None if text is None or findings else Description(path, text)
+    text, findings = read_source(path, shown, reading.contents.documents.sources, URDF_BYTES, "a URDF file")
+    if text is None or findings:
+        return replace(findings[0], span=findings[0].span or span)
+    return path, text, text, shown
+
+
+def _xacro(reading: Reading[BodyModel], node: TreeNode, read: BodyModel) -> _Found | Finding:
+    named = _file(reading, node, "xacro", read.xacro or "")
+    if isinstance(named, Finding):
+        return named
+    path, span, writer = named
+    packages = _packages(node, read, writer)
+    if isinstance(packages, Finding):
+        return packages
+    arguments = {name: _as_text(value) for name, value in read.with_.items()}
+    expanded, files = expand(path, arguments, packages, [project_of(path), library_root()], span)
+    for file in files:  # so that findings can show their lines
+        read_source(file, shown_name(file), reading.contents.documents.sources, URDF_BYTES, "a xacro file")
+    return expanded if isinstance(expanded, Finding) else (path, expanded.text, expanded.located, shown_name(path))
+
+
+def _packages(node: TreeNode, read: BodyModel, writer: Path) -> Mapping[str, Path] | Finding:
+    found = {LIBRARY: library_root()}
+    for name, written in read.packages.items():
+        folder = (writer.resolve().parent / written).resolve()
+        if not folder.is_dir() or not folder.is_relative_to(project_of(writer)):
+            message = f"the folder of package '{plain(name, 60)}' is not in the project: '{plain(written)}'"
+            return UNREADABLE.at(value_span(node, ("packages", name)), message)
+        found[name] = folder
+    return found
+
+
+def _as_text(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -46,11 +46,11 @@ ABOVE = {
     "bus": "sdk.bound",
     "check_runner": "missions.analysis model.robot",
     "checks": "check_runner composition diagnostics.core missions model sdk sections",
-    "cli": "body.transforms bus compiler composition doctor executive.requests finding_pages inspection lsp.server "
+    "cli": "body bus compiler composition doctor executive.requests finding_pages inspection lsp.server "
     "mission_tests missions model params plan recording rendering replay runtime scaffold schema.documents sdk "
     "sections",
     "compiler": "check_runner composition model plan",
-    "components": "diagnostics executive missions mux.core navigation.go_to sdk sim",
+    "components": "body diagnostics executive missions mux.core navigation.go_to sdk sim",
     "composition": "sections",
     "diagnostics": "",
     "doctor": "bus.graph composition model.robot runtime.folder runtime.processes sdk sections",
@@ -72,7 +72,7 @@ ABOVE = {
     "scaffold": "composition missions sdk",
     "schema": "missions sdk sections",
     "sdk": "",
-    "sections": "sdk",
+    "sections": "body sdk",
     "sim": "",
     "skills": "sdk",
     "testing": "bus compiler components model.wires params plan.model recording.message rendering.text "
@@ -83,7 +83,7 @@ TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
 }
-TYPE_CHECKING_BLOCKS = 9
+TYPE_CHECKING_BLOCKS = 10
 
 
 def imports(path: Path) -> set[str]:

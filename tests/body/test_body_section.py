@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.body.xml_reader import read_urdf
 from rbxcompose.composition.dump import dump_robot
-from rbxcompose.findings import KINDS
+from rbxcompose.findings import KINDS, Finding
 from rbxcompose.manifest.limits import DEPTH, URDF_BYTES, URDF_ELEMENTS
-from rbxcompose.manifest.urdf import mistake_in_urdf
 from rbxcompose.plan.diff import difference
 from rbxcompose.plan.dump import dump, load
 from rbxcompose.testing.golden import Golden
@@ -41,9 +41,17 @@ WRONG_SECTIONS = {
     "a misspelt path": "body: {urdf: cart.udrf}\n",
     "no path": "body: {}\n",
     "a word": "body: cart.urdf\n",
-    "xacro, which is not there yet": "body: {xacro: cart.urdf}\n",
+    "both": "body: {urdf: cart.urdf, xacro: cart.urdf}\n",
+    "a package elsewhere": "body: {xacro: cart.urdf, packages: {wheels: ../../..}}\n",
     "a component of its name": "body: {urdf: cart.urdf}\ncomponents:\n  robot_description: {type: transforms}\n",
 }
+
+
+def mistake_in(text: str, file: str) -> Finding | None:
+    read = read_urdf(text, file)
+    return read if isinstance(read, Finding) else None
+
+
 EXAMPLES = re.compile(r"^(Bad|Good):\n```xml\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
@@ -85,13 +93,28 @@ def test_each_mistake_in_the_section_is_told_at_its_place(
     golden.check("body.txt", "\n".join(f"--- {name}\n{text}" for name, text in told.items()))
 
 
-@pytest.mark.parametrize("code", ["RBX2001", "RBX2002"])
-def test_the_page_of_a_kind_shows_the_mistake_and_its_cure(code: str) -> None:
+@pytest.mark.parametrize("number", range(1, 8))
+def test_the_page_of_a_kind_shows_the_mistake_and_its_cure(number: int, tmp_path: Path) -> None:
+    code = f"RBX200{number}"
     shown = dict(EXAMPLES.findall(KINDS[code].doc))
-    bad = mistake_in_urdf(shown["Bad"], "bad.urdf")
-    assert bad
-    assert bad.code == code
-    assert mistake_in_urdf(shown["Good"], "good.urdf") is None
+    robot = ROBOT.replace("urdf: cart.urdf", "xacro: cart.urdf") if code == "RBX2007" else ROBOT
+    assert check(tmp_path, robot, cart_urdf=whole(shown["Bad"])).codes == [code]
+    assert check(tmp_path, robot, cart_urdf=whole(shown["Good"])).codes == []
+
+
+def whole(example: str) -> str:
+    """Return a robot around an example that is only a part of one, with the links that its joints name."""
+    if "<robot" in example:
+        return example
+    named = set(re.findall(r'(?:parent|child) link="(\w+)"', example)) - set(re.findall(r'<link name="(\w+)"', example))
+    links = "".join(f'<link name="{name}"/>' for name in sorted(named - {"bsae"}))
+    joints = re.findall(r'<link name="(\w+)"', example)
+    tied = (
+        ""
+        if "<joint" in example or len(set(joints)) < 2 or joints == ["base", "head"]
+        else (f'<joint name="tie" type="fixed"><parent link="{joints[0]}"/><child link="{joints[1]}"/></joint>')
+    )
+    return f'<robot name="cart">{links}{example}{tied}</robot>'
 
 
 def nested(depth: int) -> str:
@@ -99,13 +122,13 @@ def nested(depth: int) -> str:
 
 
 def test_the_limits_are_those_that_are_told() -> None:
-    assert mistake_in_urdf(nested(DEPTH), "cart.urdf") is None
-    assert mistake_in_urdf(f"<robot>{'<a/>' * (URDF_ELEMENTS - 1)}</robot>", "cart.urdf") is None
+    assert mistake_in(nested(DEPTH), "cart.urdf") is None
+    assert mistake_in(f"<robot>{'<a/>' * (URDF_ELEMENTS - 1)}</robot>", "cart.urdf") is None
     for text, column in (
         (nested(DEPTH + 1), 8 + 3 * (DEPTH - 1)),
         (f"<robot>{'<a/>' * URDF_ELEMENTS}</robot>", 4 + 4 * URDF_ELEMENTS),
     ):
-        mistake = mistake_in_urdf(text, "cart.urdf")
+        mistake = mistake_in(text, "cart.urdf")
         assert mistake
         assert (mistake.code, mistake.span and mistake.span[:3]) == ("RBX1103", ("cart.urdf", 1, column))
 
@@ -160,7 +183,9 @@ def test_a_plan_holds_the_text_as_it_was_checked(tmp_path: Path) -> None:
 def test_another_text_is_a_change_of_the_plan_that_can_be_read(tmp_path: Path) -> None:
     before = check(tmp_path, cart_urdf=CART + "<!--" + "a" * 2000 + "-->").plan
     after = check(tmp_path, cart_urdf=CART + "<!--" + "b" * 2000 + "-->").plan
-    [(name, [change])] = difference(before, after).changed.items()
-    assert (name, change.key) == ("robot_description", "urdf")
-    assert change.before != change.after
-    assert len(str(change)) < 120
+    changed = difference(before, after).changed
+    assert sorted(changed) == ["robot_description", "transforms"]
+    for [change] in changed.values():
+        assert change.key == "urdf"
+        assert change.before != change.after
+        assert len(str(change)) < 120

@@ -1,11 +1,14 @@
-"""The text of a URDF file, read strictly: whether it is XML and describes a robot. Its elements are not interpreted."""
+"""The text of a URDF file, read strictly into located elements: whether it is XML and the root is a robot."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
 from xml.parsers import expat
 
 from rbxcompose.findings import Finding, Related, Span, kind
+from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.limits import DEPTH, URDF_ELEMENTS
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.printable import plain
@@ -65,19 +68,44 @@ _WORDS = {
     expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT: "the root element has ended, and nothing may follow it",
     expat.errors.XML_ERROR_MISPLACED_XML_PI: "'<?xml' must be the very first thing in the file",
 }
+PLACE = "rbx-place"  # an attribute that an expanded xacro has: where its element was written
 _SHOWN = 60  # characters of a name in a message
 
 
-def mistake_in_urdf(text: str, file: str) -> Finding | None:
-    """Return the first mistake that keeps a text from being the URDF of a robot, or None.
+def span_of_place(place: str) -> Span:
+    """Return the span that `PLACE` holds: file, line, first column and length, with `|` between them."""
+    file, line, column, length = place.rsplit("|", 3)
+    return Span(shown_name(Path(file)), int(line), int(column), int(line), int(column) + int(length))
 
-    `file` is its name in findings.
+
+@dataclass(slots=True)
+class XmlElement:
+    """An element with the place of its tag. `text` is the text directly in it, before its first child."""
+
+    name: str
+    attributes: dict[str, str]
+    span: Span
+    children: list[XmlElement] = field(default_factory=list)
+    text: str = ""
+
+    def all(self, name: str) -> Iterator[XmlElement]:
+        """Yield the children of this name."""
+        return (child for child in self.children if child.name == name)
+
+    def first(self, name: str) -> XmlElement | None:
+        """Return the first child of this name, if there is one."""
+        return next(self.all(name), None)
+
+
+def read_urdf(text: str, file: str) -> XmlElement | Finding:
+    """Return the root of a URDF, or the first mistake that keeps a text from being one.
+
+    `file` is its name in findings. Elements that carry a `PLACE` have that instead of their own.
     """
     try:
-        _Reader(file).read(text)
+        return _Reader(file).read(text)
     except _RefusedError as refused:
         return refused.finding
-    return None
 
 
 class _RefusedError(Exception):
@@ -88,29 +116,23 @@ class _RefusedError(Exception):
         self.finding = finding
 
 
-class _Element(NamedTuple):
-    """An element that is still open, and where its tag begins: both count from 1."""
-
-    name: str
-    line: int
-    column: int
-
-
 class _Reader:
-    """Drives a parser that builds no tree: only the open elements are kept."""
+    """Builds the tree, within limits."""
 
     def __init__(self, file: str) -> None:
         self.file = file
-        self.open: list[_Element] = []
+        self.open: list[XmlElement] = []
+        self.root: XmlElement | None = None
         self.elements = 0
         self.parser = expat.ParserCreate("utf-8")
         self.parser.XmlDeclHandler = self._declared
         self.parser.StartDoctypeDeclHandler = self._doctype
         self.parser.StartElementHandler = self._begun
         self.parser.EndElementHandler = self._ended
+        self.parser.CharacterDataHandler = self._texted
 
-    def read(self, text: str) -> None:
-        """Read a whole text.
+    def read(self, text: str) -> XmlElement:
+        """Read a whole text and return its root.
 
         Raises:
             _RefusedError: with the first mistake.
@@ -119,6 +141,9 @@ class _Reader:
             self.parser.Parse(text, True)
         except expat.ExpatError as error:
             raise _RefusedError(self._malformed(error)) from None
+        if self.root is None:
+            raise _RefusedError(NOT_XML.at(Span(self.file, 1, 1, 1, 2), "there is no element in this file"))
+        return self.root
 
     def _declared(self, version: str, encoding: str | None, standalone: int) -> None:
         if encoding is not None and encoding.lower() not in _ENCODINGS:
@@ -141,18 +166,27 @@ class _Reader:
             raise _RefusedError(TOO_LARGE.at(self._tag(name), message))
         if self.elements > URDF_ELEMENTS:
             raise _RefusedError(TOO_LARGE.at(self._tag(name), f"more than {URDF_ELEMENTS:,} elements in one file"))
-        self.open.append(_Element(name, self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1))
+        place = attributes.pop(PLACE, None)
+        element = XmlElement(name, attributes, self._tag(name) if place is None else span_of_place(place))
+        if self.open:
+            self.open[-1].children.append(element)
+        else:
+            self.root = element
+        self.open.append(element)
 
     def _ended(self, name: str) -> None:
         self.open.pop()
+
+    def _texted(self, data: str) -> None:
+        if self.open and not self.open[-1].children:
+            self.open[-1].text += data
 
     def _malformed(self, error: expat.ExpatError) -> Finding:
         span = Span(self.file, error.lineno, error.offset + 1, error.lineno, error.offset + 2)
         if not self.open:
             return NOT_XML.at(span, _words(error))
-        name, line, column = self.open[-1]
-        shown = plain(name, _SHOWN)
-        begun = Related(Span(self.file, line, column, line, column + 1 + len(name)), f"'<{shown}>' starts here")
+        shown = plain(self.open[-1].name, _SHOWN)
+        begun = Related(self.open[-1].span, f"'<{shown}>' starts here")
         told = expat.ErrorString(error.code)
         if told == expat.errors.XML_ERROR_TAG_MISMATCH:
             return NOT_XML.at(span, f"another element ends here before '<{shown}>' does", related=[begun])

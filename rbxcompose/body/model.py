@@ -1,0 +1,171 @@
+"""The body of a robot: links and joints, and where each link is for given positions of the joints.
+
+Units are those of URDF: metres, radians, kilograms. The model is frozen, so that checks, transforms and pictures can
+share it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from rbxcompose.findings import Span
+from rbxcompose.geometry import Transform3, Vector3, quaternion_about
+
+MOVING = ("revolute", "continuous", "prismatic")
+"""Kinds of joints with one degree of freedom."""
+FLOATING = ("planar", "floating")
+"""Kinds of joints whose child is placed by something else, such as a localisation."""
+KINDS = (*MOVING, "fixed", *FLOATING)
+
+
+@dataclass(frozen=True, slots=True)
+class Geometry:
+    """A shape: `box` with three lengths, `cylinder` and `capsule` with radius and length, `sphere`, or `mesh`."""
+
+    kind: str
+    size: tuple[float, ...] = ()  # of a mesh: its scale
+    file: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A visual or collision element of a link; `colour` is red, green, blue and opacity from 0 to 1."""
+
+    geometry: Geometry
+    origin: Transform3
+    span: Span
+    colour: tuple[float, float, float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Inertial:
+    """Mass [kg], centre of mass, and the inertia ixx, ixy, ixz, iyy, iyz, izz [kg m^2] about it."""
+
+    mass: float
+    origin: Transform3
+    inertia: tuple[float, ...]
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class BodyLink:
+    """A rigid part of the body; its frame has the same name."""
+
+    name: str
+    span: Span
+    inertial: Inertial | None = None
+    visuals: tuple[Shape, ...] = ()
+    collisions: tuple[Shape, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimits:
+    """Range [rad or m], greatest effort [Nm or N] and speed [rad/s or m/s]; None where nothing is written."""
+
+    lower: float | None
+    upper: float | None
+    effort: float | None
+    velocity: float | None
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Mimic:
+    """A joint that follows another one: `multiplier * position + offset`."""
+
+    joint: str
+    multiplier: float
+    offset: float
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class BodyJoint:
+    """A joint between two links. `origin` is the child's frame in the parent's at position 0, `axis` a unit vector."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: Transform3
+    axis: Vector3
+    span: Span
+    limits: JointLimits | None = None
+    mimic: Mimic | None = None
+
+    @property
+    def moves(self) -> bool:
+        """Return whether it has a position."""
+        return self.kind in MOVING
+
+    @property
+    def rest(self) -> float:
+        """Return the position nearest to 0 within its limits."""
+        if self.limits is None or self.kind == "continuous":
+            return 0.0
+        return min(max(0.0, self.limits.lower or 0.0), self.limits.upper or 0.0)
+
+    def at(self, position: float) -> Transform3:
+        """Return the child's frame in the parent's at a position [rad or m]; 0 if it does not move."""
+        x, y, z = self.axis
+        if self.kind == "prismatic":
+            return self.origin.compose(Transform3((x * position, y * position, z * position)))
+        if self.moves:
+            return self.origin.compose(Transform3(rotation=quaternion_about(self.axis, position)))
+        return self.origin
+
+
+@dataclass(frozen=True)
+class Body:
+    """Links and joints by name, in the order of the file. They form one tree."""
+
+    name: str
+    links: Mapping[str, BodyLink] = field(default_factory=dict)
+    joints: Mapping[str, BodyJoint] = field(default_factory=dict)
+
+    @cached_property
+    def joint_above(self) -> Mapping[str, BodyJoint]:
+        """Return the joint that places each link, by link; the root has none."""
+        return {joint.child: joint for joint in self.joints.values()}
+
+    @cached_property
+    def joints_below(self) -> Mapping[str, list[BodyJoint]]:
+        """Return the joints that each link carries, by link."""
+        found: dict[str, list[BodyJoint]] = {name: [] for name in self.links}
+        for joint in self.joints.values():
+            found[joint.parent].append(joint)
+        return found
+
+    @property
+    def root(self) -> str:
+        """Return the link that no joint places."""
+        return next(name for name in self.links if name not in self.joint_above)
+
+    @property
+    def moving(self) -> list[BodyJoint]:
+        """Return the joints that have a position of their own; one that mimics another has none."""
+        return [joint for joint in self.joints.values() if joint.moves and joint.mimic is None]
+
+    def walk(self) -> Iterator[tuple[str, int]]:
+        """Yield every link with its depth, the root first and each link before those it carries."""
+        waiting = [(self.root, 0)]
+        while waiting:
+            link, depth = waiting.pop()
+            yield link, depth
+            waiting += [(joint.child, depth + 1) for joint in reversed(self.joints_below[link])]
+
+    def position(self, joint: BodyJoint, positions: Mapping[str, float]) -> float:
+        """Return the position of a joint; one that is not in `positions` is at rest."""
+        if joint.mimic is None:
+            return positions.get(joint.name, joint.rest)
+        return joint.mimic.multiplier * self.position(self.joints[joint.mimic.joint], positions) + joint.mimic.offset
+
+    def poses(self, positions: Mapping[str, float]) -> dict[str, Transform3]:
+        """Return the frame of every link in that of the root."""
+        found = {self.root: Transform3()}
+        for link, _ in self.walk():
+            for joint in self.joints_below[link]:
+                found[joint.child] = found[link].compose(joint.at(self.position(joint, positions)))
+        return found

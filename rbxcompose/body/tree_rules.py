@@ -1,0 +1,120 @@
+"""Links and joints that do not form one tree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.body.model import Body, BodyJoint
+from rbxcompose.findings import Finding, Related, kind
+from rbxcompose.printable import plain
+
+NO_LINK = kind(
+    "RBX2005",
+    """A joint names a link or a joint that the body does not have
+
+A joint connects a parent link with a child link, and may mimic another joint that moves by itself.
+
+Bad:
+```xml
+<link name="base"/>
+<link name="head"/>
+<joint name="neck" type="fixed">
+  <parent link="bsae"/>
+  <child link="head"/>
+</joint>
+```
+Good:
+```xml
+<link name="base"/>
+<link name="head"/>
+<joint name="neck" type="fixed">
+  <parent link="base"/>
+  <child link="head"/>
+</joint>
+```
+""",
+)
+NO_TREE = kind(
+    "RBX2006",
+    """The links of the body do not form one tree
+
+Each link but one, the root, is the child of exactly one joint, and no joints form a circle. Otherwise a link would be
+at two places, or at none.
+
+Bad:
+```xml
+<link name="base"/>
+<link name="head"/>
+```
+Good:
+```xml
+<link name="base"/>
+<link name="head"/>
+<joint name="neck" type="fixed">
+  <parent link="base"/>
+  <child link="head"/>
+</joint>
+```
+""",
+)
+_SHOWN = 60
+
+
+def tree_mistakes(body: Body) -> Iterator[Finding]:
+    """Yield what keeps a body from being one tree; unknown names come first, since the rest would follow from them."""
+    unknown = [*_unknown_links(body), *_wrong_mimics(body)]
+    yield from unknown or _shape_mistakes(body)
+
+
+def _unknown_links(body: Body) -> Iterator[Finding]:
+    for joint in body.joints.values():
+        for role, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in body.links:
+                message = f"the {role} of joint '{plain(joint.name, _SHOWN)}' does not exist: '{plain(link, _SHOWN)}'"
+                yield NO_LINK.misspelt(joint.span, message, link, body.links, "links")
+
+
+def _wrong_mimics(body: Body) -> Iterator[Finding]:
+    for joint in body.joints.values():
+        if joint.mimic is None:
+            continue
+        other = body.joints.get(joint.mimic.joint)
+        moving = [one.name for one in body.moving]
+        if other is None:
+            message = f"joint '{plain(joint.name, _SHOWN)}' mimics a joint that does not exist"
+            yield NO_LINK.misspelt(joint.mimic.span, message, joint.mimic.joint, moving, "joints that move")
+        elif other.mimic is not None or not other.moves:
+            does = "mimics another joint itself" if other.mimic else "does not move"
+            message = f"joint '{plain(joint.name, _SHOWN)}' mimics '{plain(other.name, _SHOWN)}', which {does}"
+            yield NO_LINK.at(joint.mimic.span, message, related=[Related(other.span, "the joint that is mimicked")])
+
+
+def _shape_mistakes(body: Body) -> Iterator[Finding]:
+    above: dict[str, BodyJoint] = {}
+    for joint in body.joints.values():
+        if joint.child in above:
+            message = f"link '{plain(joint.child, _SHOWN)}' is the child of two joints"
+            yield NO_TREE.at(joint.span, message, related=[Related(above[joint.child].span, "the first")])
+        above.setdefault(joint.child, joint)
+    roots = [link for name, link in body.links.items() if name not in above]
+    if not body.links:
+        return
+    if not roots:
+        first = next(iter(body.joints.values()))
+        yield NO_TREE.at(first.span, "each link is the child of a joint: the joints form a circle")
+        return
+    for other in roots[1:]:
+        message = f"link '{plain(other.name, _SHOWN)}' is connected to nothing above it, like '{roots[0].name}'"
+        related = [Related(roots[0].span, "the first root")]
+        yield NO_TREE.at(other.span, message, help="add a joint that has it as its child", related=related)
+    if len(roots) == 1 and len(above) == len(body.joints):
+        yield from _circle(body)
+
+
+def _circle(body: Body) -> Iterator[Finding]:
+    reached = {name for name, _ in body.walk()}
+    lost = next((link for name, link in body.links.items() if name not in reached), None)
+    if lost is not None:
+        joint = body.joint_above[lost.name]
+        message = f"link '{plain(lost.name, _SHOWN)}' cannot be reached from '{body.root}': its joints form a circle"
+        yield NO_TREE.at(joint.span, message)

@@ -1,0 +1,269 @@
+"""URDF elements -> the body, with every mistake in them as a finding.
+
+The format is that of https://wiki.ros.org/urdf/XML: links, joints, materials; what else a file holds is left to others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TypeVar
+
+from rbxcompose.body.model import KINDS, Body, BodyJoint, BodyLink, Geometry, Inertial, JointLimits, Mimic, Shape
+from rbxcompose.body.tree_rules import tree_mistakes
+from rbxcompose.body.xml_reader import XmlElement
+from rbxcompose.findings import Finding, Related, kind
+from rbxcompose.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.printable import plain
+
+WRONG_VALUE = kind(
+    "RBX2003",
+    """A value in the body is missing or wrong
+
+A URDF describes links and joints by numbers in metres, radians and kilograms. An element lacks something that it needs,
+or a value is not a finite number, or not one of the words that fit there.
+
+Bad:
+```xml
+<joint name="pan" type="revolving">
+  <parent link="base"/>
+  <child link="head"/>
+  <axis xyz="0 0 nan"/>
+</joint>
+```
+Good:
+```xml
+<joint name="pan" type="continuous">
+  <parent link="base"/>
+  <child link="head"/>
+  <axis xyz="0 0 1"/>
+</joint>
+```
+""",
+)
+TWICE = kind(
+    "RBX2004",
+    """Two links or two joints have the same name
+
+Frames, transforms and joint states are found by name. Macros that are used twice need a prefix for their names.
+
+Bad:
+```xml
+<link name="wheel"/>
+<link name="wheel"/>
+```
+Good:
+```xml
+<link name="left_wheel"/>
+<link name="right_wheel"/>
+```
+""",
+)
+_SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
+_GEOMETRIES = ("box", *_SIZES, "mesh")
+_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_SHOWN = 60
+Colour = tuple[float, float, float, float]
+T = TypeVar("T")
+N = TypeVar("N", BodyLink, BodyJoint)
+
+
+def read_body(root: XmlElement) -> tuple[Body, list[Finding]]:
+    """Return the body that a URDF describes, and what is wrong with it; with findings, the body may not be a tree."""
+    reader = _BodyReader()
+    body = reader.body(root)
+    return body, reader.findings or list(tree_mistakes(body))
+
+
+class _MistakeError(Exception):
+    def __init__(self, finding: Finding) -> None:
+        super().__init__(finding.message)
+        self.finding = finding
+
+
+@dataclass
+class _BodyReader:
+    findings: list[Finding] = field(default_factory=list)
+    materials: dict[str, Colour] = field(default_factory=dict)
+
+    def body(self, root: XmlElement) -> Body:
+        for material in root.all("material"):
+            if (colour := material.first("color")) is not None and "name" in material.attributes:
+                self.guarded(material, partial(self._remember, colour))
+        links = self._named(root, "link", self._link)
+        joints = self._named(root, "joint", self._joint)
+        return Body(root.attributes.get("name", ""), links, joints)
+
+    def _remember(self, colour: XmlElement, material: XmlElement) -> None:
+        red, green, blue, opacity = numbers(colour, "rgba", 4)
+        self.materials[material.attributes["name"]] = (red, green, blue, opacity)
+
+    def _named(self, root: XmlElement, name: str, read: Callable[[XmlElement], N]) -> Mapping[str, N]:
+        found: dict[str, N] = {}
+        for element in root.all(name):
+            one = self.guarded(element, read)
+            if one is None:
+                continue
+            if one.name in found:
+                related = [Related(found[one.name].span, "the first")]
+                self.findings.append(
+                    TWICE.at(one.span, f"two {name}s are named '{plain(one.name, _SHOWN)}'", related=related)
+                )
+                continue
+            found[one.name] = one
+        return found
+
+    def guarded(self, element: XmlElement, read: Callable[[XmlElement], T]) -> T | None:
+        try:
+            return read(element)
+        except _MistakeError as mistake:
+            self.findings.append(mistake.finding)
+            return None
+
+    def _link(self, element: XmlElement) -> BodyLink:
+        inertial = element.first("inertial")
+        return BodyLink(
+            text(element, "name"),
+            element.span,
+            _inertial(inertial) if inertial else None,
+            tuple(self._shape(one) for one in element.all("visual")),
+            tuple(self._shape(one) for one in element.all("collision")),
+        )
+
+    def _shape(self, element: XmlElement) -> Shape:
+        return Shape(_geometry(needed(element, "geometry")), _origin(element), element.span, self._colour(element))
+
+    def _colour(self, element: XmlElement) -> Colour | None:
+        material = element.first("material")
+        if material is None:
+            return None
+        if (colour := material.first("color")) is not None:
+            red, green, blue, opacity = numbers(colour, "rgba", 4)
+            return (red, green, blue, opacity)
+        return self.materials.get(material.attributes.get("name", ""))
+
+    def _joint(self, element: XmlElement) -> BodyJoint:
+        name, kind_ = text(element, "name"), text(element, "type")
+        if kind_ not in KINDS:
+            words = f"a joint cannot be of type '{plain(kind_, _SHOWN)}'"
+            raise _MistakeError(WRONG_VALUE.misspelt(element.span, words, kind_, KINDS, "types of joints"))
+        limit, mimic, axis = element.first("limit"), element.first("mimic"), element.first("axis")
+        if kind_ in ("revolute", "prismatic") and limit is None:
+            message = f"joint '{plain(name, _SHOWN)}' is {kind_} and needs '<limit>'"
+            raise _MistakeError(WRONG_VALUE.at(element.span, message, help="or make it 'continuous'"))
+        return BodyJoint(
+            name,
+            kind_,
+            text(needed(element, "parent"), "link"),
+            text(needed(element, "child"), "link"),
+            _origin(element),
+            _unit(axis) if axis is not None else (1.0, 0.0, 0.0),
+            element.span,
+            _limits(limit, name) if limit is not None else None,
+            _mimic(mimic) if mimic is not None else None,
+        )
+
+
+def _inertial(element: XmlElement) -> Inertial:
+    mass, inertia = needed(element, "mass"), needed(element, "inertia")
+    moments = tuple(number(inertia, name) for name in _INERTIA)
+    return Inertial(number(mass, "value"), _origin(element), moments, element.span)
+
+
+def _geometry(element: XmlElement) -> Geometry:
+    shape = next((one for one in element.children if one.name in _GEOMETRIES), None)
+    if shape is None:
+        raise _MistakeError(WRONG_VALUE.at(element.span, f"a geometry is one of {', '.join(_GEOMETRIES)}"))
+    match shape.name:
+        case "mesh":
+            scale = numbers(shape, "scale", 3) if "scale" in shape.attributes else (1.0, 1.0, 1.0)
+            return Geometry("mesh", scale, text(shape, "filename"))
+        case "box":
+            size = numbers(shape, "size", 3)
+        case name:
+            size = tuple(number(shape, one) for one in _SIZES[name])
+    if min(size) <= 0:
+        raise _MistakeError(WRONG_VALUE.at(shape.span, f"the size of a {shape.name} must be positive"))
+    return Geometry(shape.name, size)
+
+
+def _origin(element: XmlElement) -> Transform3:
+    origin = element.first("origin")
+    if origin is None:
+        return Transform3()
+    x, y, z = numbers(origin, "xyz", 3) if "xyz" in origin.attributes else (0.0, 0.0, 0.0)
+    roll, pitch, yaw = numbers(origin, "rpy", 3) if "rpy" in origin.attributes else (0.0, 0.0, 0.0)
+    return Transform3((x, y, z), quaternion_from_rpy(roll, pitch, yaw))
+
+
+def _unit(element: XmlElement) -> tuple[float, float, float]:
+    x, y, z = numbers(element, "xyz", 3)
+    length = math.hypot(x, y, z)
+    if length == 0.0:
+        raise _MistakeError(WRONG_VALUE.at(element.span, "the axis of a joint has length zero"))
+    return (x / length, y / length, z / length)
+
+
+def _limits(element: XmlElement, joint: str) -> JointLimits:
+    lower, upper, effort, velocity = (
+        number(element, name) if name in element.attributes else None
+        for name in ("lower", "upper", "effort", "velocity")
+    )
+    if lower is not None and upper is not None and lower > upper:
+        message = f"the lower limit of joint '{plain(joint, _SHOWN)}' is above its upper one"
+        raise _MistakeError(WRONG_VALUE.at(element.span, message))
+    return JointLimits(lower, upper, effort, velocity, element.span)
+
+
+def _mimic(element: XmlElement) -> Mimic:
+    multiplier = number(element, "multiplier") if "multiplier" in element.attributes else 1.0
+    offset = number(element, "offset") if "offset" in element.attributes else 0.0
+    return Mimic(text(element, "joint"), multiplier, offset, element.span)
+
+
+def needed(element: XmlElement, name: str) -> XmlElement:
+    """Return a child that must be there."""
+    found = element.first(name)
+    if found is None:
+        raise _MistakeError(WRONG_VALUE.at(element.span, f"'<{element.name}>'{_called(element)} needs '<{name}>'"))
+    return found
+
+
+def text(element: XmlElement, name: str) -> str:
+    """Return an attribute that must be there and not be empty."""
+    found = element.attributes.get(name, "")
+    if not found:
+        message = f"'<{element.name}>'{_called(element)} needs the attribute '{name}'"
+        raise _MistakeError(WRONG_VALUE.at(element.span, message))
+    return found
+
+
+def number(element: XmlElement, name: str) -> float:
+    """Return an attribute that is one finite number."""
+    return numbers(element, name, 1)[0]
+
+
+def numbers(element: XmlElement, name: str, count: int) -> tuple[float, ...]:
+    """Return an attribute that is `count` finite numbers."""
+    written = text(element, name)
+    found = tuple(_numbers_in(written)) if len(written) < 1000 else ()
+    if len(found) != count or not all(map(math.isfinite, found)):
+        what = "a finite number" if count == 1 else f"{count} finite numbers"
+        message = f"'{name}' of '<{element.name}>' must be {what}, not '{plain(written, _SHOWN)}'"
+        raise _MistakeError(WRONG_VALUE.at(element.span, message))
+    return found
+
+
+def _numbers_in(written: str) -> Iterator[float]:
+    for word in written.split():
+        try:
+            yield float(word)
+        except ValueError:
+            yield math.nan
+
+
+def _called(element: XmlElement) -> str:
+    name = element.attributes.get("name")
+    return f" '{plain(name, _SHOWN)}'" if name else ""

@@ -1,0 +1,98 @@
+"""xacro files: expanded with the places of their elements, fenced against what a description has no use for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.body.xacro import Expanded, expand
+from rbxcompose.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.findings import Finding, Span
+
+HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
+HERE = Span("robot.yaml", 5, 10, 5, 20)
+MACROS = HEAD + (
+    '  <xacro:macro name="wheel" params="side">\n    <link name="${side}_wheel"/>\n  </xacro:macro>\n</robot>\n'
+)
+
+
+def expanded(
+    folder: Path, text: str, arguments: dict[str, str] | None = None, packages: dict[str, Path] | None = None
+) -> tuple[Expanded | Finding, Sequence[Path]]:
+    (folder / "r.xacro").write_text(text)
+    return expand(folder / "r.xacro", arguments or {}, packages or {}, [folder], HERE)
+
+
+def links(found: Expanded | Finding) -> list[tuple[str, str, int, int]]:
+    assert isinstance(found, Expanded), found
+    root = read_urdf(found.located, "r.xacro")
+    assert isinstance(root, XmlElement), root
+    return [(one.attributes["name"], Path(one.span.file).name, one.span.line, one.span.column) for one in root.children]
+
+
+def test_elements_keep_their_places_through_includes_and_macros(tmp_path: Path) -> None:
+    (tmp_path / "wheel.xacro").write_text(MACROS)
+    text = HEAD + '<xacro:include filename="wheel.xacro"/>\n<link name="base"/><xacro:wheel side="left"/>\n</robot>'
+    found, files = expanded(tmp_path, text)
+    assert links(found) == [("base", "r.xacro", 3, 1), ("left_wheel", "wheel.xacro", 3, 5)]
+    assert [file.name for file in files] == ["r.xacro", "wheel.xacro"]
+    assert isinstance(found, Expanded)
+    assert "rbx-place" not in found.text
+    assert '<link name="left_wheel"/>' in found.text
+
+
+def test_arguments_and_packages_come_from_the_manifest(tmp_path: Path) -> None:
+    (tmp_path / "vendor").mkdir()
+    (tmp_path / "vendor/wheel.xacro").write_text(MACROS)
+    text = HEAD + '<xacro:arg name="n" default="1"/><xacro:include filename="$(find wheels)/wheel.xacro"/>\n'
+    text += '<xacro:wheel side="w${2 * $(arg n)}"/></robot>'
+    found, _ = expanded(tmp_path, text, {"n": "4"}, {"wheels": tmp_path / "vendor"})
+    assert links(found) == [("w8_wheel", "wheel.xacro", 3, 5)]
+
+
+MISTAKES = {
+    "an unknown name": ('<link name="${side}"/>', 3, "'side'"),
+    "an unknown macro": ('<xacro:whel side="left"/>', 3, "unknown macro name: xacro:whel"),
+    "a parameter that a macro does not have": ('<xacro:wheel sde="left"/>', 3, 'Invalid parameter "sde"'),
+    "a missing parameter": ("<xacro:wheel/>", 3, "Undefined parameters [side]"),
+    "a file that does not exist": ('<xacro:include filename="nothing.xacro"/>', 3, "cannot be read"),
+    "an unknown package": ('<xacro:include filename="$(find nothing)/a.xacro"/>', 3, "package 'nothing' is not known"),
+    "the environment": ('<link name="$(env HOME)"/>', 3, "HOME"),
+    "a file elsewhere": ('<xacro:include filename="/etc/passwd"/>', 3, "outside the project"),
+    "YAML elsewhere": ("<link name=\"${xacro.load_yaml('/etc/passwd')}\"/>", 3, "only read files of its project"),
+    "Python": (
+        '<link name="${(lambda: [c for c in ().__class__.__base__.__subclasses__() '
+        "if c.__name__ == 'Popen'][0](['touch', 'pwned']))()}\"/>",
+        3,
+        "",
+    ),
+    "a macro of its own": ('<xacro:macro name="a" params=""><xacro:a/><xacro:a/></xacro:macro><xacro:a/>', 0, ""),
+    "a long sum": ('<link name="${sum(range(10 ** 12))}"/>', 0, ""),
+    "much text": ("<link name=\"${'a' * 10 ** 12}\"/>", 0, ""),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_is_a_finding_at_its_place_and_nothing_is_executed(name: str, tmp_path: Path) -> None:
+    inside, line, words = MISTAKES[name]
+    (tmp_path / "wheel.xacro").write_text(MACROS)
+    found, _ = expanded(tmp_path, f'{HEAD}<xacro:include filename="wheel.xacro"/>\n{inside}\n</robot>')
+    assert isinstance(found, Finding)
+    assert found.code == "RBX2007"
+    assert words in found.message
+    assert found.span
+    if line:
+        assert found.span.line == line
+    assert {path.name for path in tmp_path.iterdir()} == {"r.xacro", "wheel.xacro"}
+
+
+def test_what_is_no_xml_is_a_finding_at_its_line(tmp_path: Path) -> None:
+    found, _ = expanded(tmp_path, HEAD + "<link>\n</robot>")
+    assert isinstance(found, Finding)
+    assert found.span
+    assert (Path(found.span.file).name, found.span.line) == ("r.xacro", 3)
+    refused, _ = expanded(tmp_path, '<!DOCTYPE robot [<!ENTITY a "b">]>' + HEAD + "</robot>")
+    assert isinstance(refused, Finding)
+    assert "DOCTYPE" in refused.message

@@ -1,0 +1,63 @@
+"""`rbxcompose body`: what it shows of the shipped robot, and what it says of wrong input."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from rbxcompose.body import picture
+from rbxcompose.cli.main import main
+from rbxcompose.testing.golden import Golden
+from tests.conftest import ROOT
+
+ROBOT = str(ROOT / "robots/box_robot")
+
+
+def told(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> str:
+    assert main(["body", *words]) == code
+    out, err = capsys.readouterr()
+    return out + err
+
+
+@pytest.mark.parametrize("action", ["show", "tree"])
+def test_a_body_is_shown(
+    action: str, capsys: pytest.CaptureFixture[str], golden: Golden, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(ROOT)
+    golden.check(f"body_{action}.txt", told(capsys, action, ROBOT))
+
+
+def test_the_expansion_is_a_urdf_without_anything_of_xacro(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    text = told(capsys, "expand", ROBOT)
+    assert "xacro:" not in text
+    assert 'size="0.025 0.025 0.6"' in text  # as the robot's file has it
+    told(capsys, "expand", ROBOT, "--set", "body.with.torso_height=0.9", "--out", str(tmp_path / "r.urdf"))
+    assert 'size="0.025 0.025 0.9"' in (tmp_path / "r.urdf").read_text()
+
+
+def test_a_picture_shows_the_body_on_white(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    straight, turned = tmp_path / "a.png", tmp_path / "b.png"
+    told(capsys, "picture", ROBOT, "--out", str(straight))
+    told(capsys, "picture", ROBOT, "--out", str(turned), "--joint", "head_pan_joint=1.0")
+    first, second = (np.asarray(Image.open(io.BytesIO(file.read_bytes()))) for file in (straight, turned))
+    assert first.shape == (picture.SIZE, picture.SIZE, 3)
+    drawn = (first != 255).any(axis=2)
+    assert 0.03 < drawn.mean() < 0.5
+    edges = np.concatenate([drawn[0], drawn[-1], drawn[:, 0], drawn[:, -1]])
+    assert not edges.any(), "something is out of sight"
+    assert (first != second).any()
+
+
+def test_wrong_input_is_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert "RBX2008" in told(capsys, "show", str(ROOT / "robots/turtlebot"), code=1)
+    assert "no moving joint 'neck': base_l" in told(capsys, "picture", ROBOT, "--joint", "neck=1", code=2)
+    assert "must be a number" in told(capsys, "picture", ROBOT, "--joint", "head_pan_joint=up", code=2)
+    assert "cannot be written" in told(capsys, "expand", ROBOT, "--out", str(tmp_path / "no/file"), code=2)
+    monkeypatch.setattr(picture, "find_spec", lambda name: None)
+    assert "RBX9014" in told(capsys, "picture", ROBOT, "--out", str(tmp_path / "c.png"), code=1)

@@ -1,0 +1,91 @@
+"""The frames of a body on the bus: fixed ones once, moving ones where the joints are."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rbxcompose.components.transforms import body_of
+from rbxcompose.msgs.sensor_msgs import JointState
+from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.qos import Qos
+from rbxcompose.testing import Bench, instance
+
+LIMITS = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+URDF = f"""<robot name="r">
+  <link name="base_footprint"/> <link name="post"/> <link name="head"/> <link name="jaw"/> <link name="eye"/>
+  <joint name="stand" type="fixed"><parent link="base_footprint"/><child link="post"/><origin xyz="0 0 1"/></joint>
+  <joint name="pan" type="revolute"><parent link="post"/><child link="head"/><axis xyz="0 0 1"/>{LIMITS}</joint>
+  <joint name="bite" type="prismatic"><parent link="head"/><child link="jaw"/>{LIMITS}</joint>
+  <joint name="look" type="revolute"><parent link="head"/><child link="eye"/><axis xyz="0 0 1"/>{LIMITS}
+    <mimic joint="pan" multiplier="-2"/></joint>
+</robot>"""
+
+
+class Listener:
+    """Keeps the newest transform of each frame, and how many messages came."""
+
+    def __init__(self, robot: Bench) -> None:
+        self.robot = robot
+        self.moving: dict[str, float] = {}
+        self.static: set[str] = set()
+        self.count = 0
+        robot.bus.subscribe("listener", "/tf", TFMessage, Qos.STATE, self._moved)
+        robot.bus.subscribe("listener", "/tf_static", TFMessage, Qos.LATCHED, self._fixed)
+        self.send = robot.bus.publisher("source", "/joint_states", JointState, Qos.STATE)
+
+    def _moved(self, message: TFMessage) -> None:
+        self.count += 1
+        for one in message.transforms:
+            at = one.transform
+            self.moving[one.child_frame_id] = at.translation.x or 2 * math.atan2(at.rotation.z, at.rotation.w)
+
+    def _fixed(self, message: TFMessage) -> None:
+        self.static |= {one.child_frame_id for one in message.transforms}
+
+    def move(self, **positions: float) -> None:
+        self.send(JointState(name=tuple(positions), position=np.array(list(positions.values()))))
+        self.robot.advance(0.01)
+
+
+@pytest.fixture
+def listener() -> Listener:
+    robot = Bench(instance("transforms", "transforms", {"urdf": URDF}), start=False)
+    made = Listener(robot)
+    robot.advance(0.15)
+    return made
+
+
+def test_fixed_frames_are_published_once_and_moving_ones_at_rest_until_a_joint_is_reported(listener: Listener) -> None:
+    assert listener.static == {"odom", "post"}
+    listener.robot.advance(1.0)
+    assert listener.moving == {"head": 0.0, "jaw": 0.0, "eye": 0.0}
+    assert 9 <= listener.count <= 12
+
+
+def test_a_joint_moves_its_link_and_those_that_mimic_it_at_once(listener: Listener) -> None:
+    listener.move(pan=0.5)
+    assert listener.moving == pytest.approx({"head": 0.5, "jaw": 0.0, "eye": -1.0})
+
+
+def test_joints_of_several_sources_are_merged(listener: Listener) -> None:
+    listener.move(pan=0.5)
+    listener.move(bite=0.25)
+    listener.robot.advance(0.5)
+    assert listener.moving == pytest.approx({"head": 0.5, "jaw": 0.25, "eye": -1.0})
+
+
+def test_what_is_no_position_of_a_moving_joint_is_ignored(listener: Listener) -> None:
+    before = listener.count
+    listener.move(stand=1.0, nothing=1.0)
+    assert listener.count == before
+    listener.move(pan=math.nan, bite=0.5)
+    assert listener.moving["head"] == 0.0
+    assert listener.moving["jaw"] == 0.5
+
+
+def test_a_body_is_parsed_once_and_a_robot_without_one_has_no_joints() -> None:
+    assert body_of(URDF) is body_of(URDF)
+    assert not body_of("").moving
