@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
 import pytest
@@ -11,14 +12,25 @@ from rbxcompose.cli import main as command
 from tests.docs.examples import ROOT, Block, blocks_of
 
 PAGE = ROOT / "docs/inspection.md"
-BLOCKS = list(blocks_of(PAGE.read_text(encoding="utf-8"), PAGE.name))
-SHOWN = [(one, other) for one, other in pairwise(BLOCKS) if (one.language, other.language) == ("sh", "text")]
 SKIPS = "..."
+
+
+def shown_in(blocks: Iterable[Block]) -> Iterator[tuple[Block, Block]]:
+    """Yield each command with what the page shows below it."""
+    yield from ((one, other) for one, other in pairwise(blocks) if (one.language, other.language) == ("sh", "text"))
+
+
+SHOWN = list(shown_in(blocks_of(PAGE.read_text(encoding="utf-8"), PAGE.name)))
 
 
 @pytest.mark.usefixtures("repository")
 @pytest.mark.parametrize(("asked", "shown"), SHOWN, ids=str)
 def test_a_command_prints_what_stands_below_it(asked: Block, shown: Block, capsys: pytest.CaptureFixture[str]) -> None:
+    compare(asked, shown, capsys)
+
+
+def compare(asked: Block, shown: Block, capsys: pytest.CaptureFixture[str]) -> None:
+    """Run a command and require that it prints what is shown, in this order; `...` stands for what is left out."""
     [line] = asked.text.splitlines()
     program, *words = shlex.split(line)
     assert program == "rbxcompose"
