@@ -150,7 +150,7 @@ class Body:
 
     def walk(self) -> Iterator[tuple[str, int]]:
         """Yield every link with its depth, the root first and each link before those it carries."""
-        waiting = [(self.root, 0)]
+        waiting = [(self.root, 0)] if self.links else []
         while waiting:
             link, depth = waiting.pop()
             yield link, depth

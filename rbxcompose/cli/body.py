@@ -96,7 +96,7 @@ def _picture(arguments: argparse.Namespace, description: Description) -> int:
     body, file = description.body, Path(arguments.out or f"{description.body.name or 'body'}.png")
     try:
         positions = dict(_position(body, written) for written in arguments.joint)
-        picture = draw(body, positions, {})
+        picture = draw(body, positions, description.meshes)
     except ValueError as error:
         sys.stderr.write(f"rbxcompose body: {error}\n")
         return USAGE

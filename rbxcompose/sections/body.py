@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
+from rbxcompose.body.lint import lint
 from rbxcompose.body.model import Body
 from rbxcompose.body.urdf import read_body
 from rbxcompose.body.xacro import expand
@@ -28,6 +29,7 @@ from rbxcompose.printable import plain
 
 DESCRIPTION = "robot_description"
 """The component that a robot with a body runs."""
+PACKAGE = "package://"
 LIBRARY = "rbxcompose"  # the package of the shipped library, for `$(find rbxcompose)`
 
 
@@ -58,6 +60,7 @@ class Description:
     text: str
     body: Body
     key: str  # `urdf` or `xacro`
+    meshes: Mapping[str, Path]  # the mesh files that exist, by their names in the URDF
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
@@ -77,7 +80,11 @@ def body(reading: Reading[BodyModel]) -> Description | None:
     read, report = reading.whole(), reading.report
     if read is None or reading.node is None:
         return None
-    found = _urdf(reading, reading.node, read) if read.urdf else _xacro(reading, reading.node, read)
+    packages = _packages(reading, reading.node, read)
+    if isinstance(packages, Finding):
+        report.add(packages)
+        return None
+    found = _urdf(reading, reading.node, read) if read.urdf else _xacro(reading, reading.node, read, packages)
     if isinstance(found, Finding):
         report.add(found)
         return None
@@ -88,7 +95,31 @@ def body(reading: Reading[BodyModel]) -> Description | None:
         return None
     made, findings = read_body(root)
     report.extend(findings)
-    return None if findings else Description(path, text, made, "urdf" if read.urdf else "xacro")
+    if findings:
+        return None
+    meshes = _meshes(made, path, packages)
+    report.extend(lint(made, meshes))
+    return Description(path, text, made, "urdf" if read.urdf else "xacro", meshes)
+
+
+def _meshes(body: Body, file: Path, packages: Mapping[str, Path]) -> dict[str, Path]:
+    """Return the mesh files that exist, by their names in the URDF; they lie in the project or in a package."""
+    shapes = [shape for link in body.links.values() for shape in (*link.visuals, *link.collisions)]
+    names = {shape.geometry.file for shape in shapes if shape.geometry.kind == "mesh"}
+    roots = [project_of(file), *packages.values()]
+    found = {name: mesh for name in names if (mesh := _mesh(name, file, packages)) is not None}
+    return {name: mesh for name, mesh in found.items() if any(mesh.is_relative_to(root) for root in roots)}
+
+
+def _mesh(name: str, file: Path, packages: Mapping[str, Path]) -> Path | None:
+    package, _, inside = name.removeprefix(PACKAGE).partition("/")
+    is_packaged = name.startswith(PACKAGE)
+    folder = packages.get(package) if is_packaged else file.parent
+    try:
+        path = (folder / (inside if is_packaged else name.removeprefix("file://"))).resolve() if folder else None
+    except (OSError, ValueError):  # a name too long for the system, a zero byte
+        return None
+    return path if path is not None and path.is_file() else None
 
 
 _Found = tuple[Path, str, str, str]  # the file, its URDF, that with places, and the file's name in findings
@@ -114,14 +145,13 @@ def _urdf(reading: Reading[BodyModel], node: TreeNode, read: BodyModel) -> _Foun
     return path, text, text, shown
 
 
-def _xacro(reading: Reading[BodyModel], node: TreeNode, read: BodyModel) -> _Found | Finding:
+def _xacro(
+    reading: Reading[BodyModel], node: TreeNode, read: BodyModel, packages: Mapping[str, Path]
+) -> _Found | Finding:
     named = _file(reading, node, "xacro", read.xacro or "")
     if isinstance(named, Finding):
         return named
-    path, span, writer = named
-    packages = _packages(node, read, writer)
-    if isinstance(packages, Finding):
-        return packages
+    path, span, _ = named
     arguments = {name: _as_text(value) for name, value in read.with_.items()}
     expanded, files = expand(path, arguments, packages, [project_of(path), library_root()], span)
     for file in files:  # so that findings can show their lines
@@ -129,9 +159,10 @@ def _xacro(reading: Reading[BodyModel], node: TreeNode, read: BodyModel) -> _Fou
     return expanded if isinstance(expanded, Finding) else (path, expanded.text, expanded.located, shown_name(path))
 
 
-def _packages(node: TreeNode, read: BodyModel, writer: Path) -> Mapping[str, Path] | Finding:
+def _packages(reading: Reading[BodyModel], node: TreeNode, read: BodyModel) -> Mapping[str, Path] | Finding:
     found = {LIBRARY: library_root()}
     for name, written in read.packages.items():
+        writer = reading.contents.documents.writer(value_span(node, ("packages", name)), reading.contents.file)
         folder = (writer.resolve().parent / written).resolve()
         if not folder.is_dir() or not folder.is_relative_to(project_of(writer)):
             message = f"the folder of package '{plain(name, 60)}' is not in the project: '{plain(written)}'"
