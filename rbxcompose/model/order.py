@@ -25,13 +25,14 @@ def start_order(after: After) -> list[str]:
     There must be no cycle.
     """
     ordered: dict[str, None] = {}
-
-    def place(name: str) -> None:
-        for other in after.get(name, ()):
-            if other in after:
-                place(other)
-        ordered.setdefault(name)
-
-    for name in after:
-        place(name)
+    for first in after:
+        waiting = [(first, iter(after[first]))]  # no recursion: a chain may be longer than Python's stack
+        while waiting:
+            name, others = waiting[-1]
+            other = next((one for one in others if one in after and one not in ordered), None)
+            if other is not None:
+                waiting.append((other, iter(after[other])))
+            else:
+                ordered.setdefault(name)
+                waiting.pop()
     return list(ordered)

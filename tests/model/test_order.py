@@ -27,3 +27,12 @@ def test_each_name_comes_once_and_after_what_it_waits_for_unless_there_is_a_circ
     order = start_order(after)
     assert sorted(order) == sorted(after)
     assert all(order.index(other) < order.index(name) for name in after for other in after[name] if other in after)
+
+
+def test_long_chains_and_dense_wishes_take_no_longer_than_they_are() -> None:
+    chain = {str(number): [str(number + 1)] for number in range(20_000)}
+    assert start_order(chain) == [str(number) for number in reversed(range(20_000))]
+    dense = {str(number): [str(other) for other in range(number)] for number in range(200)}
+    assert start_order(dense) == [str(number) for number in range(200)]  # 2**200 paths lead to the last
+    backwards = dict(reversed(dense.items()))
+    assert start_order(backwards) == [str(number) for number in range(200)]
