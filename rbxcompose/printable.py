@@ -10,7 +10,9 @@ FORBIDDEN = re.compile(
 )
 """Characters that no manifest may hold: control characters but tab and newline, bidi controls, non-characters."""
 
-_INVISIBLE = re.compile(r"[\t\n]|" + FORBIDDEN.pattern)
+_HIDDEN = re.compile(FORBIDDEN.pattern + "|[\xad\u061c\u180e\u200b-\u200f\u2060-\u206f]")
+"""Also what text may hold but nobody can see: soft hyphens, joiners and spaces without width."""
+_INVISIBLE = re.compile(r"[\t\n]|" + _HIDDEN.pattern)
 _SHORT = {"\t": "\\t", "\n": "\\n", "\r": "\\r"}
 
 
@@ -34,7 +36,7 @@ def plain(text: str, limit: int = 200) -> str:
 
 def escaped(json: str) -> str:
     """Return a JSON text whose strings contain nothing that can move the cursor, hide or reorder text."""
-    return FORBIDDEN.sub(lambda match: f"\\u{ord(match.group()):04x}", json)
+    return _HIDDEN.sub(lambda match: f"\\u{ord(match.group()):04x}", json)
 
 
 def columns(text: str) -> int:

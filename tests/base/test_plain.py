@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.printable import FORBIDDEN, columns, fitted, plain
+from rbxcompose.printable import FORBIDDEN, columns, escaped, fitted, plain
 
 
 def test_control_characters_are_spelt_out() -> None:
@@ -37,3 +40,11 @@ def test_what_is_fitted_fits_and_is_the_text_or_how_it_begins(text: str, width: 
 
 def test_wide_characters_take_two_columns_and_combining_ones_none() -> None:
     assert [columns(one) for one in ("robot", "\u673a", "e\u0301", "\u200b")] == [5, 2, 1, 0]
+
+
+@pytest.mark.parametrize("hidden", ["\u200b", "\u200d", "\u200e", "\u2060", "\xad", "\u061c"])
+def test_what_nobody_can_see_is_spelt_out(hidden: str) -> None:
+    code = ascii(hidden)[1:-1]
+    assert plain(f"go{hidden}_to") == f"go{code}_to"
+    assert json.loads(escaped(json.dumps(f"go{hidden}_to", ensure_ascii=False))) == f"go{hidden}_to"
+    assert hidden not in escaped(f'"go{hidden}_to"')
