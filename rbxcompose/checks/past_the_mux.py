@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
-from rbxcompose.model.robot import Robot
-from rbxcompose.model.wires import PortEnd
+from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import In
@@ -34,8 +33,9 @@ def past_the_mux(robot: Robot) -> Iterator[Finding]:
         type: diff_drive_sim
     ```
     """
+    outputs = {name: _outputs(component) for name, component in robot.components.items()}
     for topic, ends in robot.readers.items():
-        inputs = [end for end in ends if _output(robot, end)]
+        inputs = [end for end in ends if end.name in outputs[end.instance]]
         muxes = {end.instance for end in inputs}
         for end in ends:
             if muxes and end.instance not in muxes and isinstance(end.port, In) and end.port.qos is Qos.COMMAND:
@@ -43,13 +43,15 @@ def past_the_mux(robot: Robot) -> Iterator[Finding]:
                 yield past_the_mux.at(
                     robot.end_span(end),
                     f"'{end.instance}' subscribes to '{topic}', bypassing the mux '{mux.name}'",
-                    help=f"subscribe to the mux's output: '{end.name}: {_output(robot, own)}'",
+                    help=f"subscribe to the mux's output: '{end.name}: {outputs[own.instance][own.name]}'",
                     related=[Related(robot.key(*mux.path, "inputs", own.name), "this is an input of the mux")],
                 )
 
 
-def _output(robot: Robot, end: PortEnd) -> str:
-    """Return the topic to which a mux forwards what this end receives; empty if it is not an input of a mux."""
-    mux = robot.components[end.instance]
-    muxed = (mux.end(one.output) for one in mux.declared(Forwards) if end.name in one.inputs)
-    return next((output.port.topic for output in muxed if output), "")
+def _outputs(mux: RobotComponent) -> dict[str, str]:
+    """Return the topic to which a mux forwards what each of its inputs receives; empty if it is no mux."""
+    found: dict[str, str] = {}
+    for one in mux.declared(Forwards):
+        if output := mux.end(one.output):
+            found = dict.fromkeys(one.inputs, output.port.topic) | found  # the first that takes an input
+    return {name: topic for name, topic in found.items() if topic}

@@ -8,6 +8,9 @@ from rbxcompose.check_runner import check
 from rbxcompose.checks.needed_port import is_unheard
 from rbxcompose.findings import Finding, Related, Severity, suggest
 from rbxcompose.model.robot import Robot
+from rbxcompose.model.wires import PortEnd
+
+_MOST_SHOWN = 8  # subscribers that are pointed at
 
 
 @check("RBX3011", Severity.WARNING)
@@ -32,14 +35,16 @@ def unheard_command(robot: Robot) -> Iterator[Finding]:
         type: diff_drive_sim
     ```
     """
+    waiting: dict[str, list[PortEnd]] = {}  # by the type of their messages
+    for one in (one for topic, ends in robot.readers.items() if topic not in robot.writers for one in ends):
+        waiting.setdefault(one.type_name, []).append(one)
     for end in robot.ends:
         if is_unheard(robot, end):
-            waiting = [one for ends in robot.readers.values() for one in ends if one.type_name == end.type_name]
-            starving = [one for one in waiting if one.topic not in robot.writers and one.instance != end.instance]
+            starving = [one for one in waiting.get(end.type_name, ()) if one.instance != end.instance]
             topics = [one.topic.strip("/") for one in starving]
             yield unheard_command.at(
                 robot.end_span(end),
                 f"nothing subscribes to the commands of '{end.instance}' on '{end.topic}'",
                 help=suggest(end.topic.strip("/"), topics, "topics that wait for such commands"),
-                related=[Related(robot.end_span(one), f"listens to '{one.topic}'") for one in starving],
+                related=[Related(robot.end_span(one), f"listens to '{one.topic}'") for one in starving[:_MOST_SHOWN]],
             )

@@ -5,6 +5,7 @@ Parts that do not fit together are left out here; the checks report them.
 
 from __future__ import annotations
 
+from bisect import bisect_left, insort
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -21,9 +22,9 @@ from rbxcompose.model.missions import read_missions
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.model.skills import names_of_skills, services_of, skills_of, topics_of
 from rbxcompose.model.values import value_of
-from rbxcompose.model.wires import ends_of, readers, resolve
+from rbxcompose.model.wires import ends_of, resolve
 from rbxcompose.sdk.capabilities import require_declared
-from rbxcompose.sdk.ports import Out
+from rbxcompose.sdk.ports import In, Out
 from rbxcompose.sdk.registry import component_type
 
 MISSION = "mission"
@@ -55,7 +56,7 @@ def written_components(manifest: RobotManifest) -> dict[str, RobotComponent]:
     given = _given_topics(manifest.contents)
     for section in sorted(sections(ROBOT), key=lambda one: not one.names):
         for wanted in section.components(manifest.contents, wires):
-            wires.components[wanted.name] = _component(manifest, wanted, given.get(wanted.name, {}))
+            wires.add(_component(manifest, wanted, given.get(wanted.name, {})))
     return wires.components
 
 
@@ -74,13 +75,27 @@ class _Wires:
 
     namespace: str
     components: dict[str, RobotComponent] = field(default_factory=dict)
+    _read: dict[str, str] = field(default_factory=dict)  # topic -> type of its first subscriber
+    _written: list[tuple[str, int, str]] = field(default_factory=list)  # topic, number, type of publishers, sorted
+
+    def add(self, component: RobotComponent) -> None:
+        """Add a component and its ends."""
+        self.components[component.name] = component
+        for end in component.ends:
+            if isinstance(end.port, In):
+                self._read.setdefault(end.topic, end.type_name)
+            elif isinstance(end.port, Out):
+                insort(self._written, (end.topic, len(self._written), end.type_name))
 
     def message_of(self, topic: str) -> str:
         """Return the type of a subscriber of a topic, else of a publisher below it; empty if there is none."""
         name = resolve(topic, self.namespace)
-        ends = [end for component in self.components.values() for end in component.ends]
-        sources = [end for end in ends if isinstance(end.port, Out) and end.topic.startswith(f"{name}/")]
-        return next((end.type_name for end in [*readers(ends, name), *sources]), "")
+        if name in self._read:
+            return self._read[name]
+        first = bisect_left(self._written, (f"{name}/",))
+        last = bisect_left(self._written, (f"{name}0",))  # "0" follows "/"
+        _, message = min((one[1:] for one in self._written[first:last]), default=(0, ""))
+        return message
 
 
 def own_components(manifest: RobotManifest, written: Mapping[str, RobotComponent]) -> dict[str, RobotComponent]:
@@ -141,7 +156,9 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
 
 def values_of(manifest: RobotManifest, components: Mapping[str, RobotComponent]) -> dict[str, ValueSource]:
     """Return the values whose source exists."""
-    ends = [end for component in components.values() for end in component.ends]
+    types: dict[str, str] = {}  # by topic
+    for end in (end for component in components.values() for end in component.ends if end.type_name):
+        types.setdefault(end.topic, end.type_name)
     namespace, groups = manifest.bus.namespace or "", tuple(manifest.diagnostics.analyzers)
-    found = {name: value_of(entry, components, ends, namespace, groups) for name, entry in manifest.values.items()}
+    found = {name: value_of(entry, components, types, namespace, groups) for name, entry in manifest.values.items()}
     return {name: value for name, value in found.items() if value is not None}

@@ -41,10 +41,14 @@ class RobotComponent:
     restart: Restart = DEFAULT
     log: Level = Level.OK  # the lowest level that is logged
     capabilities: tuple[Capability, ...] = ()
+    _by_port: dict[str, PortEnd] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_by_port", {end.name: end for end in self.ends})
 
     def end(self, port: str) -> PortEnd | None:
         """Return the end of a port, or None."""
-        return next((end for end in self.ends if end.name == port), None)
+        return self._by_port.get(port)
 
     def declared(self, kind: type[K]) -> list[K]:
         """Return the capabilities of a kind."""

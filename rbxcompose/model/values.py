@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 
 from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, choice_of, quantity_of
 from rbxcompose.levels import Level
@@ -26,13 +26,13 @@ DATA = "data"  # the field of the standard messages
 def value_of(
     entry: ValueModel,
     components: Mapping[str, RobotComponent],
-    ends: Iterable[PortEnd],
+    types: Mapping[str, str],
     namespace: str,
     groups: Collection[str] = (),
 ) -> ValueSource | None:
     """Return what a value refers to, None if its source does not exist (a check reports that).
 
-    `groups` are the diagnostics groups, whose levels are values, too.
+    `types` are the ROS types of the robot's topics; `groups` are the diagnostics groups, whose levels are values, too.
     """
     if entry.port is not None:
         component, _, port = entry.port.partition(".")
@@ -43,8 +43,7 @@ def value_of(
     if entry.topic is None:
         return None
     topic = resolve(entry.topic, namespace)
-    known = next((end.type_name for end in ends if end.topic == topic and end.type_name), None)
-    message = known or STANDARD.get(entry.type or "", NUMBER)
+    message = types.get(topic) or STANDARD.get(entry.type or "", NUMBER)
     return _value(topic, message, entry.field or DATA, entry.unit or "", TYPES.get(entry.type or ""))
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from rbxcompose.config import Config
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import In, Out, Port
+from rbxcompose.sdk.ports import Port
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +41,3 @@ def ends_of(
         PortEnd(instance, name, port, resolve(connect.get(name, port.topic), namespace))
         for name, port in sorted(cls.ports(config).items())
     )
-
-
-def writers(ends: Iterable[PortEnd], topic: str) -> list[PortEnd]:
-    """Return the publishers of a topic."""
-    return [end for end in ends if isinstance(end.port, Out) and end.topic == topic]
-
-
-def readers(ends: Iterable[PortEnd], topic: str) -> list[PortEnd]:
-    """Return the subscribers of a topic."""
-    return [end for end in ends if isinstance(end.port, In) and end.topic == topic]
