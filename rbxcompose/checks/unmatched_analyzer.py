@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
-from rbxcompose.diagnostics.core import Analyzer
+from rbxcompose.diagnostics.core import Analyzer, is_glob
 from rbxcompose.findings import Finding
+from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.model.robot import Robot
+
+_MOST_COMPARED = 200_000  # of patterns with names
 
 
 @check("RBX5001", is_fixable=True)
@@ -32,11 +35,19 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
     ```
     """
     known = {*robot.components, *robot.written}
+    compared = 0
     for name, analyzer in robot.manifest.diagnostics.analyzers.items():
         for index, pattern in enumerate(analyzer.match):
-            if pattern not in known and not any(Analyzer((pattern,)).matches(component) for component in known):
+            place = robot.value("diagnostics", "analyzers", name, "match", index)
+            if compared > _MOST_COMPARED:
+                message = f"the patterns up to this one take more than {_MOST_COMPARED:,} comparisons with components"
+                yield TOO_LARGE.at(place, message, help="use fewer patterns")
+                return
+            tried = () if pattern in known or not is_glob(pattern) else known
+            compared += len(tried)
+            if pattern not in known and not any(Analyzer((pattern,)).matches(component) for component in tried):
                 yield unmatched_analyzer.misspelt(
-                    robot.value("diagnostics", "analyzers", name, "match", index),
+                    place,
                     f"analyzer '{name}' matches no component with '{pattern}'",
                     pattern,
                     known,

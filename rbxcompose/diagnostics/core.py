@@ -149,11 +149,16 @@ def _component(name: str) -> str:
     return name.partition(": ")[0]
 
 
+def is_glob(pattern: str) -> bool:
+    """Return whether a pattern can match other names than itself."""
+    return not _GLOB.isdisjoint(pattern)
+
+
 def _matches(parts: tuple[str, str], pattern: str) -> bool:
     # Equality first: a name may contain brackets, which have a meaning in globs.
     if pattern in parts:
         return True
-    return not _GLOB.isdisjoint(pattern) and any(fnmatchcase(part, pattern) for part in parts)
+    return is_glob(pattern) and any(fnmatchcase(part, pattern) for part in parts)
 
 
 def _flat(name: str) -> str:
