@@ -15,11 +15,12 @@ from rbxcompose.check_runner import run_checks
 from rbxcompose.composition.overlay import SET
 from rbxcompose.composition.robot_file import load_robot
 from rbxcompose.findings import Related, Report, Severity, Span, kind
-from rbxcompose.manifest.limits import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES
+from rbxcompose.manifest.limits import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES, STEP_VALUES
 from rbxcompose.manifest.reader import ParsedText, Texts
 from rbxcompose.manifest.walk import TWICE
 from rbxcompose.model.build import build_robot
 from rbxcompose.model.robot import Robot
+from rbxcompose.per_compile import one_compile
 from rbxcompose.plan.build import build_plan
 from rbxcompose.plan.model import Plan
 
@@ -51,6 +52,7 @@ class Compilation:
     sources: dict[str, str] = field(default_factory=dict)
 
 
+@one_compile()
 def compile_robot(
     path: str,
     *,
@@ -92,7 +94,7 @@ def compile_robot(
     out = compiled(profiles)
     if out.robot is not None and not profiles:
         steps = sum(len(mission.program.nodes) for mission in out.robot.missions.values())
-        steps = max(LEAST_STEPS, steps + sum(map(len, out.sources.values())) // STEP_BYTES)
+        steps = max(LEAST_STEPS, steps + _steps_to_read(out.sources))
         for number, (name, span) in enumerate(out.robot.manifest.profiles.items(), 1):
             if number * steps > PROFILE_STEPS:
                 message = f"the profiles from '{name}' on were not tried: it would take too long for this robot"
@@ -102,6 +104,12 @@ def compile_robot(
     if out.robot is not None and not out.report.has_errors:
         out.plan = build_plan(out.robot)
     return out
+
+
+def _steps_to_read(sources: Mapping[str, str]) -> int:
+    """Return how many steps of missions take as long as reading the files of a robot once more."""
+    values = sources.total_values if isinstance(sources, Texts) else 0
+    return max(sum(map(len, sources.values())) // STEP_BYTES, values // STEP_VALUES)
 
 
 def _tell_profile(profile: Span, tried: Compilation, out: Compilation, above: Set[str]) -> None:

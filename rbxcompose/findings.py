@@ -6,12 +6,15 @@ A stage never prints or raises for a user's mistake; it adds a `Finding` to the 
 from __future__ import annotations
 
 import difflib
+import heapq
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import lru_cache
 from typing import NamedTuple
+
+from rbxcompose.per_compile import may_guess
 
 SIMILAR = 0.6  # difflib ratio above which a name is offered as "did you mean"
 MOST_NAMES = 6  # valid names listed when none is similar
@@ -20,6 +23,7 @@ LEAD = 0.1  # if it leads every other name by this much
 VALID = "valid names"
 MOST_COMPARED = 100  # names; with more, only those one slip away are considered
 _LONGEST_COMPARED = 60  # characters of a name
+_PER_LOOKUP, _PER_NAME, _PER_CHARACTER, _PER_RATIO = 300, 12, 3, 500  # units of work of guessing
 
 
 class Severity(StrEnum):
@@ -190,7 +194,12 @@ def _place(finding: Finding) -> tuple[bool, Span | None, str, str]:
 
 
 def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
-    """Return the help for a misspelt `name`: the nearest of `valid`, else up to six of them, else nothing."""
+    """Return the help for a misspelt `name`: the nearest of `valid`, else up to six of them, else nothing.
+
+    A compile that has spent its guesses on thousands of other names gives no help any more.
+    """
+    if not may_guess():
+        return ""
     names = sorted(set(valid))
     near = nearest(name, names)
     if near:
@@ -204,13 +213,32 @@ def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
 def nearest(name: str, valid: Iterable[str], *, most: int = 1, cutoff: float = SIMILAR) -> list[str]:
     """Return the valid names most similar to `name`, nearest first; among very many, only those one slip away.
 
-    Comparing takes time, and a file may contain thousands of wrong names.
+    Comparing takes time, and a file may contain thousands of wrong names: after many, a compile finds nothing near.
     """
+    if not may_guess():
+        return []
     names = frozenset(valid)
+    may_guess(_PER_NAME * len(names))
     if len(names) > MOST_COMPARED:
         slips = _slips(names)
         names = frozenset(near for short in _shortened(name) for near in slips.get(short, ()))
-    return difflib.get_close_matches(name, sorted(names), n=most, cutoff=cutoff)
+    return _closest(name, sorted(names), most, cutoff)
+
+
+def _closest(name: str, names: list[str], most: int, cutoff: float) -> list[str]:
+    """Do what `difflib.get_close_matches` does, but count the work."""
+    may_guess(_PER_LOOKUP + _PER_NAME * len(names))
+    matcher = difflib.SequenceMatcher(None, "", name)
+    near = []
+    for one in names:
+        matcher.set_seq1(one)
+        if matcher.real_quick_ratio() < cutoff or not may_guess(_PER_CHARACTER * len(one)):
+            continue
+        if matcher.quick_ratio() < cutoff or not may_guess(_PER_RATIO + len(one) * len(name)):
+            continue
+        if (ratio := matcher.ratio()) >= cutoff:
+            near.append((ratio, one))
+    return [one for _, one in heapq.nlargest(most, near)]
 
 
 @lru_cache(maxsize=8)
@@ -218,6 +246,7 @@ def _slips(names: frozenset[str]) -> dict[str, list[str]]:
     """Return, for each text that is left when at most one character is removed, the names it comes from."""
     found: dict[str, list[str]] = {}
     for name in names:
+        may_guess(_PER_NAME * len(name))
         for short in _shortened(name):
             found.setdefault(short, []).append(name)
     return found
@@ -236,7 +265,7 @@ def correction(
     `taken` are names already used there: using one again would be a mistake, too. If the name is only part of the text
     at `span`, `within` is the whole text, and `name` is its first occurrence there.
     """
-    meant = surely_meant(name, set(valid))
+    meant = surely_meant(name, valid)
     if span is None or meant is None or meant in taken:
         return None
     old = within or name

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 
 from rbxcompose.composition.history import ROBOT_LAYER, History, HistoryStep
 from rbxcompose.composition.includes import PartInstance, Parts
 from rbxcompose.composition.overlay import NOTHING_TO_CHANGE, compose, join, settled
 from rbxcompose.composition.set_options import read_sets
-from rbxcompose.findings import Finding, Span
+from rbxcompose.findings import Finding, Report, Span
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.files import find, shown_name
 from rbxcompose.manifest.header import ManifestHeader
+from rbxcompose.manifest.limits import KEYS
 from rbxcompose.manifest.section import OVERLAY, Contents
-from rbxcompose.manifest.tree import MappingNode
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, with_children
+from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.printable import plain
 from rbxcompose.sections.include import include
 from rbxcompose.sections.profiles import profiles
@@ -66,7 +69,21 @@ def compose_robot(root: MappingNode, file: Path, chosen: Chosen, documents: Docu
     composed = compose(composed, [(_without(tree, INCLUDE), name) for tree, name in overlays], report, history)
     if chosen.sets:
         composed = compose(composed, read_sets(chosen.sets, composed, report, documents.sources), report, history)
-    return Composed(composed, included, instances, parts, history)
+    return Composed(_with_few_keys(composed, report), included, instances, parts, history)
+
+
+def _with_few_keys(root: MappingNode, report: Report) -> MappingNode:
+    """Return a tree whose maps have as few keys as that of one file may have: layers can bring more together."""
+
+    def shortened(node: TreeNode) -> TreeNode:
+        if isinstance(node, MappingNode) and len(node.entries) > KEYS:
+            last = list(node.entries.values())[KEYS]
+            report.add(TOO_LARGE.at(last.key.span, f"with this key, a map of the robot has more than {KEYS:,}"))
+            node = replace(node, entries=dict(islice(node.entries.items(), KEYS)))
+        return node if isinstance(node, ScalarNode) else with_children(node, lambda _, below: shortened(below))
+
+    short = shortened(root)
+    return short if isinstance(short, MappingNode) else root
 
 
 def _include(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from itertools import islice
 from pathlib import Path
 
 from rbxcompose.findings import Finding, Span, kind
 from rbxcompose.manifest.library import PARTS, PREFIX, library_root
 from rbxcompose.manifest.reader import UNREADABLE
+from rbxcompose.per_compile import once
 from rbxcompose.printable import plain
 
 OUTSIDE = kind(
@@ -15,7 +17,8 @@ OUTSIDE = kind(
     """A path outside the project
 
 A robot's files are together: below the nearest folder with `robots/` or `missions/`, or in the shipped library
-(`rbx:...`). A path may not leave it, neither by `..` nor by a link.
+(`rbx:...`). A path may not leave it, neither by `..` nor by a link. Nor may the file that a command names be a link
+that leaves it.
 
 Bad:
 ```yaml
@@ -42,17 +45,20 @@ def shown_name(path: Path) -> str:
     return str(path) if relative.startswith("..") else relative
 
 
+@once
 def project_of(path: Path) -> Path:
     """Return the nearest folder above a file that contains `robots/` or `missions/`, else the file's own folder."""
-    folders = path.resolve().parents
-    return next(
-        (folder for folder in folders if any((folder / n).is_dir() for n in ("robots", "missions"))), folders[0]
-    )
+    return _project_around(path.resolve().parent)
+
+
+def _project_around(folder: Path) -> Path:
+    above = (one for one in (folder, *folder.parents) if any((one / name).is_dir() for name in ("robots", "missions")))
+    return next(above, folder)
 
 
 def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
     """Return the file that a manifest names, or the finding that says why it must not or cannot be used."""
-    path = _absolute(written, writer.resolve().parent)
+    path = _absolute(written, _real(writer).parent)
     if path is None or not any(path.is_relative_to(root) for root in (project_of(writer), library_root())):
         message, folder = f"'{plain(written)}' is outside the project", plain(shown_name(project_of(writer)))
         where = f"'{folder}'" if folder != "." else "this folder"
@@ -65,7 +71,27 @@ def find(written: str) -> Path | Finding:
     path = _absolute(written, Path.cwd())
     if path is None:
         return OUTSIDE.at(None, f"'{plain(written)}' is outside the library")
-    return path if path.is_file() else _missing(written, path, None)
+    if not path.is_file():
+        return _missing(written, path, None)
+    link = _link(written)
+    if link is None or path.is_relative_to(_project_around(link.parent.resolve())):
+        return path
+    message = f"'{plain(written)}' is a link to a file outside its project"
+    return OUTSIDE.at(
+        Span(shown_name(link), 1, 1, 1, 1), message, help=f"name the file itself: '{plain(shown_name(path))}'"
+    )
+
+
+def _link(written: str) -> Path | None:
+    """Return the file that a command names if it is a link itself; folders above it may be links to anywhere."""
+    named = Path.cwd() / written
+    file = named / ROBOT_FILE if named.is_dir() else named
+    return file if not written.startswith(PREFIX) and file.is_symlink() else None
+
+
+@once
+def _real(path: Path) -> Path:
+    return path.resolve()
 
 
 def _absolute(written: str, folder: Path) -> Path | None:
@@ -87,9 +113,7 @@ def _missing(written: str, path: Path, span: Span | None, writer: Path | None = 
     if writer is not None and (namesakes := files_named(path.name, writer)):
         message, help_text = f"'{plain(written)}' does not exist", " or ".join(f"'{one}'" for one in namesakes)
         return UNREADABLE.at(span, message, help=f"did you mean {help_text}?")
-    try:
-        neighbours = [entry.name for entry in list(path.parent.iterdir())[:_MOST_NEIGHBOURS]]
-    except OSError:
+    if (neighbours := _names_in(path.parent)) is None:
         return UNREADABLE.at(span, f"'{plain(written)}' does not exist", help=_nearest_folder(path))
     message, there = f"'{plain(written)}' does not exist", f"in '{plain(shown_name(path.parent))}'"
     return UNREADABLE.misspelt(span, message, path.name, neighbours, there, within=written)
@@ -97,15 +121,34 @@ def _missing(written: str, path: Path, span: Span | None, writer: Path | None = 
 
 def files_named(name: str, writer: Path) -> list[str]:
     """Return the files of a name elsewhere in the writer's project, as the writer has to name them."""
-    file, found, looked_at = writer.resolve(), [], 0
-    for above, folders, files in os.walk(project_of(writer)):
+    file = _real(writer)
+    found = [path for path in _by_name(project_of(writer)).get(name, ()) if path != file]
+    return [plain(Path(os.path.relpath(path, file.parent)).as_posix()) for path in found[:_MOST_NAMESAKES]]
+
+
+@once
+def _by_name(project: Path) -> dict[str, list[Path]]:
+    """Return the files of a project by their names, of a large one only the first."""
+    found: dict[str, list[Path]] = {}
+    looked_at = 0
+    for above, folders, files in os.walk(project):
         folders[:] = sorted(one for one in folders if not one.startswith("."))
         looked_at += len(folders) + len(files)
-        if name in files and (path := Path(above, name)) != file:
-            found.append(plain(Path(os.path.relpath(path, file.parent)).as_posix()))
-        if looked_at > _MOST_NEIGHBOURS or len(found) >= _MOST_NAMESAKES:
+        for name in files:
+            found.setdefault(name, []).append(Path(above, name))
+        if looked_at > _MOST_NEIGHBOURS:
             break
     return found
+
+
+@once
+def _names_in(folder: Path) -> list[str] | None:
+    """Return the names in a folder, of a large one only the first; None if it cannot be read."""
+    try:
+        with os.scandir(folder) as entries:
+            return [entry.name for entry in islice(entries, _MOST_NEIGHBOURS)]
+    except OSError:
+        return None
 
 
 def _nearest_folder(path: Path) -> str:

@@ -203,11 +203,16 @@ class _Filler:
                 message = f"{describe(to_plain(value)).removeprefix('this is ')} cannot be part of a text"
                 self.report.add(WRONG_OPERATION.at(span, message))
                 return replace(scalar, filled=BROKEN)
+        if not values:
+            return scalar
         parts, position = [], 0
         for piece, value in values.items():
             parts += [scalar.text[position : piece.start()], _as_text(value)]
             position = piece.end()
-        return self.within(scalar, replace(scalar, text="".join(parts) + scalar.text[position:])) if parts else scalar
+        parts.append(scalar.text[position:])
+        if (room := self.room(scalar, sum(map(len, parts)) - len(scalar.text))) is not None:
+            return room
+        return replace(scalar, text="".join(parts))
 
     def where_given(self, filled: TreeNode, piece: re.Match[str]) -> TreeNode:
         """Return what was filled in for one `${...}`, with the place of its value if that was given to an argument."""
@@ -218,10 +223,14 @@ class _Filler:
 
     def within(self, scalar: ScalarNode, filled: TreeNode) -> TreeNode:
         """Return what was filled in, or `BROKEN` after a finding if everything filled in is too large together."""
+        return self.room(scalar, size(filled) - size(scalar)) or filled
+
+    def room(self, scalar: ScalarNode, growth: int) -> TreeNode | None:
+        """Return None if the tree may grow by so many bytes where this scalar is, else what is left of it."""
         if self.left >= 0:
-            self.left -= size(filled) - size(scalar)
+            self.left -= growth
             if self.left >= 0:
-                return filled
+                return None
             message = f"what is filled in from here on makes this robot larger than {ALL_BYTES:,} bytes"
             self.report.add(TOO_LARGE.at(scalar.span, message))
         return replace(scalar, filled=BROKEN)
@@ -251,7 +260,7 @@ class _Filler:
 
     def running_name(self, scalar: ScalarNode, piece: re.Match[str]) -> object:
         name = piece["name"].rstrip(".")
-        known = [key for key in self.known if name in (key, key.removeprefix("args."))]
+        known = [key for key in (name, f"args.{name}") if key in self.known]
         help_text = f"write '${{{known[0]}}}'" if known else "use braces to fill in a value; write '$$' for a dollar"
         message = f"'${plain(name, 60)}' is looked up while the robot runs, but this is filled in earlier"
         span = part_span(scalar, piece.start(), piece.start() + 1 + len(name))

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
 
 from rbxcompose.findings import Edit, Finding, Fix, Span, kind
-from rbxcompose.manifest.limits import ALL_BYTES, ALL_VALUES, FILE_BYTES, FILES
+from rbxcompose.manifest.limits import ALL_BYTES, ALL_VALUES, FILE_BYTES, FILES, FILL_TEXT
 from rbxcompose.manifest.parser_error import NOT_YAML
 from rbxcompose.manifest.tree import TreeNode, count
 from rbxcompose.manifest.walk import CHARACTER, Walk
@@ -67,7 +67,8 @@ class Texts(dict[str, str]):
         self.total_values += count(root)
         if self.total_values <= ALL_VALUES:
             return None
-        return TOO_LARGE.at(None, f"with '{shown}' this robot has more than {ALL_VALUES:,} values")
+        help_text = f"a text with '${{...}}' counts as one for each {FILL_TEXT} characters"
+        return TOO_LARGE.at(None, f"with '{shown}' this robot has more than {ALL_VALUES:,} values", help=help_text)
 
 
 def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> ParsedText:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from rbxcompose.findings import Span
+from rbxcompose.manifest.limits import FILL_TEXT
 
 NODE_BYTES = 40  # counted for a node in addition to its text
 BROKEN = object()
@@ -106,11 +107,14 @@ def size(node: TreeNode) -> int:
 
 
 def count(node: TreeNode) -> int:
-    """Return how many values a tree has, with its root."""
+    """Return how many values a tree has, with its root; a text to fill in counts by its length, too."""
     total, waiting = 0, [node]
     while waiting:
+        now = waiting.pop()
         total += 1
-        waiting += (child for _, child in children(waiting.pop()))
+        if isinstance(now, ScalarNode) and ("${" in now.text or "$$" in now.text):
+            total += len(now.text) // FILL_TEXT
+        waiting += (child for _, child in children(now))
     return total
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.findings import MOST_COMPARED, nearest, suggest
+from rbxcompose.per_compile import one_compile
 
 MANY = [f"battery_{number}" for number in range(50 * MOST_COMPARED)]
 
@@ -26,3 +29,19 @@ def test_among_thousands_what_is_far_away_is_listed_only() -> None:
 def test_a_name_that_is_there_is_nearest_to_itself(name: str, others: list[str]) -> None:
     if name:
         assert nearest(name, [name, *others]) == nearest(name, [name, *others, *MANY[:200]]) == [name]
+
+
+def test_a_compile_stops_guessing_after_much_work_and_the_next_starts_anew() -> None:
+    others = [f"battery_{number:02}_{'a' * 40}" for number in range(MOST_COMPARED)]
+    for _ in range(2):
+        with one_compile():
+            helps = [suggest(f"batery_{number}_{'a' * 40}", others) for number in range(2000)]
+        assert helps[0].startswith("did you mean")
+        assert helps[-1] == ""
+    assert suggest(f"batery_1_{'a' * 40}", others) == suggest(f"batery_1_{'a' * 40}", others) == helps[1]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.text("abc_", max_size=12), st.sets(st.text("abc_", max_size=12), max_size=8), st.integers(1, 3))
+def test_what_is_near_is_what_difflib_tells(name: str, others: set[str], most: int) -> None:
+    assert nearest(name, others, most=most) == difflib.get_close_matches(name, sorted(others), n=most)

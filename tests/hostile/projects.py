@@ -103,6 +103,16 @@ def strangers(count: int) -> str:
 ARGUMENT = "args:\n  long: {type: text, default: " + "x" * 60_000 + "}\n"
 PROJECTS: dict[str, Project] = {
     # Files: which, how many, how large
+    "a robot that is a link to a file of the system": Project(
+        "RBX1306", {}, linked("/etc/passwd", "robots/bad/robot.yaml")
+    ),
+    "900 missions that are missing in a folder of 900": Project(
+        "RBX1301",
+        {
+            **robot("missions:\n" + "".join(f"  m{n}: ../../missions/n{n}.yaml\n" for n in range(900))),
+            **{f"missions/z{n}.yaml": MISSION for n in range(900)},
+        },
+    ),
     "a link to a device": Project("RBX1301", {}, linked("/dev/zero", "robots/bad/robot.yaml")),
     "a link to a file of the system": Project("RBX1306", named("../../missions/bad.yaml"), linked("/etc/passwd")),
     "a link to itself": Project("RBX1306", named("../../missions/bad.yaml"), linked("bad.yaml")),
@@ -164,6 +174,22 @@ PROJECTS: dict[str, Project] = {
     ),
     "a variable that names itself": Project("RBX1102", robot("about: [${env.A}]\n"), environment={"A": "${env.A}"}),
     "a variable with an escape": Project("RBX1001", robot("${env.A}: 1\n"), environment={"A": "\x1b[2J"}),
+    "one text filled with a long argument 5,000 times": Project(
+        "RBX1103", robot(ARGUMENT + "about: '" + "${args.long}" * 5000 + "'\n")
+    ),
+    "100,000 expressions in 30 texts": Project(
+        "RBX1103", robot("about: [" + ("'" + "${1 + 1}" * 3500 + "',") * 30 + "]\n")
+    ),
+    "2,000 names near 99 arguments": Project(
+        "RBX1202",
+        robot(
+            "args:\n"
+            + "".join(f"  a{n:02}{'a' * 50}: {{type: speed, default: 1 m/s}}\n" for n in range(99))
+            + "about: ["
+            + "".join(f"'${{args.a{n}{'a' * 50}}}'," for n in range(100, 2100))
+            + "]\n"
+        ),
+    ),
     # XML
     "a URDF of 5 MB": Project("RBX1103", body("<robot>" + " " * 5_000_000 + "</robot>")),
     "200,000 elements of a URDF": Project("RBX1103", body("<robot>" + "<a/>" * 200_001 + "</robot>")),
@@ -245,6 +271,43 @@ PROJECTS: dict[str, Project] = {
     ),
     "1,000 profiles": Project(
         "RBX7003", robot("profiles:\n" + "".join(f"  p{n}: {{about: {n}}}\n" for n in range(1_000)))
+    ),
+    "20 profiles over 19,000 values": Project(
+        "RBX7003",
+        robot(
+            "about: ["
+            + "1," * 19_000
+            + "]\nprofiles:\n"
+            + "".join(f"  p{n}: {{places: {{z: {{x: 1 m, y: 1 m}}}}}}\n" for n in range(20))
+        ),
+    ),
+    "parts that bring 8,000 components": Project(
+        "RBX1103",
+        {
+            **robot("include:\n" + "".join(f"  i{n}: p.yaml\n" for n in range(8))),
+            "robots/bad/p.yaml": PART + "components:\n" + "".join(f"  b{n}: {{type: go_to}}\n" for n in range(950)),
+        },
+    ),
+    "a start order of 150 components with 2^149 paths": Project(
+        "RBX3011",
+        robot(
+            "components:\n"
+            + "".join(
+                f"  g{n}: {{type: chore_sim, connect: {{cmd_vel: u{n}, chore: s{n}}}, "
+                f"starts_after: [{', '.join(f'g{m}' for m in range(n))}]}}\n"
+                for n in range(150)
+            )
+        ),
+    ),
+    "10,000 patterns for 900 components": Project(
+        "RBX1103",
+        robot(
+            "components:\n"
+            + "".join(f"  c{n}: {{type: chore_sim, connect: {{cmd_vel: u{n}, chore: s{n}}}}}\n" for n in range(900))
+            + "diagnostics:\n  analyzers:\n    a: {match: ["
+            + "".join(f"'*c{n % 900}{'*' * (n // 900)}'," for n in range(10_000))
+            + "]}\n"
+        ),
     ),
     "90,000 unknown keys": Project("RBX1103", robot("".join(f"k{n}: 1\n" for n in range(90_000)))),
     "a loop over 19,000 items": Project("RBX4102", mission("do: [{for: x, in: [" + "1," * 19_000 + "], do: fly}]\n")),

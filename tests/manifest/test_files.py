@@ -9,6 +9,7 @@ import pytest
 
 from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.files import find, project_of, resolve, shown_name
+from rbxcompose.per_compile import one_compile
 
 HERE = Span("robot.yaml", 1, 1, 1, 2)
 
@@ -100,3 +101,56 @@ def test_what_is_there_and_no_file_is_told_as_that(project: Path, kind: str) -> 
         path.symlink_to("nowhere.yaml")
     expected = "is not a regular file" if kind == "pipe" else "does not exist"
     assert expected in refused("../../missions/odd.yaml", project).message
+
+
+def test_a_command_may_name_a_link_inside_its_project_but_not_one_that_leads_out(project: Path) -> None:
+    robot, inside, outside = (project / f"robots/{name}" for name in ("one/robot.yaml", "two.yaml", "three.yaml"))
+    inside.symlink_to(robot)
+    outside.symlink_to(project.parent / "secret.yaml")
+    assert find(str(inside)) == robot
+    refused = find(str(outside))
+    assert isinstance(refused, Finding)
+    assert refused.code == "RBX1306"
+
+
+def test_the_robot_file_of_a_folder_may_not_be_a_link_that_leads_out(project: Path) -> None:
+    robot = project / "robots/one/robot.yaml"
+    robot.unlink()
+    robot.symlink_to(project.parent / "secret.yaml")
+    refused = find(str(robot.parent))
+    assert isinstance(refused, Finding)
+    assert refused.code == "RBX1306"
+
+
+def test_a_command_may_name_a_file_without_a_project_and_go_through_links_to_folders(project: Path) -> None:
+    assert find(str(project.parent / "secret.yaml")) == project.parent / "secret.yaml"
+    (project.parent / "elsewhere").symlink_to(project / "robots")
+    assert find(str(project.parent / "elsewhere/one")) == project / "robots/one/robot.yaml"
+
+
+def test_within_one_compile_a_folder_is_listed_once(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    listed: list[object] = []
+    scan = os.scandir
+
+    def counted(folder: Path) -> object:
+        listed.append(folder)
+        return scan(folder)
+
+    monkeypatch.setattr(os, "scandir", counted)
+
+    def listings(count: int) -> int:
+        listed.clear()
+        with one_compile():
+            for number in range(count):
+                refused(f"../../missions/none_{number}.yaml", project)
+        return len(listed)
+
+    assert listings(20) == listings(1) > 0
+
+
+def test_what_one_compile_found_the_next_looks_up_again(project: Path) -> None:
+    with one_compile():
+        refused("../../missions/tour.yaml", project)
+    (project / "missions/tours.yaml").write_text("rbx: 1\n")
+    with one_compile():
+        assert "tours.yaml" in refused("../../missions/tour.yaml", project).help
