@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from rbxcompose.composition.robot_file import read_mission
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.findings import Report
+from rbxcompose.missions.analysis.held_nodes import HeldBudget
 from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.inputs import bind_inputs
 from rbxcompose.missions.language.reader import read_program
@@ -34,6 +35,7 @@ def read_missions(
     `skills` are the names of all existing skills.
     """
     found: dict[str, RobotMission] = {}
+    budget = HeldBudget()
     for name, entry in manifest.missions.items():
         root = read_mission(
             entry.path,
@@ -43,7 +45,7 @@ def read_missions(
             sim=manifest.is_simulated,
             environment=environment,
         )
-        program = read_program(root, report, skills) if root else None
+        program = read_program(root, report, skills, budget) if root else None
         if program is not None:
             gone = manifest.history.removed("places")
             given, is_begun = entry.with_.entries, name == manifest.start

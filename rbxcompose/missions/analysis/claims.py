@@ -23,5 +23,7 @@ def claims_below(
             yield skill.claims, node.span
         name = node.step.uses.text if node.step.uses else ""
         if name in robot.missions and name not in within:
-            for claim in claims_of(robot.missions[name], robot, (*within, name)):
+            if name not in robot.claims:
+                robot.claims[name] = claims_of(robot.missions[name], robot, (*within, name))
+            for claim in robot.claims[name]:
                 yield claim, node.span

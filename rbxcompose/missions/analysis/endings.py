@@ -42,10 +42,12 @@ class Ending:
 
     def of_mission(self, name: str, /) -> Outcomes:
         """Return how another mission may end."""
-        program = self.robot.missions.get(name)
+        program, known = self.robot.missions.get(name), self.robot.ends
         if program is None or name in self.within:
             return ANY
-        return Ending(program, self.robot, (*self.within, name)).mission()
+        if name not in known:
+            known[name] = Ending(program, self.robot, (*self.within, name)).mission()
+        return known[name]
 
     def of_branches(self, node: MissionNode) -> dict[str, Outcomes]:
         """Return how each branch of a node may end, by its name."""

@@ -36,6 +36,9 @@ TOO_MUCH = kind(
 Each `use` has its own nodes. Twenty thousand nodes, and missions within sixteen others, are enough for every robot;
 more is usually a mistake, such as missions that use two others each, which use two others each.
 
+Each `run` has its own copy of all nodes in the data that it may get. With every copy counted, the missions of a robot
+may have 5,000 values in such nodes.
+
 Use a mission in a loop instead of many times.
 """,
 )

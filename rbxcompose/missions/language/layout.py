@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cache
 
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.findings import Finding
+from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode
 from rbxcompose.missions.language.grammar import BELOW, KeySlot, Takes, Words
 from rbxcompose.missions.language.node_reader import NodeReader
@@ -28,7 +28,7 @@ class Nobody:
     def loop(self, item: str, expression: Expression) -> None:
         """Note nothing."""
 
-    def held(self, expression: Expression, parent: int) -> list[int]:
+    def held(self, expression: Expression, parent: int, span: Span) -> list[int]:
         """Return no nodes."""
         return []
 

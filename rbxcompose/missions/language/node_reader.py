@@ -56,7 +56,7 @@ class NodeReader(ValueReader):
 
     def held(self, expression: Expression) -> None:
         """Read the nodes in the data that an expression may yield."""
-        self.children.extend(self.nodes.held(expression, self.number))
+        self.children.extend(self.nodes.held(expression, self.number, self.span))
 
     def branches(self) -> tuple[str, ...]:
         """Read the branches of a parallel, a list or a map, and return the names in a map."""

@@ -8,9 +8,18 @@ from dataclasses import replace
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Finding, Related, Report, Span
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, count
 from rbxcompose.missions import codes
-from rbxcompose.missions.analysis.held_nodes import ITEM, PathPattern, matching, pattern_of, with_held
+from rbxcompose.missions.analysis.held_nodes import (
+    HELD_VALUES,
+    ITEM,
+    HeldBudget,
+    PathPattern,
+    matching,
+    pattern_of,
+    with_held,
+)
+from rbxcompose.missions.analysis.uses import TOO_MUCH
 from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.language.grammar import LEVELS, Takes, long_form
 from rbxcompose.missions.language.header import read_data, read_inputs, read_rate
@@ -30,9 +39,12 @@ KEYS = ("rbx", "kind", "name", "about", "inputs", "data", "outputs", "interrupts
 INTERRUPT_KEYS = ("when", "do", "afterwards")
 
 
-def read_program(root: MappingNode, report: Report, skills: Collection[str] = ()) -> Program | None:
+def read_program(
+    root: MappingNode, report: Report, skills: Collection[str] = (), budget: HeldBudget | None = None
+) -> Program | None:
     """Return the program of a mission file, None if it has no body; `skills` are the robot's, if known.
 
+    `budget` is shared by the missions of a robot.
     Parts that could not be read are missing from the program, so that the rest can be checked; it may run only if the
     report has no errors.
     """
@@ -44,7 +56,7 @@ def read_program(root: MappingNode, report: Report, skills: Collection[str] = ()
             report.add(
                 codes.UNKNOWN_KEY.misspelt(entry.key.span, message, name, KEYS, "keys of a mission", taken=root.entries)
             )
-    reader = _Reader(report, root, repairs)
+    reader = _Reader(report, root, repairs, budget or HeldBudget())
     inputs, data = read_inputs(root.get("inputs"), report), read_data(root.get("data"), report)
     body = _body(root, report)
     if body is None:
@@ -90,9 +102,10 @@ def _text(root: MappingNode, key: str) -> str:
 class _Reader:
     """Numbers the nodes in the order of the text, and keeps track of its position."""
 
-    def __init__(self, report: Report, root: MappingNode, repairs: Repairs) -> None:
+    def __init__(self, report: Report, root: MappingNode, repairs: Repairs, budget: HeldBudget) -> None:
         self.report = report
         self.repairs = repairs
+        self.budget = budget
         data = root.get("data")
         self.data = {name: entry.value for name, entry in data.entries.items()} if isinstance(data, MappingNode) else {}
         self.patterns: dict[str, PathPattern] = {}  # where in the data the items of loops are
@@ -146,12 +159,13 @@ class _Reader:
         if pattern:
             self.patterns[item] = (*pattern, ITEM)
 
-    def held(self, expression: Expression, parent: int) -> list[int]:
+    def held(self, expression: Expression, parent: int, span: Span) -> list[int]:
         """Read the nodes in the data that an expression may yield."""
         pattern = pattern_of(expression, self.patterns)
-        found = list(matching(self.data, pattern)) if pattern else []
-        numbers = []
-        for key, node in found:
+        numbers: list[int] = []
+        for key, node in matching(self.data, pattern) if pattern else ():
+            if not self.affords(node, span):
+                break
             self.found[key] = node
             number = self.child(self.repairs.step(node, len(self.paths)), ".".join(key), parent)
             read = self.nodes[number]
@@ -159,6 +173,17 @@ class _Reader:
                 self.nodes[number] = replace(read, held=key)
             numbers.append(number)
         return numbers
+
+    def affords(self, node: TreeNode, span: Span) -> bool:
+        """Return whether a node in the data may be read once more; the first that may not is a finding."""
+        if self.budget.left < 0:
+            return False
+        self.budget.left -= count(node)
+        if self.budget.left >= 0:
+            return True
+        message = f"the nodes that each 'run' may get have more than {HELD_VALUES:,} values together"
+        self.add(TOO_MUCH.at(span, message, help="write 'run' once, in a mission of its own, or hold fewer nodes"))
+        return False
 
     def outputs(self, node: TreeNode | None) -> dict[str, Asked]:
         """Read the outputs: a map from names to expressions."""

@@ -39,7 +39,7 @@ class Nodes(Protocol):
         """Note the item of a loop over the value of an expression."""
         ...
 
-    def held(self, expression: Expression, parent: int) -> list[int]:
+    def held(self, expression: Expression, parent: int, span: Span) -> list[int]:
         """Read the nodes in the data that an expression may yield, below `parent`, and return their numbers."""
         ...
 

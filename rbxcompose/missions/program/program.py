@@ -70,6 +70,10 @@ class RobotNames:
     unread: frozenset[str] = frozenset()
     removed: Mapping[str, Span] = field(default_factory=dict)
     is_complete: bool = True
+    ends: dict[str, Outcomes] = field(init=False, compare=False, repr=False, default_factory=dict)
+    """How its missions may end, as far as that was asked: one that many others use is examined once."""
+    claims: dict[str, frozenset[str]] = field(init=False, compare=False, repr=False, default_factory=dict)
+    """What its missions claim, as far as that was asked."""
 
 
 @dataclass(frozen=True, slots=True)
