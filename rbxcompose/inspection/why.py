@@ -17,7 +17,7 @@ from rbxcompose.inspection.paths import found_at, is_known, no_such_path, path_o
 from rbxcompose.inspection.port import why_port
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, key_span
 from rbxcompose.missions.engine.value_text import show as show_value
-from rbxcompose.missions.program.program import Input
+from rbxcompose.missions.program.data import Input
 from rbxcompose.model.robot import Robot
 from rbxcompose.printable import plain
 from rbxcompose.schema.documents import installed_schema

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from rbxcompose.composition.robot_file import read_mission
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.findings import Report
-from rbxcompose.missions.analysis.held_nodes import HeldBudget
 from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.inputs import bind_inputs
+from rbxcompose.missions.language.budget import Budget
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.model.robot import RobotMission
 
@@ -35,7 +35,7 @@ def read_missions(
     `skills` are the names of all existing skills.
     """
     found: dict[str, RobotMission] = {}
-    budget = HeldBudget()
+    budget = Budget()
     for name, entry in manifest.missions.items():
         root = read_mission(
             entry.path,

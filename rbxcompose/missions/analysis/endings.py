@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from itertools import takewhile
 
+from rbxcompose.missions.analysis.facts import Constants, constants_of
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, FAILS, SUCCEEDS, Outcomes
 from rbxcompose.missions.program.program import END, MissionNode, Program, RobotNames
 
@@ -16,6 +18,11 @@ class Ending:
         self.robot = robot
         self.within = within  # missions that are being examined
         self._known: dict[int, Outcomes] = {}
+
+    @cached_property
+    def constants(self) -> Constants:
+        """Return the data that nothing changes."""
+        return constants_of(self.program, {})
 
     def of(self, number: int, /) -> Outcomes:
         """Return how a node may end, its modifiers included."""

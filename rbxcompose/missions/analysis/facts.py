@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from rbxcompose.config import Place
 from rbxcompose.expressions.tree import (
@@ -81,8 +81,18 @@ def items_of(node: MissionNode, constants: Constants, places: Mapping[str, Place
         found = [place_of(item, constants, places) for item in items]
     else:
         listed = constants.get(items.tree.name) if isinstance(items.tree, Variable) else None
-        found = [places.get(str(text)) for text in listed] if isinstance(listed, list | tuple) else [None]
+        found = _known_places(listed, places) if isinstance(listed, list | tuple) else [None]
     return [place for place in found if place] if all(found) else None
+
+
+def _known_places(listed: Iterable[Value], places: Mapping[str, Place]) -> list[Place | None]:
+    """Return the places of a list, up to the first item that is none."""
+    found: list[Place | None] = []
+    for text in listed:
+        found.append(places.get(str(text)))
+        if found[-1] is None:
+            break
+    return found
 
 
 def never_skipped(program: Program, node: MissionNode) -> bool:
@@ -105,7 +115,7 @@ def is_sure(node: MissionNode, program: Program) -> bool:
     """Return whether a node reads only what exists from the start, in ways that cannot fail."""
     read = {name.name for asked in node.asked for name in asked.expression.names}
     others = read - program.inputs.keys() - program.data.keys()
-    if others and not others <= {one.item for one in program.nodes}:
+    if not others <= program.items:
         return False
     parts = (part for asked in node.asked for part, _ in walk(asked.expression.tree))
     return not any(isinstance(part, Index | FieldAccess) or _divides(part) for part in parts)

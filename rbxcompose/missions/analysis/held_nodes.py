@@ -11,16 +11,8 @@ from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, Tree
 
 ANY = None  # matches any entry of a list or a map
 ITEM = ""  # matches any item of a list in a loop; over a map, a loop iterates over the keys
-HELD_VALUES = 5_000  # of nodes in the data of a robot's missions, counted for each `run` that may get them
 NodeKey = tuple[str, ...]  # where a node is in the data: ("chores", "kitchen", "0")
 PathPattern = tuple[str | None, ...]
-
-
-@dataclass(slots=True)
-class HeldBudget:
-    """How many values of nodes in the data may still be read: each `run` has its own copy of all that it may get."""
-
-    left: int = HELD_VALUES
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,8 @@ Each `use` has its own nodes. Twenty thousand nodes, and missions within sixteen
 more is usually a mistake, such as missions that use two others each, which use two others each.
 
 Each `run` has its own copy of all nodes in the data that it may get. With every copy counted, the missions of a robot
-may have 5,000 values in such nodes.
+may have 5,000 values and operators in such nodes. All their texts together may have 30,000 names and operators, such
+as `$battery` and `<`.
 
 Use a mission in a loop instead of many times.
 """,

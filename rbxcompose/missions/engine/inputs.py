@@ -14,7 +14,8 @@ from rbxcompose.manifest.tree import NOWHERE, Entry, ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.header import range_trouble
 from rbxcompose.missions.language.literals import WrongValue, typed
-from rbxcompose.missions.program.program import Datum, Input, Program
+from rbxcompose.missions.program.data import Datum, Input
+from rbxcompose.missions.program.program import Program
 
 
 def bind_texts(

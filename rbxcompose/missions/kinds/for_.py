@@ -12,7 +12,6 @@ from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression, FieldAccess, Index, Variable
 from rbxcompose.expressions.types import TEXT, UNKNOWN, Type, TypeKind
 from rbxcompose.expressions.values import NOT_ARRIVED, Located, NotArrivedError, Value
-from rbxcompose.missions.analysis.facts import constants_of
 from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.engine.data_edits import without
 from rbxcompose.missions.engine.scopes import ItemScope
@@ -24,7 +23,7 @@ from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.moments import NO_EFFECTS, NodeEffects
 from rbxcompose.missions.program.outcomes import ANY as ANYHOW
 from rbxcompose.missions.program.outcomes import Outcomes
-from rbxcompose.missions.program.program import NOTHING, Endings, MissionNode, Program, Target
+from rbxcompose.missions.program.program import NOTHING, Endings, MissionNode, Target
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.results import NodeFailed
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
@@ -206,16 +205,16 @@ class ForStep(Loop):
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it fails if its body fails or its list cannot be read."""
-        if self.order == NEAREST or self.removes_done or not node.children or not self._is_read(endings.program):
+        if self.order == NEAREST or self.removes_done or not node.children or not self._is_read(endings):
             return ANYHOW
         return Outcomes(fails=endings.of(node.children[0]).plain.fails)
 
-    def _is_read(self, program: Program) -> bool:
+    def _is_read(self, endings: Endings) -> bool:
         """Return whether its list can always be read."""
         if isinstance(self.items, tuple):
             return not any(item.names for item in self.items)
         written = self.items.tree.name if isinstance(self.items.tree, Variable) else ""
-        return isinstance(constants_of(program, {}).get(written), list | tuple | Mapping)
+        return isinstance(endings.constants.get(written), list | tuple | Mapping)
 
     def endless(self, ends: Outcomes) -> None:
         """Return no advice: every list has an end."""

@@ -11,7 +11,8 @@ from rbxcompose.missions import codes
 from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.language.literals import WrongValue, literal, typed
 from rbxcompose.missions.language.names import NAME, no_name
-from rbxcompose.missions.program.program import RATE, Datum, Input
+from rbxcompose.missions.program.data import Datum, Input
+from rbxcompose.missions.program.program import RATE
 from rbxcompose.missions.program.registry import kinds
 
 INPUT_KEYS = ("type", "default", "min", "max", "choices", "about")

@@ -19,7 +19,7 @@ from rbxcompose.expressions.values import Value
 from rbxcompose.findings import suggest
 from rbxcompose.manifest.scalars import describe, plain_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
-from rbxcompose.missions.program.program import Datum
+from rbxcompose.missions.program.data import Datum
 from rbxcompose.units import NUMBER, Quantity, UnitError, parse_quantity, to_si
 
 

@@ -8,19 +8,12 @@ from dataclasses import replace
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Finding, Related, Report, Span
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, count
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.analysis.held_nodes import (
-    HELD_VALUES,
-    ITEM,
-    HeldBudget,
-    PathPattern,
-    matching,
-    pattern_of,
-    with_held,
-)
+from rbxcompose.missions.analysis.held_nodes import ITEM, PathPattern, matching, pattern_of, with_held
 from rbxcompose.missions.analysis.uses import TOO_MUCH
 from rbxcompose.missions.language.asked import Asked
+from rbxcompose.missions.language.budget import MOST_HELD, MOST_WRITTEN, Budget
 from rbxcompose.missions.language.grammar import LEVELS, Takes, long_form
 from rbxcompose.missions.language.header import read_data, read_inputs, read_rate
 from rbxcompose.missions.language.keys import find_key
@@ -40,7 +33,7 @@ INTERRUPT_KEYS = ("when", "do", "afterwards")
 
 
 def read_program(
-    root: MappingNode, report: Report, skills: Collection[str] = (), budget: HeldBudget | None = None
+    root: MappingNode, report: Report, skills: Collection[str] = (), budget: Budget | None = None
 ) -> Program | None:
     """Return the program of a mission file, None if it has no body; `skills` are the robot's, if known.
 
@@ -48,6 +41,9 @@ def read_program(
     Parts that could not be read are missing from the program, so that the rest can be checked; it may run only if the
     report has no errors.
     """
+    budget = budget or Budget()
+    if _is_too_much(root, budget, report):
+        return None
     repairs = Repairs.of(report, skills)
     whole, root = root, repairs.mission(root)
     for name, entry in root.entries.items():
@@ -56,7 +52,7 @@ def read_program(
             report.add(
                 codes.UNKNOWN_KEY.misspelt(entry.key.span, message, name, KEYS, "keys of a mission", taken=root.entries)
             )
-    reader = _Reader(report, root, repairs, budget or HeldBudget())
+    reader = _Reader(report, root, repairs, budget)
     inputs, data = read_inputs(root.get("inputs"), report), read_data(root.get("data"), report)
     body = _body(root, report)
     if body is None:
@@ -77,6 +73,16 @@ def read_program(
         reader.outputs(root.get("outputs")),
         root=whole,
     )
+
+
+def _is_too_much(root: MappingNode, budget: Budget, report: Report) -> bool:
+    """Return whether a mission has more text than may still be read; the first one is a finding."""
+    was_left = budget.written >= 0
+    found = budget.unaffordable(root)
+    if found and was_left:
+        message = f"the texts of this robot's missions have more than {MOST_WRITTEN:,} names and operators together"
+        report.add(TOO_MUCH.at(found.span, message))
+    return found is not None
 
 
 def _body(root: MappingNode, report: Report) -> TreeNode | None:
@@ -102,7 +108,7 @@ def _text(root: MappingNode, key: str) -> str:
 class _Reader:
     """Numbers the nodes in the order of the text, and keeps track of its position."""
 
-    def __init__(self, report: Report, root: MappingNode, repairs: Repairs, budget: HeldBudget) -> None:
+    def __init__(self, report: Report, root: MappingNode, repairs: Repairs, budget: Budget) -> None:
         self.report = report
         self.repairs = repairs
         self.budget = budget
@@ -176,13 +182,12 @@ class _Reader:
 
     def affords(self, node: TreeNode, span: Span) -> bool:
         """Return whether a node in the data may be read once more; the first that may not is a finding."""
-        if self.budget.left < 0:
-            return False
-        self.budget.left -= count(node)
-        if self.budget.left >= 0:
+        was_left = self.budget.held >= 0
+        if self.budget.affords_held(node):
             return True
-        message = f"the nodes that each 'run' may get have more than {HELD_VALUES:,} values together"
-        self.add(TOO_MUCH.at(span, message, help="write 'run' once, in a mission of its own, or hold fewer nodes"))
+        if was_left:
+            message = f"the nodes that each 'run' may get have more than {MOST_HELD:,} values and operators together"
+            self.add(TOO_MUCH.at(span, message, help="write 'run' once, in a mission of its own, or hold fewer nodes"))
         return False
 
     def outputs(self, node: TreeNode | None) -> dict[str, Asked]:

@@ -21,6 +21,7 @@ from rbxcompose.missions.language.asked import Asked, WrittenArgument
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.answers import Advice, Counted, NodeFlow, Skipped
 from rbxcompose.missions.program.branches import BranchChoice, Branches
+from rbxcompose.missions.program.data import Datum, Input
 from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.machines import MachineStates, Next
 from rbxcompose.missions.program.modifier import Modifier
@@ -76,32 +77,16 @@ class RobotNames:
     """What its missions claim, as far as that was asked."""
 
 
-@dataclass(frozen=True, slots=True)
-class Datum:
-    """A value as written: in SI, with its type and span."""
-
-    value: Value
-    type: Type
-    span: Span
-
-
-@dataclass(frozen=True, slots=True)
-class Input:
-    """A typed argument of a mission; without a default it must be given."""
-
-    name: str
-    type: Type
-    span: Span
-    default: Datum | None = None
-    least: float | None = None
-    most: float | None = None
-
-
 class Endings(Protocol):
     """An analyser of how the nodes of a mission may end."""
 
     program: Program
     robot: RobotNames
+
+    @property
+    def constants(self) -> Mapping[str, Value]:
+        """Return the data that nothing changes."""
+        ...
 
     def of(self, number: int, /) -> Outcomes:
         """Return how a node may end, its modifiers included."""
@@ -387,6 +372,11 @@ class Program:
     def saved(self) -> frozenset[str]:
         """Return the names under which results are saved."""
         return frozenset(node.saved.text for node in self.nodes if node.saved)
+
+    @cached_property
+    def items(self) -> frozenset[str]:
+        """Return the names that loops give to their items."""
+        return frozenset(node.item for node in self.nodes)
 
     @cached_property
     def reads(self) -> frozenset[str]:
