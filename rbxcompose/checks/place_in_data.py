@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from rbxcompose.check_runner import check
 from rbxcompose.expressions.tree import ExpressionError, Variable
 from rbxcompose.expressions.types import TypeKind
+from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Finding, Related, Span, suggest
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, at
 from rbxcompose.missions.analysis.effects import replaced, written
@@ -48,21 +49,28 @@ def place_in_data(robot: Robot) -> Iterator[Finding]:
     places = robot.manifest.places
     for mission in robot.missions.values():
         program, known = mission.program, {**_shortened(mission.program), **constants(mission)}
+        wrong = {name: _without(value, places) for name, value in known.items() if name in program.data}
         for node, name in _goals(robot, program):
-            for text, datum in _texts(program, node, name, known):
-                if text not in places and datum in program.data:
-                    yield place_in_data.at(
-                        _place_of(program, datum, text),
-                        f"there is no place '{text}', which '{node.skill}' gets from '${name}'",
-                        help=suggest(text, places, "places of this robot"),
-                        related=[Related(node.span, "used here")],
-                    )
+            for text, datum in _texts(program, node, name, wrong):
+                yield place_in_data.at(
+                    _place_of(program, datum, text),
+                    f"there is no place '{text}', which '{node.skill}' gets from '${name}'",
+                    help=suggest(text, places, "places of this robot"),
+                    related=[Related(node.span, "used here")],
+                )
 
 
 def _shortened(program: Program) -> Constants:
     """Return the data that only ever lose items: what remains of them was there from the start."""
     names = (written(program) & program.data.keys()) - replaced(program)
     return {name: program.data[name].value for name in names}
+
+
+def _without(value: Value, places: Collection[str]) -> Value:
+    """Return the texts of a datum that are no places: a list is read once, however many loops are over it."""
+    if isinstance(value, list | tuple | dict):
+        return [text for text in value if isinstance(text, str) and text not in places]
+    return value if isinstance(value, str) and value not in places else None
 
 
 def _place_of(program: Program, datum: str, text: str) -> Span:

@@ -28,6 +28,20 @@ robots do not need; it is an extra: `pip install 'rbxcompose[graph]'`. `--format
 """,
 )
 
+TOO_TANGLED = kind(
+    "RBX9014",
+    """A machine has too many transitions for a picture
+
+Graphviz would take minutes to place the states of a machine with hundreds of transitions that lead back and across, and
+nobody could follow the lines. `--format text`, `--format dot` and `--format mermaid` show such a mission nevertheless.
+
+Bad: `rbxcompose mission show patrol robots/turtlebot --format html` with 200 states that each lead to two others
+
+Good: `rbxcompose mission show patrol robots/turtlebot --format text`
+""",
+)
+MOST_EFFORT = 25_000  # takes about a second
+
 Edge = tuple[str, str]
 
 
@@ -69,6 +83,11 @@ class Layout:
     groups: Mapping[str, Rect]
     width: float
     height: float
+
+
+def effort(items: int, edges: int) -> int:
+    """Return about how hard a picture is to lay out: it grows with its size, and with the edges that no tree has."""
+    return (items + edges) * max(1, edges - items)
 
 
 def lay_out(items: Sequence[LayoutItem], edges: Sequence[Edge]) -> Layout:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from rbxcompose.inspection.layout import Layout, LayoutItem, lay_out
+from rbxcompose.inspection.layout import MOST_EFFORT, TOO_TANGLED, Layout, LayoutItem, NotDrawnError, effort, lay_out
 from rbxcompose.inspection.mission_style import STYLE
 from rbxcompose.inspection.mission_text import MARKS, status_of
 from rbxcompose.missions.program.look import Form
@@ -18,7 +18,14 @@ _BOX, _PILL = 34.0, 22.0  # heights [px]
 
 
 def mission_html(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
-    """Return the HTML of the page, light or dark as the reader has set it, with the status of each node if known."""
+    """Return the HTML of the page, light or dark as the reader has set it, with the status of each node if known.
+
+    Raises:
+        NotDrawnError: if Graphviz is not installed, or would take too long.
+    """
+    if sum(_effort(one) for root in picture.roots for one in root.all()) > MOST_EFFORT:
+        message = f"mission '{picture.name}' has too many transitions for a picture"
+        raise NotDrawnError(TOO_TANGLED.at(None, message, help="use '--format text', 'dot' or 'mermaid'"))
     return "".join(f"{line}\n" for line in _page(picture, statuses))
 
 
@@ -72,6 +79,15 @@ def _head(drawn: Drawn, status: int, is_live: bool) -> str:
         f'<span class="lead">{escape(one.outcome or "then")} → {escape(one.to)}</span>' for one in drawn.arrows
     )
     return f'<div class="head">{mark}{name}{sign}{kind}{text}{start}{notes}{leads}</div>'
+
+
+def _effort(drawn: Drawn) -> int:
+    """Return how hard the diagram of a machine is to lay out; 0 for every other node."""
+    if drawn.form != Form.MACHINE:
+        return 0
+    joined = {(state.name, arrow.to) for state in drawn.children for arrow in state.arrows}
+    names = {*(state.name for state in drawn.children), *(to for _, to in joined)}
+    return effort(len(names) + len(joined), 2 * len(joined))
 
 
 def _states(machine: Drawn, statuses: Sequence[int]) -> Iterator[str]:

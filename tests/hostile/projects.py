@@ -89,6 +89,11 @@ def many(count: int, text: str) -> dict[str, str | bytes]:
     return {**robot(included(*(f"../../parts/p{n}.yaml" for n in range(count)))), **parts}
 
 
+def compared(number: int) -> str:
+    """Return a condition of 990 characters, another one for each number."""
+    return " or ".join(f"$battery > {number + n / 100:.2f} %" for n in range(43))
+
+
 def strangers(count: int) -> str:
     """Return many names that are nearly, but not quite, those that exist."""
     components = "".join(f"  battery_{n}: {{type: battery_sim, runtime: 45 s}}\n" for n in range(count))
@@ -264,6 +269,47 @@ PROJECTS: dict[str, Project] = {
             **robot("include:\n" + "".join(f"  p{n}: ../../parts/p.yaml\n" for n in range(100))),
             "parts/p.yaml": "rbx: 1\nkind: Part\nname: p\nplaces:\n"
             + "".join(f"  q{n}: {{x: 1 m, y: 1 m}}\n" for n in range(900)),
+        },
+    ),
+    "100 missions that each use all later ones": Project(
+        "RBX4147",
+        {
+            **robot("missions:\n" + "".join(f"  m{n}: ../../missions/m{n}.yaml\n" for n in range(100))),
+            **{
+                f"missions/m{n}.yaml": f"rbx: 1\nkind: Mission\nname: m{n}\ndo:\n"
+                + "".join(f"  - use: m{m}\n" for m in range(n + 1, 100))
+                + "  - wait: 1 s\n"
+                for n in range(100)
+            },
+        },
+    ),
+    "3,000 stored nodes run in 1,400 places": Project(
+        "RBX4147",
+        mission(
+            "data:\n  chores:\n"
+            + "    - wait: 1 s\n" * 3_000
+            + "do:\n"
+            + "  - {for: c, in: $chores, do: {run: $c}}\n" * 1_400
+        ),
+    ),
+    "stored nodes that run all stored nodes": Project(
+        "RBX4147", mission("data:\n  a:\n" + "    - {for: d, in: $a, do: {run: $d}}\n" * 300 + "do: {run: '$a[0]'}\n")
+    ),
+    "1,900 conditions of 990 characters": Project(
+        "RBX4147", mission("do:\n" + "".join(f"  - check: {compared(n)}\n" for n in range(1_900)))
+    ),
+    "30 texts with 7,000 names each": Project("RBX4147", mission("do:\n" + f"  - log: {'$battery ' * 7_000}\n" * 30)),
+    "2,000 loops over 8,900 places": Project(
+        "RBX4102",
+        {
+            **mission(
+                "data:\n  l: ["
+                + "home, " * 8_900
+                + "]\ndo:\n"
+                + "  - {for: c, in: $l, do: {go_to: $c}}\n" * 2_000
+                + "  - fly\n"
+            ),
+            **robot(DRIVING),
         },
     ),
     "1,100 components": Project(

@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+from rbxcompose.inspection.layout import NotDrawnError
 from rbxcompose.inspection.mission_graphs import mission_dot, mission_mermaid
 from rbxcompose.inspection.mission_html import mission_html
 from rbxcompose.inspection.mission_text import mission_lines, mission_text
@@ -121,3 +122,25 @@ def test_the_page_is_well_formed_and_loads_nothing() -> None:
     tags.feed(mission_html(tour(), STATUSES))
     assert (tags.loads, tags.open) == ([], [])
     assert "<b>enough" not in mission_html(tour()).replace('<b class="', "")
+
+
+def machine(count: int) -> MissionPicture:
+    """Return the picture of a machine whose states each lead to the next and to another one."""
+    rows = "".join(
+        f"    s{n}: {{do: {{go_to: dock}}, next: {{success: s{(n + 1) % count}, failure: s{7 * n % count}}}}}\n"
+        for n in range(count)
+    )
+    return picture_of(program_of(f"name: web\nmachine:\n  start: s0\n  states:\n{rows}"), RobotNames())
+
+
+def test_a_machine_that_nobody_could_follow_is_not_laid_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rbxcompose.inspection.mission_html.lay_out", None)
+    with pytest.raises(NotDrawnError, match="mission 'web' has too many transitions for a picture") as caught:
+        mission_html(machine(200))
+    assert caught.value.finding.code == "RBX9014"
+    assert "s199" in mission_text(machine(200))
+    assert "s199" in mission_dot(machine(200))
+
+
+def test_a_machine_of_30_states_is_laid_out() -> None:
+    assert "s29" in mission_html(machine(30))

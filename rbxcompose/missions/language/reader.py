@@ -221,8 +221,9 @@ class _Reader:
         step = (kind or all_kinds()[SKILL]).read(reader)
         own, read = len(reader.asked), {}
         is_state = kind is not None and kind.is_inner
+        written = reader.mapping.entries.keys()
         for key, cls in modifiers().items():
-            if any(reader.has(one) for one in (key, *cls.keys)) and (is_state or not cls.only_states):
+            if not written.isdisjoint((key, *cls.keys)) and (is_state or not cls.only_states):
                 read[key] = cls.read(reader, key)
         return program.MissionNode(
             number=reader.number,
@@ -271,7 +272,10 @@ class _Reader:
             return ()
         read = [self.interrupt(name, entry) for name, entry in node.entries.items()]
         # A restart may name a node in the reaction of a later interrupt, which it may cut short: all are read by now.
-        return tuple(replace(one, targets=self.targets(one.restarts)) for one in read if one)
+        targets = self.targets()
+        return tuple(
+            replace(one, targets=targets.get(one.restarts.text, ()) if one.restarts else ()) for one in read if one
+        )
 
     def interrupt(self, name: str, entry: Entry) -> Interrupt | None:
         """Read `when`, `do` and `afterwards`."""
@@ -306,11 +310,10 @@ class _Reader:
         inner = reader.inside(value, (RESTART,), "'afterwards'")
         return RESTART, inner.scalar(RESTART, "the name of a step, a state or a loop's item")
 
-    def targets(self, named: ScalarNode | None) -> tuple[Target, ...]:
-        """Return all nodes, states and loops over an item that have this name; nothing without a name."""
-        if named is None:
-            return ()
-        nodes = [node for node in self.nodes if node]
-        return tuple(
-            Target(node.number, node.item == named.text) for node in nodes if named.text in (node.name, node.item)
-        )
+    def targets(self) -> dict[str, tuple[Target, ...]]:
+        """Return all nodes, states and loops over an item by their names."""
+        found: dict[str, list[Target]] = {}
+        for node in (node for node in self.nodes if node):
+            for name in dict.fromkeys((node.name, node.item)):
+                found.setdefault(name, []).append(Target(node.number, node.item == name))
+        return {name: tuple(targets) for name, targets in found.items() if name}
