@@ -19,7 +19,7 @@ from rbxcompose.geometry import Transform3
 Trimesh = Any  # of an extra, which may be missing
 
 NOT_DRAWN = kind(
-    "RBX9014",
+    "RBX9042",
     """The libraries for pictures are not installed
 
 Pictures of a body are made by trimesh, embreex and Pillow. Robots do not need them; they are an extra.

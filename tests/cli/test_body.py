@@ -60,4 +60,4 @@ def test_wrong_input_is_told(
     assert "must be a number" in told(capsys, "picture", ROBOT, "--joint", "head_pan_joint=up", code=2)
     assert "cannot be written" in told(capsys, "expand", ROBOT, "--out", str(tmp_path / "no/file"), code=2)
     monkeypatch.setattr(picture, "find_spec", lambda name: None)
-    assert "RBX9014" in told(capsys, "picture", ROBOT, "--out", str(tmp_path / "c.png"), code=1)
+    assert "RBX9042" in told(capsys, "picture", ROBOT, "--out", str(tmp_path / "c.png"), code=1)
