@@ -23,6 +23,7 @@ from rbxcompose.mission_tests.junit import junit
 from rbxcompose.mission_tests.reader import TrialReader, WrittenTrial
 from rbxcompose.mission_tests.report import FileOutcome, Teller, as_json, coverage_text
 from rbxcompose.mission_tests.runner import run_trial
+from rbxcompose.printable import plain
 
 HERE = Path("missions")
 
@@ -43,10 +44,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Read, run and judge the tests, and report the results."""
     for path in arguments.paths:
         if not path.exists():
-            return misused("test", f"there is no '{path}'")
+            return misused("test", f"there is no '{plain(str(path))}'")
     files = tests_of(arguments.paths)
     if not files:
-        return misused("test", f"no tests ('kind: Test') in {', '.join(map(str, arguments.paths))}")
+        return misused("test", f"no tests ('kind: Test') in {plain(', '.join(map(str, arguments.paths)))}")
     reading, coverage, teller = TrialReader(os.environ), Coverage(), Teller(has_colour(sys.stdout))
     outcomes: list[FileOutcome] = []
     unreadable = Report()
@@ -64,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
             _tell(outcome, teller, arguments.verbose)
     tell_report(_findings(reading, outcomes) if outcomes else unreadable, reading.sources)
     if not outcomes:
-        return misused("test", f"no test has '{arguments.filter}' in its name")
+        return misused("test", f"no test has '{plain(arguments.filter)}' in its name")
     _finish(outcomes, coverage, teller, arguments)
     return 0 if all(one.passed for one in outcomes) else FINDINGS
 

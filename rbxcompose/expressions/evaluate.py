@@ -36,10 +36,10 @@ from rbxcompose.expressions.values import (
     MOST_LEVELS,
     NOT_ARRIVED,
     EvaluationError,
-    NamedPose,
     NotArrivedError,
     Scope,
     Value,
+    is_named_pose,
     is_number,
     is_same,
 )
@@ -273,7 +273,7 @@ def _part(node: FieldAccess | Index) -> Evaluate:
 
 
 def _entry(whole: Value, key: Value, node: FieldAccess | Index) -> Value:
-    if not isinstance(key, str) and isinstance(key, NamedPose):
+    if not isinstance(key, str) and is_named_pose(key):
         key = key.name
     if isinstance(whole, Mapping):
         if isinstance(key, str) and key in whole:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from rbxcompose.expressions.values import MOST_ITEMS, Located, Value
+from rbxcompose.expressions.values import MOST_ITEMS, Value, is_located
 from rbxcompose.units import MOST
 
 
@@ -51,7 +51,7 @@ def _count(value: Value) -> float:
 
 
 def _distance(one: Value, other: Value) -> float:
-    if not (isinstance(one, Located) and isinstance(other, Located)):
+    if not (is_located(one) and is_located(other)):
         raise ValueError("needs two places or poses")
     return math.hypot(one.x - other.x, one.y - other.y)
 

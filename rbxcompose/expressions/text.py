@@ -11,7 +11,7 @@ from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.parser import parse
 from rbxcompose.expressions.tokens import NAME
 from rbxcompose.expressions.tree import Expression, ExpressionError, Reference
-from rbxcompose.expressions.values import LONGEST_TEXT, EvaluationError, Located, NamedPose, Scope, Value
+from rbxcompose.expressions.values import LONGEST_TEXT, EvaluationError, Scope, Value, is_located, is_named_pose
 from rbxcompose.units import format_number
 
 Show: TypeAlias = Callable[[str, Value], str]
@@ -106,8 +106,8 @@ def show_value(name: str, value: Value) -> str:
         return ", ".join(f"{key}: {show_value(name, each)}" for key, each in value.items())
     if isinstance(value, list | tuple):
         return ", ".join(show_value(name, each) for each in value)
-    if isinstance(value, NamedPose):
+    if is_named_pose(value):
         return value.name.replace("_", " ")
-    if isinstance(value, Located):
+    if is_located(value):
         return f"({format_number(value.x)} m, {format_number(value.y)} m)"
     return str(value)

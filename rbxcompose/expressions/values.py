@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import Final, Protocol, TypeAlias, runtime_checkable
+from typing import Final, Protocol, TypeAlias, TypeGuard, runtime_checkable
 
 LONGEST_TEXT = 4096  # characters
 MOST_ITEMS = 1000  # in a list or a map
@@ -54,6 +54,26 @@ class NamedPose(Located, Protocol):
         ...
 
 
+_LOCATED: dict[type, bool] = {}
+_NAMED: dict[type, bool] = {}
+
+
+def is_located(value: Value) -> TypeGuard[Located]:
+    """Return whether a value has a position; decided once for each class, since asking a protocol takes long."""
+    known = _LOCATED.get(type(value))
+    if known is None:
+        known = _LOCATED[type(value)] = isinstance(value, Located)
+    return known
+
+
+def is_named_pose(value: Value) -> TypeGuard[NamedPose]:
+    """Return whether a value is a place; decided once for each class, like `is_located`."""
+    known = _NAMED.get(type(value))
+    if known is None:
+        known = _NAMED[type(value)] = isinstance(value, NamedPose)
+    return known
+
+
 class Scope(Protocol):
     """What is known while the robot runs."""
 
@@ -101,5 +121,5 @@ def is_same(one: Value, other: Value) -> bool:
     """Return whether two values are equal; a text equals the place of that name, and a flag equals no number."""
     if isinstance(one, str) != isinstance(other, str):
         text, thing = (one, other) if isinstance(one, str) else (other, one)
-        return isinstance(thing, NamedPose) and thing.name == text
+        return is_named_pose(thing) and thing.name == text
     return isinstance(one, bool) == isinstance(other, bool) and one == other

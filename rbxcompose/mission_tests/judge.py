@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from bisect import bisect_left
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from rbxcompose.expressions.types import Type
-from rbxcompose.expressions.values import NOT_ARRIVED
+from rbxcompose.expressions.values import NOT_ARRIVED, Value
 from rbxcompose.findings import Span
 from rbxcompose.mission_tests.model import RUNS, Expectations, ExpectedStep
 from rbxcompose.mission_tests.record import Done, TrialRecord
@@ -15,6 +18,10 @@ from rbxcompose.missions.engine.value_text import show
 from rbxcompose.units import format_number
 
 ON_TIME = 0.01  # [s] by which the start of a step may differ from its `at`
+MOST_MISSING = 50  # steps that are told
+MOST_COMPARED = 500_000  # pairs of something expected and something that happened
+
+C = TypeVar("C")
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,15 +35,56 @@ class UnmetExpectation:
 
 def judge(expect: Expectations, record: TrialRecord, types: Mapping[str, Type]) -> list[UnmetExpectation]:
     """Return the unmet expectations, none for a test that passed; `types` are those of the data."""
-    return [
+    effort = _Effort()
+    problems = [
         *_ending(expect, record),
-        *_steps(expect.steps, record),
-        *_never(expect.never, record),
+        *_steps(expect.steps, record, effort),
+        *_never(expect.never, record, effort),
         *_counts(expect, record),
         *_data(expect, record, types),
-        *_published(expect, record),
-        *_reports(expect, record),
+        *_published(expect, record, effort),
+        *_reports(expect, record, effort),
     ]
+    if effort.left < 0:
+        problems.append(UnmetExpectation("there is too much to compare: not all that is expected was", None))
+    return problems
+
+
+class _Effort:
+    """Counts comparisons: what is expected is compared with what happened, and there may be much of both."""
+
+    def __init__(self) -> None:
+        self.left = MOST_COMPARED
+
+    def of(self, candidates: Iterable[C]) -> Iterator[C]:
+        """Yield candidates as long as there are comparisons left."""
+        for one in candidates:
+            self.left -= 1
+            if self.left < 0:
+                return
+            yield one
+
+
+class _StepsByName:
+    """The steps that ran: those of a name before and after a place among all."""
+
+    def __init__(self, steps: Sequence[Done]) -> None:
+        self._steps = steps
+        self._places: dict[str, list[int]] = {}
+        for place, step in enumerate(steps):
+            self._places.setdefault(step.name, []).append(place)
+
+    def after(self, name: str, behind: int) -> Iterator[tuple[int, Done]]:
+        """Yield the steps of this name from a place on, with their places."""
+        places = self._places.get(name, [])
+        for index in range(bisect_left(places, behind), len(places)):
+            yield places[index], self._steps[places[index]]
+
+    def before(self, name: str, behind: int) -> Iterator[Done]:
+        """Yield the steps of this name before a place, the last one first."""
+        places = self._places.get(name, [])
+        for index in reversed(range(bisect_left(places, behind))):
+            yield self._steps[places[index]]
 
 
 def _ending(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpectation]:
@@ -62,18 +110,26 @@ def _how(outcome: str) -> str:
     return "is still running" if outcome == RUNS else f"ended with {outcome}"
 
 
-def _steps(expected: Sequence[ExpectedStep], record: TrialRecord) -> Iterator[UnmetExpectation]:
+def _steps(expected: Sequence[ExpectedStep], record: TrialRecord, effort: _Effort) -> Iterator[UnmetExpectation]:
     """Search each step after the previous one, even if that one is missing."""
-    behind = 0
+    behind, missing = 0, 0
+    done = _StepsByName(record.steps)
     for step in expected:
-        found = next((i for i in range(behind, len(record.steps)) if is_it(step, record.steps[i])), None)
-        if found is None:
-            line = record.steps[behind - 1].line if behind else -1
-            yield UnmetExpectation(
-                f"expected {_written(step)}: {_nearest(step, record.steps, behind)}", step.span, line
-            )
-        else:
+        found = next((i for i, one in effort.of(done.after(step.name, behind)) if is_it(step, one)), None)
+        if effort.left < 0:
+            return
+        if found is not None:
             behind = found + 1
+            continue
+        missing += 1
+        if missing > MOST_MISSING:
+            continue
+        line = record.steps[behind - 1].line if behind else -1
+        last = record.steps[behind - 1] if behind else None
+        near = _nearest(step, done.after(step.name, behind), done.before(step.name, behind), last)
+        yield UnmetExpectation(f"expected {_written(step)}: {near}", step.span, line)
+    if missing > MOST_MISSING:
+        yield UnmetExpectation(f"{missing - MOST_MISSING:,} more of the expected steps are missing")
 
 
 def is_it(step: ExpectedStep, done: Done) -> bool:
@@ -94,20 +150,20 @@ def _differences(step: ExpectedStep, done: Done) -> list[str]:
     return found
 
 
-def _nearest(step: ExpectedStep, done: Sequence[Done], behind: int) -> str:
+def _nearest(step: ExpectedStep, later: Iterable[tuple[int, Done]], before: Iterable[Done], last: Done | None) -> str:
     """Return in words what comes nearest to a missing step: the same call first, then a similar one.
 
-    The same call earlier counts more than a later call with other arguments.
+    The same call earlier counts more than a later call with other arguments. `last` is the latest expected step.
     """
-    earlier = [one for one in done[:behind] if is_it(step, one)]
-    later = [(one, _differences(step, one)) for one in done[behind:] if one.name == step.name]
-    near, differences = min(later, key=lambda pair: ("" in pair[1], len(pair[1])), default=(None, []))
+    earlier = next((one for one in before if is_it(step, one)), None)
+    pairs = ((one, _differences(step, one)) for _, one in later)
+    near, differences = min(pairs, key=lambda pair: ("" in pair[1], len(pair[1])), default=(None, []))
     if near and not (earlier and "" in differences):
         told = [one for one in differences if one and not one.startswith("started")]
         return f"the nearest is {near.text} at {at(near.began)}" + "".join(f", which {one}" for one in told)
     if earlier:
-        return f"it was done only earlier, at {at(earlier[-1].began)}"
-    return "it never started" if not behind else f"it did not start after {done[behind - 1].text}"
+        return f"it was done only earlier, at {at(earlier.began)}"
+    return f"it did not start after {last.text}" if last else "it never started"
 
 
 def _written(step: ExpectedStep) -> str:
@@ -115,9 +171,10 @@ def _written(step: ExpectedStep) -> str:
     return f"{step.text}{ended}" + (f", at {at(step.at)}" if step.at is not None else "")
 
 
-def _never(never: Sequence[ExpectedStep], record: TrialRecord) -> Iterator[UnmetExpectation]:
+def _never(never: Sequence[ExpectedStep], record: TrialRecord, effort: _Effort) -> Iterator[UnmetExpectation]:
+    steps = _StepsByName(record.steps)
     for step in never:
-        done = next((one for one in record.steps if is_it(step, one)), None)
+        done = next((one for _, one in effort.of(steps.after(step.name, 0)) if is_it(step, one)), None)
         if done:
             yield UnmetExpectation(
                 f"{_written(step)} must never be done, but was at {at(done.began)}", step.span, done.line
@@ -125,10 +182,10 @@ def _never(never: Sequence[ExpectedStep], record: TrialRecord) -> Iterator[Unmet
 
 
 def _counts(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpectation]:
+    counts = Counter(step.name for step in record.steps)
     for one in expect.count:
-        count = sum(step.name == one.name for step in record.steps)
-        if count != one.value:
-            yield UnmetExpectation(f"expected {_times(one.name, one.value)}, counted {count}", one.span)
+        if counts[one.name] != one.value:
+            yield UnmetExpectation(f"expected {_times(one.name, one.value)}, counted {counts[one.name]}", one.span)
 
 
 def _times(name: str, count: object) -> str:
@@ -143,23 +200,33 @@ def _data(expect: Expectations, record: TrialRecord, types: Mapping[str, Type]) 
             yield UnmetExpectation(f"expected {one.name} to be {show(kind, one.value)}, {told}", one.span)
 
 
-def _published(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpectation]:
+def _published(expect: Expectations, record: TrialRecord, effort: _Effort) -> Iterator[UnmetExpectation]:
     behind = 0
+    by_topic: dict[str, list[tuple[int, Mapping[str, Value]]]] = {}
+    for place, (topic, fields) in enumerate(record.published):
+        by_topic.setdefault(topic, []).append((place, fields))
     for sent in expect.published:
-        rest = enumerate(record.published[behind:], behind)
-        fits = (i for i, (topic, fields) in rest if topic == sent.topic and agrees(sent.fields, fields))
+        all_sent = by_topic.get(sent.topic, [])
+        rest = range(bisect_left(all_sent, behind, key=lambda one: one[0]), len(all_sent))
+        fits = (all_sent[index][0] for index in effort.of(rest) if agrees(sent.fields, all_sent[index][1]))
         found = next(fits, None)
+        if effort.left < 0:
+            return
         if found is None:
-            others = [show(None, fields) for topic, fields in record.published if topic == sent.topic]
-            told = f"; on it were: {', '.join(others[:3])}" if others else "; nothing was published on it"
+            others = [show(None, fields) for _, fields in all_sent[:3]]
+            told = f"; on it were: {', '.join(others)}" if others else "; nothing was published on it"
             yield UnmetExpectation(f"expected {show(None, sent.fields)} on {sent.topic}{told}", sent.span)
         else:
             behind = found + 1
 
 
-def _reports(expect: Expectations, record: TrialRecord) -> Iterator[UnmetExpectation]:
+def _reports(expect: Expectations, record: TrialRecord, effort: _Effort) -> Iterator[UnmetExpectation]:
+    texts = list(dict.fromkeys(record.reports))
     for one in expect.reports:
-        if not any(one.name in text for text in record.reports):
+        is_there = any(one.name in text for text in effort.of(texts))
+        if effort.left < 0:
+            return
+        if not is_there:
             yield UnmetExpectation(f"nothing that was logged or reported contains '{one.name}'", one.span)
 
 

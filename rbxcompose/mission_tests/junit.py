@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from rbxcompose.mission_tests.report import FileOutcome, Teller
-
-_NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+from rbxcompose.printable import FORBIDDEN
 
 
 def junit(outcomes: Sequence[FileOutcome]) -> str:
@@ -44,5 +42,5 @@ def _add(case: ElementTree.Element, tag: str, message: str, text: str) -> None:
 
 
 def _fit(text: str) -> str:
-    """Return a text without characters that XML cannot hold."""
-    return _NOT_IN_XML.sub("?", text)
+    """Return a text without characters that XML cannot hold, or that would change how a reader of it shows the text."""
+    return FORBIDDEN.sub("?", text)

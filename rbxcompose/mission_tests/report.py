@@ -55,7 +55,7 @@ class Teller:
         """Return the one line on a test."""
         word = self.paint("pass", "passed") if one.passed else self.paint("fail", "FAILED")
         times = f"{one.took * 1e3:.0f} ms" + (f", {one.robot_time:.1f} s of robot time" if one.verdict else "")
-        return f"{word}  {one.name or '?'}  {self.paint('time', f'({one.file}, {times})')}"
+        return f"{word}  {plain(one.name) or '?'}  {self.paint('time', f'({plain(one.file)}, {times})')}"
 
     def trace(self, verdict: Verdict) -> str:
         """Return the trace, with each problem after the line that it concerns."""
@@ -82,7 +82,7 @@ class Teller:
         return f"  {self.paint('time', f'{line.time:9.2f}')}  {told}"
 
     def _problem(self, problem: UnmetExpectation) -> str:
-        where = f"  [{problem.span.file}:{problem.span.line}]" if problem.span else ""
+        where = f"  [{plain(problem.span.file)}:{problem.span.line}]" if problem.span else ""
         return f"  {self.paint('fail', f'{MARK:>9}  {plain(problem.message)}')}{where}"
 
     def summary(self, outcomes: Sequence[FileOutcome], coverage: Coverage) -> str:
@@ -112,8 +112,8 @@ def coverage_text(coverage: Coverage) -> str:
     for mission in sorted({way.mission for way in coverage.ways}):
         ways = [way for way in coverage.ways if way.mission == mission]
         missing = [way for way in coverage.missing if way.mission == mission]
-        lines.append(f"{mission}: {len(ways) - len(missing)} of {len(ways)} paths taken")
-        lines += [f"  {way.span.file}:{way.span.line}  {way.text}" for way in missing]
+        lines.append(f"{plain(mission)}: {len(ways) - len(missing)} of {len(ways)} paths taken")
+        lines += [f"  {plain(way.span.file)}:{way.span.line}  {plain(way.text)}" for way in missing]
     return "\n".join(lines)
 
 

@@ -8,7 +8,7 @@ from rbxcompose.config import Place
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.text import fill, parse_template
 from rbxcompose.expressions.types import POSE, UNKNOWN, Type, TypeKind
-from rbxcompose.expressions.values import NamedPose, NotArrived, Value, is_number, is_same
+from rbxcompose.expressions.values import NotArrived, Value, is_named_pose, is_number, is_same
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.mission_tests import codes
@@ -90,7 +90,7 @@ def _placed(value: Value, robot: RobotNames) -> Value:
 
 
 def _word(value: Value) -> Value:
-    return value.name if isinstance(value, NamedPose) else value
+    return value.name if is_named_pose(value) else value
 
 
 def read_value(node: TreeNode, wanted: Type, robot: RobotNames, what: str) -> tuple[Value, list[Finding]]:

@@ -17,6 +17,8 @@ from rbxcompose.missions.program.statuses import IDLE, RUNNING
 
 MOST_INSTANTS = 100_000  # instants at which something happens
 MOST_STEPS = 5000
+MOST_LINES = 50_000  # of the trace
+MOST_WORK = 600_000  # nodes that are started or continued
 
 
 class TrialStage:
@@ -85,8 +87,8 @@ class TrialStage:
             self._instant()
             if self.engine.status not in (IDLE, RUNNING) or self.record.trouble:
                 break
-            if len(self.record.steps) > MOST_STEPS:
-                self.record.trouble = f"did not end: {MOST_STEPS} steps within {self.now:.0f} s"
+            if excess := self._excess():
+                self.record.trouble = f"did not end: {excess} within {self.now:.0f} s{self._unwaiting()}"
                 break
             upcoming = self._next()
             if upcoming is None or upcoming > (LONGEST_TEST if until is None else until) + ROUNDING:
@@ -98,6 +100,18 @@ class TrialStage:
         self.record.late = len(self.events)
         self.record.data = dict(self.engine.data)
         return self.record
+
+    def _excess(self) -> str:
+        """Return what there is too much of, in words; counted, so that a test ends the same way on every computer."""
+        if len(self.record.steps) > MOST_STEPS:
+            return f"{MOST_STEPS} steps"
+        if len(self.record.lines) > MOST_LINES:
+            return f"{MOST_LINES:,} lines of the trace"
+        return f"{MOST_WORK:,} nodes started or continued" if self.engine.work > MOST_WORK else ""
+
+    def _unwaiting(self) -> str:
+        """Return the outermost loop that does not wait, in words."""
+        return f": {min(self.engine.named, key=len)} does not wait" if self.engine.named else ""
 
     def _leave(self, until: float | None, upcoming: float | None) -> None:
         if until is not None:

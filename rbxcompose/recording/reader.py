@@ -11,6 +11,7 @@ from typing import IO
 import lz4.frame
 import zstandard
 from mcap.exceptions import EndOfFile, McapError
+from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Schema
 from mcap.stream_reader import StreamReader
 
@@ -22,6 +23,7 @@ LARGEST = 64 * 1024 * 1024  # bytes of a record, and of an unpacked chunk
 # No recording compresses better than this. A file that does was made to take memory and time.
 _MOST_PACKED = 1000  # unpacked bytes per byte of the file, beyond `LARGEST`
 _MOST_MESSAGES = 100_000  # beyond one per byte of the file: each differs from the one before in its time at least
+_RECORD = struct.Struct("<BQ")  # what a record begins with: its kind and its length
 _MAGIC = b"\x89MCAP0\r\n"
 
 # Besides their own errors, the readers of MCAP and of its compressions raise these for invalid bytes.
@@ -61,20 +63,24 @@ class RecordingReader:
         self._schemas: dict[int, tuple[str, str]] = {}  # name and definition
         self._channels: dict[int, RecordedTopic] = {}
         self._unpacked = 0  # [bytes] so far
-        self._count = 0  # of messages so far
+        self._count = 0  # of messages so far, and of other records in chunks
 
     def messages(self) -> Iterator[Recorded]:
         """Yield the messages in the order of the file, until it ends or becomes invalid."""
         try:
-            for record in self._reader.records:
-                if isinstance(record, Chunk):
-                    yield from self._messages_of(self._records_of(record))
-                else:
-                    yield from self._messages_of([record])
+            yield from self._messages_of(self._records())
         except _BROKEN as error:
             # A truncated file gives many kinds of error: numbers that are too short, chunks that do not unpack.
             is_cut = not isinstance(error, _BombError) and not self._file.read(1)
             self.damage = "it ends in the middle" if is_cut else f"a part makes no sense ({plain(str(error), 100)})"
+
+    def _records(self) -> Iterator[McapRecord]:
+        """Yield the records of the file, and of its chunks instead of these."""
+        for record in self._reader.records:
+            if isinstance(record, Chunk):
+                yield from self._records_of(record)
+            else:
+                yield record
 
     def _records_of(self, chunk: Chunk) -> Iterator[McapRecord]:
         """Yield the records of a chunk one by one: they would take several times its memory."""
@@ -84,12 +90,31 @@ class RecordingReader:
             raise _BombError("it unpacks to more than a recording would")
         if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
             raise ValueError("the checksum of a chunk is wrong")
+        self._count_others(data)
         stream = io.BytesIO(data)
         try:
-            yield from StreamReader(stream, skip_magic=True, record_size_limit=LARGEST).records
+            for record in StreamReader(stream, skip_magic=True, emit_chunks=True, record_size_limit=LARGEST).records:
+                if isinstance(record, Chunk):
+                    raise ValueError("a chunk holds another one")
+                yield record
         except EndOfFile:
             if stream.tell() < len(data):
                 raise
+
+    def _count_others(self, data: bytes) -> None:
+        """Count the records of a chunk that are no messages: the reader of MCAP skips those of unknown kinds itself."""
+        most, size, place = self._most(), len(data), 0
+        while place + _RECORD.size <= size:
+            opcode, length = _RECORD.unpack_from(data, place)
+            place += _RECORD.size + length
+            if opcode != Opcode.MESSAGE:
+                self._count += 1
+                if self._count > most:
+                    raise _BombError("it holds more records than a recording would")
+
+    def _most(self) -> int:
+        """Return how many messages and other records the part of the file read so far may hold."""
+        return _MOST_MESSAGES + self._file.tell()
 
     def _messages_of(self, records: Iterable[McapRecord]) -> Iterator[Recorded]:
         for record in records:
@@ -103,7 +128,7 @@ class RecordingReader:
                 if record.channel_id not in self._channels:
                     raise ValueError("a message of an unknown channel")
                 self._count += 1
-                if self._count > _MOST_MESSAGES + self._file.tell():
+                if self._count > self._most():
                     raise _BombError("it holds more messages than a recording would")
                 yield Recorded(
                     self._channels[record.channel_id],

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.cli import main as command
+from rbxcompose.cli.missions import replay as replaying
 from rbxcompose.executive.requests import ReadLog
 from rbxcompose.testing import Bench, check_file
 
@@ -79,3 +80,40 @@ def test_what_is_no_log_of_the_robot_is_told(
 ) -> None:
     log.write_text(text)
     assert words in told(capsys, code=1)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "words"),
+    [
+        ("time", "x", "'time' is not a time in seconds"),
+        ("results", 5, "'results' is not a list"),
+        ("results", [[1, {"Place": {"name": 1}}]], "a value of the type 'Place' has the fields name, x, y, heading"),
+        ("read", [], "'read' is not a map"),
+        ("read", {"value battery": {"Wrong": {}}}, "a value cannot be a map with the key 'Wrong'"),
+    ],
+)
+def test_a_wrong_field_is_told_with_its_line(
+    field: str, value: object, words: str, log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = log.read_text().splitlines()
+    at = next(number for number, line in enumerate(lines) if '"tick"' in line)
+    lines[at] = json.dumps({**json.loads(lines[at]), field: value})
+    log.write_text("\n".join(lines))
+    text = told(capsys, code=1)
+    assert f"cannot be replayed: {words}" in text
+    assert f"--> work.log:{at + 1}:1" in text
+
+
+@pytest.mark.parametrize(
+    ("limit", "words"), [("_MOST_RUNS", "has more than 0 runs"), ("_MOST_VALUES", "it holds more than 0 values")]
+)
+def test_a_log_beyond_the_limits_is_refused(
+    limit: str, words: str, log: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(replaying, limit, 0)
+    assert words in told(capsys, code=1)
+
+
+def test_a_record_of_many_levels_is_no_record(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log.write_text(log.read_text() + '{"mission": "work", "run": 1, "event": "a", "x": ' + "[" * 400 + "]" * 400 + "}")
+    assert "is not a log" in told(capsys, code=1)

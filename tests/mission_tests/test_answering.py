@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pytest
+
+from rbxcompose.mission_tests import stage
 from tests.mission_tests.trying import Trying
 
 OPEN = "events:\n  - at: 2 s\n    set:\n      door: false\n"
@@ -158,3 +161,19 @@ def test_one_in_which_no_time_passes_is_told(trying: Trying) -> None:
     text = "with:\n  rounds: 1000000\nmocks:\n  go_to:\n  recharge:\nevents:\n  - at: 0 s\n    set:\n"
     verdict = trying.verdict(f"{text}      battery: 100 %\nexpect:\n  outcome: success\n")
     assert verdict.problems[0].message.startswith("did not end: 5000 steps")
+
+
+@pytest.mark.parametrize("expect", ["outcome: success", "outcome: running\n  for: 1 h"])
+def test_a_loop_that_does_not_wait_ends_after_a_fixed_amount_of_work(trying: Trying, expect: str) -> None:
+    first, second = (trying.verdict(f"expect:\n  {expect}\n", "spinning") for _ in range(2))
+    (problem,) = first.problems
+    assert problem.message.startswith("did not end: 600,000 nodes started or continued within")
+    assert problem.message.endswith(": do.repeat does not wait")
+    assert first.record.now == second.record.now < 600
+
+
+def test_one_that_logs_without_end_is_told(trying: Trying, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stage, "MOST_LINES", 500)
+    verdict = trying.verdict("expect:\n  outcome: success\n", "babbling")
+    assert verdict.problems[0].message.startswith("did not end: 500 lines of the trace within")
+    assert len(verdict.record.lines) < 700

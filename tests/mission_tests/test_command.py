@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -135,3 +136,27 @@ def test_check_takes_a_test(repository: Path, trying: Trying, capsys: pytest.Cap
     trying.read("mocks:\n  go: failure\nexpect:\n  outcome: success\n", "states")
     assert command(["check", str(trying.folder / "tried.test.yaml")]) == 1
     assert "RBX4201" in capsys.readouterr().out
+
+
+def test_what_only_looks_like_a_file_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    os.mkfifo(tmp_path / "pipe.test.yaml")
+    (tmp_path / "zero.test.yaml").symlink_to("/dev/zero")
+    (tmp_path / "loop.test.yaml").symlink_to("loop.test.yaml")
+    (tmp_path / ".#opened.test.yaml").symlink_to("nowhere")  # an editor's mark
+    assert command(["test", str(tmp_path)]) == 1
+    captured = capsys.readouterr()
+    assert captured.err.count("error[RBX1301]") == 3
+    assert "opened" not in captured.out + captured.err
+
+
+def test_nothing_that_a_user_wrote_reaches_the_terminal_raw(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "a.test.yaml").write_text('rbx: 1\nkind: Test\nname: "\\e[31mred"\nrobot: robot.yaml\nmission: m\n')
+    junit = tmp_path / "junit.xml"
+    assert command(["test", str(tmp_path), "--junit", str(junit)]) == 1
+    assert command(["test", str(tmp_path), "--filter", "\x1b[31m"]) == 1
+    assert command(["test", str(tmp_path), "--filter", "\x1b[32m"]) == 2
+    assert command(["test", "\x1b[31m"]) == 2
+    captured = capsys.readouterr()
+    assert "\x1b" not in captured.out + captured.err
+    assert "FAILED  \\x1b[31mred" in captured.out
+    assert "?[31mred" in junit.read_text()

@@ -57,6 +57,20 @@ MISSIONS = {
         do:
           wait_for: $door
     """,
+    "spinning": """
+        do:
+          repeat: forever
+          do:
+            repeat: 10
+            do:
+              check: true
+    """,
+    "babbling": """
+        do:
+          repeat: forever
+          do:
+            log: Again
+    """,
     "posed": """
         do:
           - wait_for: age($pose) < 1 s

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import copy
 import json
+from functools import cache
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rbxcompose.executive.requests import PauseMission, ResumeMission
-from rbxcompose.missions.engine.logbook import INPUTS, ReplayError, replay
+from rbxcompose.missions.engine.log_replay import ReplayBudget, ReplayError, replay
+from rbxcompose.missions.engine.logbook import INPUTS
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.sdk import Outcome
 from tests.executive.fake_robot import Robot
@@ -99,3 +105,63 @@ def test_another_mission_gives_another_trace() -> None:
     assert replay(records, other.programs["test"], other.names) != replay(
         records, robot.mission.config.programs["test"], robot.mission.config.names
     )
+
+
+SCALARS = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.just(10**400)
+KEYS = st.sampled_from(["map", "tuple", "number", "missing", "Place", "Result", "HeldNode", "value battery", "raised"])
+PLAIN = st.recursive(
+    SCALARS,
+    lambda below: st.lists(below, max_size=3) | st.dictionaries(KEYS | st.text(max_size=3), below, max_size=2),
+    max_leaves=6,
+)
+once = cache(recorded)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_a_log_with_anything_changed_is_replayed_or_refused(data: st.DataObject) -> None:
+    robot, log = once()
+    records: list[Any] = copy.deepcopy(log)
+    for _ in range(data.draw(st.integers(1, 3))):
+        change(records, data)
+    with contextlib.suppress(ReplayError):
+        replay(records, robot.mission.config.programs["test"], robot.mission.config.names)
+
+
+def change(records: list[Any], data: st.DataObject) -> None:
+    """Replace, remove or double something: a record that matters, or anything within one."""
+    inputs = [at for at, one in enumerate(records) if isinstance(one, dict) and one.get("event") in list(INPUTS)]
+    place: Any = records
+    key: Any = data.draw(st.sampled_from(inputs or [0]))
+    while isinstance(place[key], dict | list) and place[key] and data.draw(st.booleans() | st.just(True)):
+        place = place[key]
+        key = data.draw(st.sampled_from(list(place) if isinstance(place, dict) else range(len(place))))
+    match data.draw(st.sampled_from(["replace", "remove", "double"])):
+        case "replace":
+            place[key] = data.draw(PLAIN)
+        case "remove" if len(place) > 1:
+            del place[key]
+        case "double" if isinstance(place, list):
+            place.insert(key, copy.deepcopy(place[key]))
+
+
+def test_a_replay_ends_with_its_budget() -> None:
+    robot, records = recorded()
+    names = robot.mission.config.programs["test"], robot.mission.config.names
+    budget = ReplayBudget()
+    replay(records, *names, budget)
+    spent = ReplayBudget().left - budget.left
+    assert spent > len(records)
+    replay(records, *names, ReplayBudget(spent))
+    with pytest.raises(ReplayError, match="too long"):
+        replay(records, *names, ReplayBudget(spent - 1))
+
+
+def test_a_deep_value_is_refused() -> None:
+    robot, records = recorded()
+    deep: Any = []
+    for _ in range(300):
+        deep = [deep]
+    records[0]["inputs"]["low"] = deep
+    with pytest.raises(ReplayError, match="levels"):
+        replay(records, robot.mission.config.programs["test"], robot.mission.config.names)

@@ -20,6 +20,7 @@ from rbxcompose.missions.engine.value_text import show, show_briefly
         ("text", "living_room", "living_room", "living_room"),
         ("place", Place("living_room", 0.0, 0.0, 0.0), "living room", "living room"),
         ("flag", True, "true", "true"),
+        ("ratio", -1e308, "-inf %", "-inf %"),
     ],
 )
 def test_values_have_the_unit_of_their_type(type_name: str, value: Value, whole: str, brief: str) -> None:

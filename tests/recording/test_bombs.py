@@ -78,6 +78,23 @@ def test_more_messages_than_a_recording_of_this_size_has_are_refused(monkeypatch
     assert "it holds more messages than a recording would" in damage
 
 
+def test_more_records_of_unknown_kinds_than_a_recording_of_this_size_has_are_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(reader, "_MOST_MESSAGES", 1000)
+    unknown = b"\x7f" + bytes(8)
+    few = HEAD + channel() + chunk(unknown * 900 + message(0))
+    assert read(few)[0] == 1
+    count, damage = read(few + chunk(unknown * 50_000 + message(0)))
+    assert count == 1
+    assert "it holds more records than a recording would" in damage
+
+
+def test_chunks_within_chunks_are_not_unpacked() -> None:
+    count, damage = read(HEAD + channel() + chunk(message(0) + chunk(message(0) * 1000)) + message(0))
+    assert (count, damage) == (1, "a part makes no sense (a chunk holds another one)")
+
+
 def test_chunks_that_unpack_to_more_than_a_recording_of_this_size_has_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -5,18 +5,23 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from rbxcompose.cli.missions.files import mission_in, robot_of
 from rbxcompose.cli.output.console import FINDINGS, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
-from rbxcompose.findings import kind
-from rbxcompose.missions.engine.logbook import INPUTS, LogRecord, ReplayError, replay
+from rbxcompose.findings import Span, kind
+from rbxcompose.missions.engine.log_replay import OtherMissionError, ReplayBudget, ReplayError, replay
+from rbxcompose.missions.engine.logbook import INPUTS, LogRecord
 from rbxcompose.model.robot import Robot
-from rbxcompose.regular_files import read_regular
+from rbxcompose.regular_files import TooLargeError, read_regular
 
 _LARGEST = 16_000_000  # [B] largest log that is replayed
+_MOST_VALUES = 1_500_000  # in it, as far as they are easily counted
+_MOST_RUNS = 10_000
+_DEEPEST = 200  # levels of lists and maps in a record, which are twice those of the values in it
 _OWN = ("mission", "run")  # keys of a record that identify its run
 
 NO_LOG = kind(
@@ -24,12 +29,22 @@ NO_LOG = kind(
     """The file is not the log of a mission
 
 `rbxcompose mission replay` reads the output of `rbxcompose mission log --all`: one JSON record per line, each run from
-its start. Without `--all` the inputs are missing, and nothing can be run again.
+its start. Without `--all` the inputs are missing, and nothing can be run again. The message names the first record that
+is not as `mission log` writes it. A log has at most 16 MB and 10,000 runs, and takes a limited amount of work to run
+again: replay a part of a longer one.
 
 Bad: `rbxcompose mission log > patrol.log; rbxcompose mission replay patrol.log robots/turtlebot`
 Good: `rbxcompose mission log --all > patrol.log; rbxcompose mission replay patrol.log robots/turtlebot`
 """,
 )
+
+
+@dataclass(slots=True)
+class LoggedRun:
+    """The records of one run of a mission, and the line of each in the file."""
+
+    records: list[LogRecord] = field(default_factory=list)
+    lines: list[int] = field(default_factory=list)
 
 
 def replay_log(arguments: argparse.Namespace) -> int:
@@ -42,43 +57,83 @@ def replay_log(arguments: argparse.Namespace) -> int:
     robot = robot_of(arguments.path)
     if robot is None:
         return FINDINGS
-    differs = False
-    for (name, number), records in runs.items():
-        found = difference(records, name, robot, arguments.log)
+    differs, budget = False, ReplayBudget()
+    for (name, number), run in runs.items():
+        found = difference(run, name, robot, arguments.log, budget)
         differs = differs or bool(found)
-        tell(f"{name}, run {number}: {found or f'the same, {len(records)} records'}")
+        tell(f"{name}, run {number}: {found or f'the same, {len(run.records)} records'}")
     return FINDINGS if differs else 0
 
 
-def runs_in(file: str) -> dict[tuple[str, int], list[LogRecord]]:
+def runs_in(file: str) -> dict[tuple[str, int], LoggedRun]:
     """Return the records of a log by mission and run.
 
     Raises:
         NotDoneError: if it cannot be read.
     """
-    runs: dict[tuple[str, int], list[LogRecord]] = {}
+    runs: dict[tuple[str, int], LoggedRun] = {}
+    number = 0
     try:
-        for line in read_regular(Path(file), _LARGEST).decode("utf-8").splitlines():
+        for number, line in enumerate(_text_of(file).splitlines(), 1):
             record = json.loads(line)
-            runs.setdefault((record["mission"], record["run"]), []).append(record)
+            run = runs.setdefault(_run_of(record, line), LoggedRun())
+            run.records.append(record)
+            run.lines.append(number)
     except OSError as error:
         raise NotDoneError(NO_LOG.at(None, f"'{file}' cannot be read: {error.strerror}")) from error
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
-        raise NotDoneError(NO_LOG.at(None, f"'{file}' is not a log: each line must be a JSON record")) from error
+    except (ValueError, RecursionError) as error:
+        message = f"'{file}' is not a log: each line must be a JSON record of a run"
+        raise NotDoneError(NO_LOG.at(_line(file, number) if number else None, message)) from error
     if not runs:
         raise NotDoneError(NO_LOG.at(None, f"'{file}' is empty"))
+    if len(runs) > _MOST_RUNS:
+        raise NotDoneError(NO_LOG.at(None, f"'{file}' has more than {_MOST_RUNS:,} runs; replay a part of it"))
     return runs
 
 
-def difference(records: Sequence[LogRecord], name: str, robot: Robot, file: str) -> str:
+def _text_of(file: str) -> str:
+    data = read_regular(Path(file), _LARGEST)
+    if data.count(b",") + data.count(b"[") + data.count(b"{") > _MOST_VALUES:
+        raise TooLargeError(0, f"it holds more than {_MOST_VALUES:,} values")
+    return data.decode("utf-8")
+
+
+def _run_of(record: object, line: str) -> tuple[str, int]:
+    """Return which run a record belongs to; raise ValueError if it is no record, or none that a log can have."""
+    if not isinstance(record, dict):
+        raise ValueError("no record")
+    mission, run = record.get("mission"), record.get("run")
+    if type(mission) is not str or type(run) is not int or type(record.get("event")) is not str:
+        raise ValueError("no record")
+    if len(line) > _DEEPEST and line.count("[") + line.count("{") > _DEEPEST and _is_deep(record):
+        raise ValueError("too deep")
+    return mission, run
+
+
+def _is_deep(record: object) -> bool:
+    level: list[Any] = [record]
+    for _ in range(_DEEPEST):
+        maps = (value for one in level if isinstance(one, dict) for value in one.values())
+        level = [*maps, *(value for one in level if isinstance(one, list) for value in one)]
+        if not level:
+            return False
+    return True
+
+
+def _line(file: str, number: int) -> Span:
+    return Span(file, number, 1, number, 1)
+
+
+def difference(run: LoggedRun, name: str, robot: Robot, file: str, budget: ReplayBudget) -> str:
     """Describe the first record that differs now; empty if all are the same."""
-    then = [_told(record) for record in records if record["event"] not in INPUTS]
+    then = [_told(record) for record in run.records if record["event"] not in INPUTS]
     try:
-        again = replay(records, mission_in(robot, name), robot.names)
-    except ReplayError as error:
-        raise NotDoneError(NO_LOG.at(None, f"'{file}' cannot be replayed: {error}")) from error
-    except LookupError:  # a result of a leaf that no longer exists
+        again = replay(run.records, mission_in(robot, name), robot.names, budget)
+    except OtherMissionError:
         return "the log has results of nodes that the mission does not have: it has changed too much to continue"
+    except ReplayError as error:
+        place = _line(file, run.lines[error.record])
+        raise NotDoneError(NO_LOG.at(place, f"'{file}' cannot be replayed: {error}")) from error
     now = [_told(record) for record in json.loads(json.dumps(again))]
     for number in range(max(len(then), len(now))):
         before, after = then[number : number + 1], now[number : number + 1]

@@ -45,6 +45,7 @@ class EngineBase:
         self.places = ResumePoints()
         self.reasons: dict[int, str] = {}  # why each node last failed
         self.draws = 0  # random draws so far
+        self.work = 0  # how often an observed node was started or continued so far
         self.arrived: list[tuple[int, Result]] = []
         self.wake: float | None = None
         self.reading: set[str] = set()

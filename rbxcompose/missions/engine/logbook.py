@@ -2,22 +2,20 @@
 
 Each record is a map for JSON with `time` [s] of robot time, `mission`, `run` (how often the mission has been run), and
 `event`. Inputs are `begin`, `tick` (with the values read and the results that arrived), `pause`, `resume`, `abort`;
-all other records are events of the engine. `replay` gives the same inputs to the same engine again.
+all other records are events of the engine. `log_replay.py` gives the same inputs to the same engine again.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any, TypeVar
 
 from rbxcompose.expressions.values import NotArrived, Value
-from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
-from rbxcompose.missions.engine.snapshot import from_plain, to_plain
+from rbxcompose.missions.engine.snapshot import to_plain
 from rbxcompose.missions.engine.world import Settings, World
-from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.results import Result
 
 BEGIN, TICK, PAUSE, RESUME, ABORT = "begin", "tick", "pause", "resume", "abort"
@@ -117,100 +115,3 @@ class LoggedWorld:
         """Log it and forward it."""
         self._write(record_of(event))
         self._world.say(event)
-
-
-class ReplayError(ValueError):
-    """Raised when records are not the log of a mission from its start."""
-
-
-class Played:
-    """The world of a replay: it returns what was logged, and records the events."""
-
-    def __init__(self) -> None:
-        self.said: list[LogRecord] = []
-        self.time = 0.0
-        self._known: dict[str, Any] = {}
-        self._raised: list[Any] = []
-
-    def now_reads(self, read: Mapping[str, Any]) -> None:
-        """Return these values from now on."""
-        self._raised = list(read.get("raised", ()))
-        self._known.update(read)
-
-    def value(self, name: str, /) -> Any:
-        """Return the logged value."""
-        return from_plain(self._known[f"value {name}"])
-
-    def age(self, name: str, /) -> Any:
-        """Return the logged value."""
-        return from_plain(self._known[f"age {name}"])
-
-    def count(self, name: str, /) -> int:
-        """Return the logged value."""
-        return int(self._known[f"count {name}"])
-
-    def start(self, leaf: int, skill: str, arguments: Mapping[str, Value], /) -> None:
-        """Raise the logged exception again, if there was one."""
-        self._raise(leaf)
-
-    def call(self, leaf: int, service: str, request: Mapping[str, Value], /) -> None:
-        """Raise the logged exception again, if there was one."""
-        self._raise(leaf)
-
-    def publish(self, topic: str, message: Mapping[str, Value], /) -> None:
-        """Raise the logged exception again, if there was one."""
-        self._raise(0)
-
-    def _raise(self, leaf: int) -> None:
-        if self._raised and self._raised[0][0] == leaf:
-            _, name, text = self._raised.pop(0)
-            raise type(name, (Exception,), {})(text)
-
-    def halt(self, leaf: int, /) -> None:
-        """Do nothing: no request is under way."""
-
-    def pause(self, leaf: int, /) -> None:
-        """Do nothing: no request is under way."""
-
-    def resume(self, leaf: int, /) -> None:
-        """Do nothing: no request is under way."""
-
-    def say(self, event: MissionEvent, /) -> None:
-        """Record it."""
-        self.said.append({"time": self.time, **record_of(event)})
-
-
-def replay(records: Iterable[LogRecord], program: Program, robot: RobotNames) -> list[LogRecord]:
-    """Replay a mission from its log and return its events, which are the same as then if nothing was changed.
-
-    Raises:
-        ReplayError: if the records do not begin with the beginning of a run.
-    """
-    world, engine = Played(), None
-    for record in records:
-        what = record["event"]
-        world.time = float(record["time"])
-        world.now_reads(record.get("read", {}))
-        if what == BEGIN:
-            inputs = {name: from_plain(value) for name, value in record["inputs"].items()}
-            start_at = {int(number): state for number, state in record["start_at"].items()}
-            engine = Engine(program, robot, inputs, world, Settings(record["seed"], start_at))
-        elif engine is None:
-            raise ReplayError("the log does not start with the start of the mission")
-        elif what in INPUTS:
-            for leaf, result in record.get("results", ()):
-                engine.ended(leaf, from_plain(result))
-            _again(engine, what, world.time)
-    return world.said
-
-
-def _again(engine: Engine, what: str, now: float) -> None:
-    match what:
-        case "tick":
-            engine.tick(now)
-        case "pause":
-            engine.pause(now)
-        case "resume":
-            engine.resume(now)
-        case "abort":
-            engine.abort(now)

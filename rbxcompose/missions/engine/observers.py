@@ -115,13 +115,18 @@ class Branch(Around):
 
 
 class Observed(Around):
-    """Notifies an observer."""
+    """Notifies an observer, and counts the work: whoever runs an engine with an observer can limit it."""
 
     __slots__ = ("observer",)
 
     def __init__(self, site: Site, options: Observer, inner: Task) -> None:
         super().__init__(site, inner)
         self.observer = options
+
+    def proceed(self) -> int:
+        """Count it, and continue."""
+        self.engine.work += 1
+        return super().proceed()
 
     def started(self) -> None:
         """Report it."""

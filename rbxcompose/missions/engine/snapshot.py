@@ -12,7 +12,7 @@ from dataclasses import fields
 from typing import Any
 
 from rbxcompose.config import Place
-from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
+from rbxcompose.expressions.values import MOST_LEVELS, NOT_ARRIVED, NotArrived, Value
 from rbxcompose.geometry import Pose2
 from rbxcompose.missions.analysis.held_nodes import HeldNode
 from rbxcompose.missions.engine.course import Course
@@ -20,9 +20,21 @@ from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.run import Run
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.program.results import Result
+from rbxcompose.printable import plain as plain_text
 
 VERSION = 2
 _CLASSES: Mapping[str, type[Any]] = {cls.__name__: cls for cls in (Place, Pose2, HeldNode, Result)}
+_NUMBER = (float, int)
+_POSE = {"x": _NUMBER, "y": _NUMBER, "heading": _NUMBER}
+_FIELDS: Mapping[str, Mapping[str, type | tuple[type, ...]]] = {
+    "Place": {"name": str, **_POSE},
+    "Pose2": _POSE,
+    "HeldNode": {"key": tuple, "text": str},
+    "Result": {"success": bool, "message": str, "outcome": str, "values": dict},
+}
+_NUMBERS = ("nan", "inf", "-inf")  # that JSON cannot express
+_LEVELS = MOST_LEVELS + 10  # of a value as plain data: a result holds values, too
+_BITS = 64  # of the largest integer in a message
 _ENGINE = (
     "status",
     "outcome",
@@ -42,6 +54,10 @@ _COURSE = ("lost", "left")
 
 class NoSnapshot(ValueError):  # noqa: N818 - shown to whoever gives the data
     """Raised when data are not a snapshot of this mission."""
+
+
+class NoValue(ValueError):  # noqa: N818 - shown to whoever gives the data
+    """Raised when data are not a value as `to_plain` writes it."""
 
 
 def save(engine: Engine) -> dict[str, Any]:
@@ -147,20 +163,38 @@ def to_plain(value: Value | NotArrived) -> Any:
     return {name: {field.name: to_plain(getattr(made, field.name)) for field in fields(made)}}
 
 
-def from_plain(plain: Any) -> Any:
-    """Return the value that `to_plain` wrote."""
+def from_plain(plain: Any, levels: int = _LEVELS) -> Any:
+    """Return the value that `to_plain` wrote.
+
+    Raises:
+        NoValue: if it did not write this.
+    """
+    if levels < 0:
+        raise NoValue(f"a value has more than {_LEVELS} levels")
     match plain:
-        case {"number": str(text)}:
+        case {"number": str(text)} if text in _NUMBERS:
             return float(text)
         case {"tuple": list(items)}:
-            return tuple(from_plain(item) for item in items)
+            return tuple(from_plain(item, levels - 1) for item in items)
         case {"map": dict(entries)}:
-            return {key: from_plain(entry) for key, entry in entries.items()}
+            return {key: from_plain(entry, levels - 1) for key, entry in entries.items()}
         case {"missing": True}:
             return NOT_ARRIVED
         case dict() if plain:
-            name, entries = next(iter(plain.items()))
-            return _CLASSES[name](**{key: from_plain(entry) for key, entry in entries.items()})
+            return _made(*next(iter(plain.items())), levels)
         case list():
-            return [from_plain(item) for item in plain]
+            return [from_plain(item, levels - 1) for item in plain]
+        case int() if plain.bit_length() > _BITS:
+            raise NoValue("a number is too large")
     return plain
+
+
+def _made(name: str, entries: Any, levels: int) -> Any:
+    """Return the value of a class with these fields."""
+    fits = _FIELDS.get(name)
+    if fits is None or not isinstance(entries, dict):
+        raise NoValue(f"a value cannot be a map with the key '{plain_text(name)}'")
+    values = from_plain({"map": entries}, levels - 1)
+    if values.keys() != fits.keys() or not all(isinstance(values[key], fits[key]) for key in fits):
+        raise NoValue(f"a value of the type '{name}' has the fields {', '.join(fits)}")
+    return _CLASSES[name](**values)

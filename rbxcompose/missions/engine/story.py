@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import assert_never
 
-from rbxcompose.expressions.values import NamedPose, Value
+from rbxcompose.expressions.values import Value, is_named_pose
 from rbxcompose.levels import Level
 from rbxcompose.missions.engine.events import (
     BranchEnded,
@@ -87,7 +87,7 @@ class MissionStory:
         skill = self._skills[name]
         texts = []
         for argument, value in arguments.items():
-            text = value.name if isinstance(value, NamedPose) else show(skill.arguments.get(argument), value)
+            text = value.name if is_named_pose(value) else show(skill.arguments.get(argument), value)
             texts.append(text if argument == skill.main else f"{argument} {text}")
         return texts
 

@@ -36,9 +36,11 @@ def spoken(value: Value, places: Collection[str]) -> Value:
 def show_briefly(type: Type | None, value: Value) -> str:
     """Return a value as text, a number with three digits, or more if there are more before the point: '48.9 %'."""
     text = show(type, value)
-    if not isinstance(value, int | float) or not is_number(value) or not math.isfinite(value):
+    if not isinstance(value, int | float) or not is_number(value):
         return text
     number, space, unit = text.partition(" ")
     written = float(number)
+    if not math.isfinite(written):  # a number may become infinite in its unit
+        return text
     decimals = DIGITS - 1 - math.floor(math.log10(abs(written))) if written else 0
     return f"{format_number(round(written, max(0, decimals)))}{space}{unit}"

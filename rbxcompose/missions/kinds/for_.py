@@ -11,7 +11,7 @@ from rbxcompose.expressions.check import StaticScope, check
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression, FieldAccess, Index, Variable
 from rbxcompose.expressions.types import TEXT, UNKNOWN, Type, TypeKind
-from rbxcompose.expressions.values import NOT_ARRIVED, Located, NotArrivedError, Value
+from rbxcompose.expressions.values import NOT_ARRIVED, Located, NotArrivedError, Value, is_located
 from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.engine.data_edits import without
 from rbxcompose.missions.engine.scopes import ItemScope
@@ -123,14 +123,14 @@ class ForTask(Task):
         pose = self.scope.variable(POSE)
         if pose is NOT_ARRIVED:
             raise NotArrivedError(POSE)
-        if not isinstance(pose, Located):
+        if not is_located(pose):
             raise NodeFailed("'order: nearest' needs to know where the robot is")
         ways = [math.hypot(place.x - pose.x, place.y - pose.y) for place in map(self._place, self.left)]
         return ways.index(min(ways))
 
     def _place(self, item: Value) -> Located:
         found = self.engine.robot.places.get(item) if isinstance(item, str) else item
-        if not isinstance(found, Located):
+        if not is_located(found):
             raise NodeFailed(f"'order: nearest' needs places, not {self.run.show('', item)}")
         return found
 

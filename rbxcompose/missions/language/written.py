@@ -7,7 +7,7 @@ from collections.abc import Callable
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.text import parse_template
 from rbxcompose.expressions.types import Type, TypeKind
-from rbxcompose.expressions.values import NamedPose, Value
+from rbxcompose.expressions.values import Value, is_named_pose
 from rbxcompose.manifest.tree import ScalarNode, TreeNode
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.language.literals import literal
@@ -44,4 +44,4 @@ def place(task: Task, value: Value) -> Value:
 
 def _word(value: Value) -> Value:
     """Return a choice as text, even if a place has the same name."""
-    return value.name if isinstance(value, NamedPose) else value
+    return value.name if is_named_pose(value) else value
