@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from rbxcompose.expressions.values import NOT_ARRIVED, Value, is_number
 from rbxcompose.missions.engine.engine import Engine
@@ -16,9 +16,10 @@ from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.results import Result
 from rbxcompose.units import MOST
 
-MOST_WORK = 1_000_000  # nodes that are started or continued, in all runs of a log
+MOST_WORK = 600_000  # nodes that are started or continued, in all runs of a log: enough for all that a robot keeps
 _WORK_TO_BUILD = 5  # for one node
 _WORK_TO_READ = 2  # for one record
+_NOTHING: Mapping[str, Value] = MappingProxyType({})
 
 
 class ReplayError(ValueError):
@@ -37,16 +38,18 @@ class _WrongRecordError(ValueError):
     """Raised with what is wrong with a record."""
 
 
-@dataclass(frozen=True, slots=True)
-class LoggedCall:
-    """A call of the engine `at` a robot time [s]: what it read, which starts raised, which results had arrived."""
+class LoggedCall(NamedTuple):
+    """A call of the engine `at` a robot time [s]: what it read, which starts raised, which results had arrived.
+
+    A tuple, since a log has many.
+    """
 
     what: str
     at: float
-    read: Mapping[str, Value] = field(default_factory=dict)
+    read: Mapping[str, Value] = _NOTHING
     raised: tuple[tuple[int, str, str], ...] = ()
     results: tuple[tuple[int, Result], ...] = ()
-    inputs: Mapping[str, Value] = field(default_factory=dict)
+    inputs: Mapping[str, Value] = _NOTHING
     settings: Settings = PLAIN
 
 
@@ -76,7 +79,8 @@ class Played:
         """Return these values from now on."""
         self.time = call.at
         self._raised = list(call.raised)
-        self._known.update(call.read)
+        if call.read:
+            self._known.update(call.read)
 
     def value(self, name: str, /) -> Any:
         """Return the logged value."""
@@ -149,16 +153,17 @@ def replay(
         except (_WrongRecordError, NoValue) as error:
             raise ReplayError(str(error), index) from error
         world.now_reads(call)
-        budget.spend(_WORK_TO_READ, index)
+        work = _WORK_TO_READ
         if call.what == BEGIN:
             engine = Engine(program, robot, call.inputs, world, call.settings)
-            budget.spend(_WORK_TO_BUILD * len(engine.statuses), index)
+            work += _WORK_TO_BUILD * len(engine.statuses)
         elif engine is None:
             raise ReplayError("the log does not start with the start of the mission", index)
         elif call.what in INPUTS:
-            work = engine.work
+            before = engine.work
             _again(engine, call, index)
-            budget.spend(engine.work - work, index)
+            work += engine.work - before
+        budget.spend(work, index)
     return world.said
 
 
