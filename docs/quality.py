@@ -31,9 +31,9 @@ examples), `make soak` the numbers in the table. A failure becomes a file that e
   turn, in a random order. What can come back does, and the mission succeeds; otherwise everything ends in order. A
   process outside the robot listens: the base moves by live commands alone, and rests in time after the last one.
   `tests/faults/test_table.py` has a table of faults with the test of each.
-- **Floods** (`tests/faults`): one process sends the base as many messages as it can, none of them a command; others send
-  goals, requests and queries. The patrol continues with the same processes. A flood of liveliness tokens is not held
-  off: each costs Zenoh about as much as many messages, and after a minute it may take the whole machine.
+- **Floods** (`tests/faults`): one process sends the base as many messages as it can, none of them a command; others
+  send goals, requests and queries. The patrol continues with the same processes. A flood of liveliness tokens is not
+  held off: each costs Zenoh about as much as many messages, and after a minute it may take the whole machine.
 - **Attacks on listeners** (`tests/exposure`): finds in the kernel's tables what a running robot listens on, and sends
   nonsense, floods and crowds there.
 - **Fuzzing** (`tests/fuzz`, extra `fuzz`): coverage-guided inputs.

@@ -13,11 +13,14 @@ import resource
 import sys
 import xml.dom.minidom
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, cast
 from xml.dom import expatbuilder
 
 import xacro
 from xacro import substitution_args
+
+from rbxcompose.regular_files import read_regular
 
 SECONDS = 2  # of processor time
 MEMORY = 256_000_000  # [bytes] of address space beyond what it has at its start
@@ -48,13 +51,10 @@ class _Expansion:
         if len(xacro.filestack) > DEPTH:
             raise xacro.XacroException(f"files include each other more than {DEPTH} deep")
         try:
-            with open(path, "rb") as file:
-                data = file.read(FILE + 1)
+            data = read_regular(Path(path), FILE)
         except OSError as error:
             xacro.filestack.pop()
-            raise xacro.XacroException(f"'{filename}' cannot be read: {os.strerror(error.errno or 0)}") from None
-        if len(data) > FILE:
-            raise xacro.XacroException(f"'{filename}' is larger than {FILE:,} bytes")
+            raise xacro.XacroException(f"'{filename}' cannot be read: {error.strerror}") from None
         self.files.append(path)
         builder = _Builder(path)
         try:
@@ -128,8 +128,7 @@ def expand(request: dict[str, Any]) -> dict[str, Any]:
 
 def fence(roots: list[str]) -> None:
     """Limit what this process can use, and refuse what a description has no use for."""
-    with open("/proc/self/statm", "rb") as file:
-        pages = int(file.read().split()[0])
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
     most = pages * resource.getpagesize() + MEMORY
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
@@ -141,7 +140,7 @@ def fence(roots: list[str]) -> None:
     def audit(event: str, arguments: tuple[Any, ...]) -> None:
         if event == "open" and isinstance(arguments[0], str | bytes):
             path = os.path.realpath(os.fsdecode(arguments[0]))
-            is_read = arguments[1] is None or not set(str(arguments[1])) & set("wax+")
+            is_read = not arguments[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND)
             if not (is_read and any(os.path.commonpath([path, root]) == root for root in real)):
                 raise PermissionError("a description may only read files of its project")
         elif event.startswith(_REFUSED):

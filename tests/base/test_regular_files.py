@@ -13,6 +13,7 @@ from rbxcompose.regular_files import NotRegularError, TooLargeError, open_regula
 PACKAGE = Path(rbxcompose.__file__).parent
 # What these open is no file that a user names: the package's own data, what the system tells, files of a running robot.
 MAY_OPEN = {
+    "body/xacro_child.py",
     "cli/main.py",
     "doctor/machine.py",
     "msgs/definitions.py",

@@ -381,10 +381,7 @@ PROJECTS: dict[str, Project] = {
         "RBX3008",
         robot(
             "components:\n"
-            + "".join(
-                f"  c{n}: {{type: battery_sim, runtime: 45 s, starts_after: [c{(n + 1) % 1000}]}}\n"
-                for n in range(1000)
-            )
+            + "".join(f"  c{n}: {{type: go_to, starts_after: [c{(n + 1) % 1000}]}}\n" for n in range(1000))
         ),
     ),
 }
