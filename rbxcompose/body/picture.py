@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rbxcompose.body.model import Body, Geometry, Shape
 from rbxcompose.findings import Finding, kind
 from rbxcompose.geometry import Transform3
+from rbxcompose.printable import plain
 
 Trimesh = Any  # of an extra, which may be missing
 
@@ -36,6 +37,7 @@ _LIGHT = (0.4, -0.75, 1.0)
 _AMBIENT = 0.35
 _FIELD = math.radians(30)  # of view
 _MARGIN = 1.08
+_LARGEST_MESH = 64_000_000  # [bytes]
 _ROUND = 48  # faces around a cylinder
 _NEEDED = ("trimesh", "embreex", "PIL")
 
@@ -55,7 +57,7 @@ def draw(body: Body, positions: Mapping[str, float], meshes: Mapping[str, Path])
 
     Raises:
         NoPictureError: if a library is missing.
-        ValueError: if there is nothing to draw.
+        ValueError: if there is nothing to draw, or a mesh cannot be read.
     """
     missing = [name for name in _NEEDED if find_spec(name) is None]
     if missing:
@@ -114,8 +116,16 @@ def _solid(geometry: Geometry, meshes: Mapping[str, Path]) -> Any:
     path = meshes.get(geometry.file)
     if path is None:
         return None
-    mesh: Any = load_mesh(path)
-    mesh.apply_scale(geometry.size)
+    if path.stat().st_size > _LARGEST_MESH:
+        raise ValueError(f"the mesh '{plain(geometry.file)}' is larger than {_LARGEST_MESH:,} bytes")
+    try:
+        mesh: Any = load_mesh(path)
+        mesh.apply_scale(geometry.size)
+        is_empty = not len(mesh.faces)
+    except Exception as error:  # readers of many formats raise anything
+        raise ValueError(f"the mesh '{plain(geometry.file)}' cannot be read") from error
+    if is_empty:
+        raise ValueError(f"the mesh '{plain(geometry.file)}' has no triangles")
     return mesh
 
 

@@ -9,11 +9,13 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import rbxcompose
 from rbxcompose.body.xml_reader import PLACE, span_of_place
 from rbxcompose.findings import Finding, Span, kind
 from rbxcompose.manifest.files import shown_name
+from rbxcompose.per_compile import once
 from rbxcompose.printable import plain
 
 NOT_EXPANDED = kind(
@@ -71,7 +73,7 @@ def expand(
         "packages": {name: str(folder) for name, folder in packages.items()},
         "roots": [str(root) for root in (*roots, *packages.values())],
     }
-    answer = _answer(request)
+    answer = _answer(json.dumps(request))
     if answer is None:
         message = f"'{plain(shown_name(path))}' does not end within its limits of time and memory"
         return NOT_EXPANDED.at(span, message, help="does a macro call itself?"), ()
@@ -82,12 +84,14 @@ def expand(
     return Expanded(answer["text"]), files
 
 
-def _answer(request: Mapping[str, object]) -> dict[str, str] | None:
+@once  # profiles are tried one after another, and few change the body
+def _answer(request: str) -> dict[str, Any] | None:
+    """Return the child's answer to a request in JSON; None if it does not end within its limits."""
     package = str(Path(rbxcompose.__file__).parents[1])
     try:
         child = subprocess.run(
             [sys.executable, "-E", "-s", "-B", "-c", _RUN, package],
-            input=json.dumps(request),
+            input=request,
             capture_output=True,
             text=True,
             timeout=DEADLINE,
@@ -98,5 +102,5 @@ def _answer(request: Mapping[str, object]) -> dict[str, str] | None:
         return None
     if child.returncode != 0:
         return None
-    answer: dict[str, str] = json.loads(child.stdout)
+    answer: dict[str, Any] = json.loads(child.stdout)
     return answer

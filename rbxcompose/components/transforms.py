@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import AfterValidator
 
 from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.body.urdf import read_body
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.findings import Finding
 from rbxcompose.geometry import Transform3
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -26,6 +29,15 @@ MOVING: dict[str, Port[Any]] = {
 }
 
 
+def _checked(urdf: str) -> str:
+    """Return a URDF; raise ValueError with the first mistake that keeps it from being one."""
+    root = read_urdf(urdf, "urdf") if urdf else None
+    mistakes = [root] if isinstance(root, Finding) else read_body(root)[1] if root is not None else []
+    if mistakes:
+        raise ValueError(mistakes[0].message)
+    return urdf
+
+
 class TransformsConfig(Config):
     """The frames that coincide, and the body."""
 
@@ -33,7 +45,7 @@ class TransformsConfig(Config):
     """Frame of places."""
     odom: str = "odom"
     """Frame of the base's odometry."""
-    urdf: str = ""
+    urdf: Annotated[str, AfterValidator(_checked)] = ""
     """Text of the URDF of a body whose frames it publishes."""
 
 

@@ -117,9 +117,9 @@ def _mesh(name: str, file: Path, packages: Mapping[str, Path]) -> Path | None:
     folder = packages.get(package) if is_packaged else file.parent
     try:
         path = (folder / (inside if is_packaged else name.removeprefix("file://"))).resolve() if folder else None
+        return path if path is not None and path.is_file() else None
     except (OSError, ValueError):  # a name too long for the system, a zero byte
         return None
-    return path if path is not None and path.is_file() else None
 
 
 _Found = tuple[Path, str, str, str]  # the file, its URDF, that with places, and the file's name in findings
@@ -163,12 +163,21 @@ def _packages(reading: Reading[BodyModel], node: TreeNode, read: BodyModel) -> M
     found = {LIBRARY: library_root()}
     for name, written in read.packages.items():
         writer = reading.contents.documents.writer(value_span(node, ("packages", name)), reading.contents.file)
-        folder = (writer.resolve().parent / written).resolve()
-        if not folder.is_dir() or not folder.is_relative_to(project_of(writer)):
+        folder = _folder(written, writer)
+        if folder is None or not folder.is_relative_to(project_of(writer)):
             message = f"the folder of package '{plain(name, 60)}' is not in the project: '{plain(written)}'"
             return UNREADABLE.at(value_span(node, ("packages", name)), message)
         found[name] = folder
     return found
+
+
+def _folder(written: str, writer: Path) -> Path | None:
+    """Return the folder that a manifest names, None if there is none."""
+    try:
+        folder = (writer.resolve().parent / written).resolve()
+        return folder if folder.is_dir() else None
+    except (OSError, ValueError, RuntimeError):  # a name too long for the system, a zero byte, a circle of links
+        return None
 
 
 def _as_text(value: object) -> str:

@@ -42,6 +42,7 @@ WRONG_SECTIONS = {
     "no path": "body: {}\n",
     "a word": "body: cart.urdf\n",
     "both": "body: {urdf: cart.urdf, xacro: cart.urdf}\n",
+    "a package with a name too long for the system": f"body: {{xacro: cart.urdf, packages: {{wheels: {'x' * 300}}}}}\n",
     "a package elsewhere": "body: {xacro: cart.urdf, packages: {wheels: ../../..}}\n",
     "a component of its name": "body: {urdf: cart.urdf}\ncomponents:\n  robot_description: {type: transforms}\n",
 }

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Sequence
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from rbxcompose.body.xacro import Expanded, expand
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.findings import Finding, Span
+from rbxcompose.per_compile import one_compile
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
 HERE = Span("robot.yaml", 5, 10, 5, 20)
@@ -86,6 +89,16 @@ def test_a_mistake_is_a_finding_at_its_place_and_nothing_is_executed(name: str, 
     if line:
         assert found.span.line == line
     assert {path.name for path in tmp_path.iterdir()} == {"r.xacro", "wheel.xacro"}
+
+
+def test_within_one_compile_the_same_file_is_expanded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "r.xacro").write_text(HEAD + "</robot>")
+    run = Mock(wraps=subprocess.run)
+    monkeypatch.setattr(subprocess, "run", run)
+    with one_compile():
+        for height in ("1", "1", "2"):
+            expand(tmp_path / "r.xacro", {"height": height}, {}, [tmp_path], HERE)
+    assert run.call_count == 2
 
 
 def test_what_is_no_xml_is_a_finding_at_its_line(tmp_path: Path) -> None:

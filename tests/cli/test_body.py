@@ -61,3 +61,12 @@ def test_wrong_input_is_told(
     assert "cannot be written" in told(capsys, "expand", ROBOT, "--out", str(tmp_path / "no/file"), code=2)
     monkeypatch.setattr(picture, "find_spec", lambda name: None)
     assert "RBX9042" in told(capsys, "picture", ROBOT, "--out", str(tmp_path / "c.png"), code=1)
+
+
+def test_a_mesh_that_cannot_be_read_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text("rbx: 1\nkind: Robot\nname: r\nbody: {urdf: r.urdf}\n")
+    shape = '<visual><geometry><mesh filename="m.stl"/></geometry></visual>'
+    (tmp_path / "r.urdf").write_text(f'<robot name="r"><link name="a">{shape}</link></robot>')
+    for data in (bytes(range(256)) * 20, b"", b"solid nothing\nendsolid nothing\n"):
+        (tmp_path / "m.stl").write_bytes(data)
+        assert "the mesh 'm.stl'" in told(capsys, "picture", str(tmp_path), "--out", str(tmp_path / "o.png"), code=2)

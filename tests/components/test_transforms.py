@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rbxcompose.components.transforms import body_of
+from rbxcompose.components.transforms import TransformsConfig, body_of
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.qos import Qos
@@ -89,3 +89,9 @@ def test_what_is_no_position_of_a_moving_joint_is_ignored(listener: Listener) ->
 def test_a_body_is_parsed_once_and_a_robot_without_one_has_no_joints() -> None:
     assert body_of(URDF) is body_of(URDF)
     assert not body_of("").moving
+
+
+@pytest.mark.parametrize("urdf", ["<robot", '<robot><link name="a"/><link name="b"/></robot>', "<sdf/>"])
+def test_what_is_no_body_is_refused_when_it_is_configured(urdf: str) -> None:
+    with pytest.raises(ValueError, match=r"XML|connected|root"):
+        TransformsConfig(urdf=urdf)

@@ -16,26 +16,15 @@ from rbxcompose.bus.zenoh_session import open_client
 from rbxcompose.runtime.folder import LOCK, SOCKET
 from rbxcompose.runtime.processes import wait_until_ended
 from tests.exposure.sockets import listeners
-from tests.exposure.test_listeners import NOBODY, answers
+from tests.exposure.test_listeners import NOBODY, answers, running
 from tests.runtime.test_real_processes import Robot, eventually
 
 
 @pytest.fixture(scope="module")
 def robot() -> Iterator[Robot]:
-    """A private robot, which leaves nothing behind but its logs."""
-    base = Path(tempfile.mkdtemp(prefix="rbx"))
-    made = Robot(f"private_{os.getpid()}", base)
-    process = made.up("-d", "--access", "user")
-    output, _ = process.communicate(timeout=30.0)
-    assert process.returncode == 0, output
-    yield made
-    down = made.do("down")
-    left = made.processes()
-    for one in left:
-        one.send_signal(signal.SIGKILL)
-    files = {path.name for path in made.folder.path.iterdir()} - {"log.jsonl", "log.1.jsonl"}
-    shutil.rmtree(base)
-    assert (down.returncode, left, files) == (0, [], set())
+    """A private robot."""
+    with running(f"private_{os.getpid()}", "--access", "user") as made:
+        yield made
 
 
 def test_it_has_no_port_and_its_sockets_lie_in_a_private_folder(robot: Robot) -> None:

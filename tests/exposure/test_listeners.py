@@ -11,6 +11,7 @@ import stat
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -25,20 +26,21 @@ from rbxcompose.runtime.folder import SOCKET, RobotFolder
 from rbxcompose.runtime.requests import RobotStatus
 from tests.exposure.attacks import ON_CONTROL, ON_ROUTER, REQUESTS, sending
 from tests.exposure.sockets import Listener, listeners
-from tests.runtime.test_real_processes import Robot, eventually
+from tests.runtime.test_real_processes import PATIENCE, Robot, eventually
 from tests.soak import Soak
 
 NOBODY = 65534  # uid
 QUICK_ANSWER = 2.0  # [s]
 
 
-@pytest.fixture(scope="module")
-def robot() -> Iterator[Robot]:
-    """A robot that is up for all tests of this module, and leaves nothing behind but its logs."""
+@contextmanager
+def running(name: str, *options: str) -> Iterator[Robot]:
+    """A robot that is up, and leaves nothing behind but its logs."""
     base = Path(tempfile.mkdtemp(prefix="rbx"))
-    made = Robot(f"exposed_{os.getpid()}", base)
-    made.up_detached()
-    port = made.ps()["router"]["endpoint"].rpartition(":")[2]
+    made = Robot(name, base)
+    process = made.up("-d", *options)
+    output, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, output
     yield made
     down = made.do("down")
     left = made.processes()
@@ -46,9 +48,17 @@ def robot() -> Iterator[Robot]:
         one.send_signal(signal.SIGKILL)
     files = {path.name for path in made.folder.path.iterdir()} - {"log.jsonl", "log.1.jsonl"}
     shutil.rmtree(base)
+    assert (down.returncode, left, files) == (0, [], set())
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[Robot]:
+    """A robot that is up for all tests of this module, and whose port is free afterwards."""
+    with running(f"exposed_{os.getpid()}") as made:
+        port = made.ps()["router"]["endpoint"].rpartition(":")[2]
+        yield made
     with socket.socket() as probe:
-        is_port_free = probe.connect_ex(("127.0.0.1", int(port))) != 0
-    assert (down.returncode, left, files, is_port_free) == (0, [], set(), True)
+        assert probe.connect_ex(("127.0.0.1", int(port))) != 0
 
 
 @pytest.fixture(scope="module")
