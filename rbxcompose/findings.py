@@ -138,10 +138,19 @@ class FindingKind:
         """Return a finding about a `name` at `span` that is not in `valid`, with the name that was probably meant.
 
         `what` describes the valid names, which are listed if none is similar; see `correction` for the other arguments.
+        If `valid` holds things with a `span` by their names, the place of that name is told, too.
         """
         names = list(valid)
         fix = correction(name, names, span, taken=taken, within=within)
-        return self.at(span, message, help=suggest(name, names, what), fix=fix)
+        related = _declared(name, valid) if isinstance(valid, Mapping) else ()
+        return self.at(span, message, help=suggest(name, names, what), related=related, fix=fix)
+
+
+def _declared(name: str, valid: Mapping[str, object]) -> Iterator[Related]:
+    """Yield the place of the name that was probably meant."""
+    for near in nearest(name, valid):
+        if isinstance(span := getattr(valid[near], "span", None), Span):
+            yield Related(span, f"'{near}' is declared here")
 
 
 KINDS: dict[str, FindingKind] = {}  # every kind that has been imported, by code

@@ -17,6 +17,8 @@ COMPONENT, PLACE, VALUE, MISSION = "component", "place", "value", "mission"
 ANALYZER, ARGUMENT, INSTANCE = "analyzer", "argument", "instance"
 PORT = "port"
 """A component, or `component.port`."""
+LINK, JOINT = "link", "joint"
+"""A link or a joint of the body."""
 RUNNING = "running"
 """All components: those of the user and those of every robot."""
 TOPIC, FILE, ANYTHING = "topic", "file", "anything"
@@ -79,7 +81,8 @@ class Refers:
         return find
 
     def _unknown(self, name: str, there: Mapping[str, object]) -> PydanticCustomError:
-        context = {"kind": self.kind, "name": name, "valid": list(there), "what": f"{plural(self.kind)} of this robot"}
+        valid = there if self.kind in (LINK, JOINT) else list(there)  # theirs are known, others may be being read
+        context = {"kind": self.kind, "name": name, "valid": valid, "what": f"{plural(self.kind)} of this robot"}
         return PydanticCustomError(self.kind, "there is no {kind} '{name}'", context)
 
 

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 from rbxcompose.atomic_files import replace_file
+from rbxcompose.body.description import Description
 from rbxcompose.body.model import Body
 from rbxcompose.body.picture import NoPictureError, draw
 from rbxcompose.body.text import JOINTS, LINKS, joints_of, links_of, tree_of
@@ -19,7 +20,6 @@ from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import kind
-from rbxcompose.sections.body import Description
 
 USAGE = 2
 NO_BODY = kind(

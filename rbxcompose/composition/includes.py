@@ -191,7 +191,7 @@ class Parts:
             is_own = instance is inside[-1]  # its given values already use the names of the including file
             yield replace(
                 instance,
-                root=renaming.root(instance.root),
+                root=_brought(name, renaming.root(instance.root), written if is_own else None),
                 given=instance.given if is_own else renaming.values(instance.given),
                 claims=tuple(renamed(claim, renaming) for claim in instance.claims),
             )
@@ -201,6 +201,18 @@ class Parts:
             span = connect[topic].key_span
             finding = NO_TOPIC.misspelt(span, message, topic, topics, "its topics", taken=connect)
             self.documents.report.add(finding)
+
+
+def _brought(name: str, root: MappingNode, entry: TreeNode | None) -> MappingNode:
+    """Return the sections of a part as those of the file that includes it; others' were changed when they were."""
+    if entry is None:
+        return root
+    entries = dict(root.entries)
+    for one in sections(PART):
+        there = entries.get(one.name)
+        if (node := one.brought(name, there.value if there else None, entry)) is not None:
+            entries[one.name] = Entry(there.key if there else ScalarNode(one.name, node.span), node)
+    return replace(root, entries=entries)
 
 
 def _instance(name: str, file: _File, opened: _Open, entry: Entry) -> PartInstance:

@@ -28,6 +28,7 @@ class Renaming:
     prefix: str
     connect: dict[str, RenamedTopic]
     own: dict[str, frozenset[str]]  # by section
+    defines: frozenset[str] = frozenset()  # kinds of which all names in the part are its own
     used: set[str] = field(default_factory=set)
 
     @classmethod
@@ -36,7 +37,8 @@ class Renaming:
         trees = list(roots)
         named = [one for one in sections() if one.names and one.is_composed]
         own = {one.name: frozenset(name for root in trees for name in one.names_in(root)) for one in named}
-        return cls(prefix, connect, own)
+        defines = frozenset(kind for one in sections() for kind in one.defines if any(one.name in it for it in trees))
+        return cls(prefix, connect, own, defines)
 
     @property
     def running(self) -> frozenset[str]:
@@ -75,6 +77,8 @@ class Renaming:
             return self.topic(name)
         if kind == ANYTHING:
             return self.any_name(name)
+        if kind in self.defines:
+            return f"{self.prefix}{name}"
         head, dot, rest = name.partition(".") if kind in (PORT, COMPONENT) else (name, "", "")
         for section in naming(COMPONENT if kind == PORT else kind):
             if head in self.own.get(section.name, ()):

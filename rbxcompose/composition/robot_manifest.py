@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
+from rbxcompose.body.description import Description
 from rbxcompose.composition.history import History
 from rbxcompose.composition.inclusions import Inclusions
 from rbxcompose.config import Place
 from rbxcompose.findings import Span
 from rbxcompose.manifest.section import Contents
 from rbxcompose.manifest.tree import MappingNode
-from rbxcompose.sections.body import Description, body
+from rbxcompose.sections.body import body
 from rbxcompose.sections.bus import BusModel, bus
 from rbxcompose.sections.components import ComponentEntry, components
 from rbxcompose.sections.diagnostics import DiagnosticsModel, diagnostics

@@ -65,7 +65,7 @@ def register(made: Section[Any, Any]) -> None:
     ordered = sorted([*_SECTIONS.values(), made], key=lambda one: (one.order, one.name))
     _SECTIONS.clear()
     _SECTIONS.update({one.name: one for one in ordered})
-    if made.entry:
+    if made.entry and not made.at:
         ENTRY_WORDS[made.name] = made.entry
 
 

@@ -112,6 +112,14 @@ class Declaration(Generic[M]):
     topics: Callable[[str, TreeNode], Iterable[str]] = lambda name, node: ()
     """Topics of an entry that `connect:` of an instance may name."""
 
+    brought: Callable[[str, TreeNode | None, TreeNode], TreeNode | None] = lambda instance, node, entry: node
+    """Returns what the section of a part becomes in the file that includes it; it is given the instance, the section,
+    if the part has it, and the entry in `include`."""
+    defines: tuple[str, ...] = ()
+    """Kinds of names that it defines outside the manifest; in a part that has the section, they are the part's own."""
+    defined: Callable[[Any], Mapping[str, Mapping[str, object]]] = lambda read: {}
+    """Returns these names by kind, given what was read; none for a kind that could not be read."""
+
     brings: tuple[str, ...] = ()
     """Names of the components that it adds if it is present."""
     components: Callable[[Contents, Wiring], Iterable[WantedComponent]] = lambda contents, wiring: ()
@@ -204,7 +212,7 @@ class Contents:
         self, root: MappingNode, file: Path, documents: Documents, sections: Iterable[Section[Any, Any]] = ()
     ) -> None:
         self.root, self.file, self.documents = root, file, documents
-        self._naming = [one for one in sections if one.names]
+        self._sections = list(sections)
         self._read: dict[str, object] = {}
 
     def of(self, section: Section[Any, R]) -> R:
@@ -216,8 +224,12 @@ class Contents:
     @cached_property
     def known(self) -> dict[str, Mapping[str, object]]:
         """Return the names of each kind, including entries with mistakes: references to them are not wrong."""
-        kinds = {COMPONENT, *(one.names for one in self._naming)}
-        return {kind: _Names(self, [one for one in self._naming if one.has_names_of(kind)]) for kind in kinds}
+        naming = [one for one in self._sections if one.names]
+        kinds = {COMPONENT, *(one.names for one in naming)}
+        found: dict[str, Mapping[str, object]] = {
+            kind: _Names(self, [one for one in naming if one.has_names_of(kind)]) for kind in kinds
+        }
+        return found | {kind: _Defined(self, one, kind) for one in self._sections for kind in one.defines}
 
 
 class _Names(Mapping[str, object]):
@@ -239,6 +251,30 @@ class _Names(Mapping[str, object]):
 
     def __len__(self) -> int:
         return len(self._section)
+
+
+class _Defined(Mapping[str, object]):
+    """The names of a kind that a section defines outside the manifest; any name, if they could not be read."""
+
+    def __init__(self, contents: Contents, section: Section[Any, Any], kind: str) -> None:
+        self._contents, self._section, self._kind = contents, section, kind
+
+    @property
+    def _there(self) -> Mapping[str, object]:
+        return self._section.defined(self._contents.of(self._section)).get(self._kind, {})
+
+    def __getitem__(self, name: str) -> object:
+        return self._there[name]
+
+    def __contains__(self, name: object) -> bool:
+        read = self._contents.of(self._section)
+        return name in self._there or (read is None and self._section.name in self._contents.root)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._there)
+
+    def __len__(self) -> int:
+        return len(self._there)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,75 +1,121 @@
-"""The section `body`: the file that describes the robot's body."""
+"""The section `body`: the files that describe the robot's body."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field, model_validator
 
-from rbxcompose.body.lint import lint
-from rbxcompose.body.model import Body
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xacro import expand
-from rbxcompose.body.xml_reader import read_urdf
-from rbxcompose.config import Config
+from rbxcompose.body.attachment import PieceAttachment
+from rbxcompose.body.description import BodyPart, Description, describe
+from rbxcompose.body.files import BodyFile
+from rbxcompose.config import Config, Name
 from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.fields import FileName
-from rbxcompose.manifest.files import project_of, resolve, shown_name
-from rbxcompose.manifest.library import library_root
-from rbxcompose.manifest.limits import URDF_BYTES
-from rbxcompose.manifest.reader import UNREADABLE, read_source
+from rbxcompose.manifest.files import project_of, resolve
+from rbxcompose.manifest.reader import UNREADABLE
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import TreeNode, value_span
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, TreeNode, key_span, value_span
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.printable import plain
+from rbxcompose.references import JOINT, LINK
+from rbxcompose.units import Quantity, UnitError, parse_quantity
 
 DESCRIPTION = "robot_description"
 """The component that a robot with a body runs."""
-PACKAGE = "package://"
-LIBRARY = "rbxcompose"  # the package of the shipped library, for `$(find rbxcompose)`
+PIECE, PIECES = "piece", "pieces"
 
 
-class BodyModel(Config):
-    """What the robot looks like and how it moves: a URDF, or a xacro file that expands to one."""
+class BodyFileModel(Config):
+    """A URDF file, or a xacro file that expands to one."""
 
     urdf: FileName | None = None
-    """The URDF file, relative to this one; it is published unchanged on `robot_description`."""
+    """The URDF file, relative to this one."""
     xacro: FileName | None = None
     """The xacro file, relative to this one; its expansion is published."""
     with_: dict[str, Any] = Field({}, alias="with")
-    """Values of the xacro's arguments: texts, flags, and numbers in SI units."""
+    """Values of the xacro's arguments: texts, flags, numbers, and quantities, which it gets in SI units."""
     packages: dict[str, str] = {}
     """Folders by the names of ROS packages, for `$(find NAME)` and `package://NAME`, relative to this file."""
 
     @model_validator(mode="after")
-    def _one_file(self) -> BodyModel:
-        if (self.urdf is None) == (self.xacro is None):
+    def _one_file(self) -> BodyFileModel:
+        if self.urdf is not None and self.xacro is not None:
             raise ValueError("a body has either 'urdf' or 'xacro'")
+        if self.urdf is None and self.xacro is None and (missing := self.lacks_file()):
+            raise ValueError(missing)
         return self
 
+    def lacks_file(self) -> str:
+        """Return what is wrong if there is no file, or nothing."""
+        return "a body needs 'urdf' or 'xacro'"
 
-@dataclass(frozen=True, slots=True)
-class Description:
-    """The description of the robot's body: its file, its URDF as text, and the links and joints in that."""
 
-    path: Path
-    text: str
-    body: Body
-    key: str  # `urdf` or `xacro`
-    meshes: Mapping[str, Path]  # the mesh files that exist, by their names in the URDF
+class PieceModel(BodyFileModel):
+    """A piece of the body: its file, and the link that carries it."""
+
+    attach: PieceAttachment | None = None
+    """The link that carries it, and where; one piece, the base, has none."""
+
+    def lacks_file(self) -> str:
+        """Return what is wrong if there is no file."""
+        return "there is no 'urdf' or 'xacro' to attach" if self.attach else "a piece needs 'urdf' or 'xacro'"
+
+
+class BodyModel(BodyFileModel):
+    """What the robot looks like and how it moves: a file, and further pieces, which are attached to it."""
+
+    pieces: dict[Name, PieceModel] = {}
+    """Further pieces of the body, by the prefix of their links and joints; parts bring theirs."""
+
+    def lacks_file(self) -> str:
+        """Return what is wrong if there is no file; its pieces may be all."""
+        return "" if self.pieces else "a body needs 'urdf' or 'xacro'"
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     """Yield the component that publishes the description."""
     if found := contents.of(body):
-        yield WantedComponent(DESCRIPTION, DESCRIPTION, {"urdf": found.text}, ("body", found.key))
+        yield WantedComponent(DESCRIPTION, DESCRIPTION, {"urdf": found.text}, (body.name,))
 
 
-@section("body", BodyModel, order=30, brings=(DESCRIPTION,), components=_components)
+def _brought(instance: str, own: TreeNode | None, entry: TreeNode) -> TreeNode | None:
+    """Return the body of a part as a piece of the body of the file that includes it."""
+    attach = entry.entries.get("attach") if isinstance(entry, MappingNode) else None
+    if own is None and attach is not None:
+        own = MappingNode({}, attach.key.span)  # a piece without a file, which is told there
+    if not isinstance(own, MappingNode):
+        return own
+    piece = {key: one for key, one in own.entries.items() if key != PIECES} | ({"attach": attach} if attach else {})
+    named = Entry(ScalarNode(instance, entry.span), MappingNode(piece, own.span))
+    there = own.get(PIECES)
+    further = there.entries if isinstance(there, MappingNode) else {}
+    pieces = MappingNode({**({instance: named} if piece else {}), **further}, own.span)
+    return MappingNode({PIECES: Entry(ScalarNode(PIECES, own.span), pieces)}, own.span, own.tag)
+
+
+def _names(read: Description | None) -> Mapping[str, Mapping[str, object]]:
+    return {LINK: read.body.links, JOINT: read.body.joints} if read else {}
+
+
+@section(
+    "body",
+    BodyModel,
+    order=30,
+    names=PIECE,
+    at=(PIECES,),
+    entry="piece",
+    shared=((), (PIECES,)),
+    brings=(DESCRIPTION,),
+    brought=_brought,
+    defines=(LINK, JOINT),
+    defined=_names,
+    components=_components,
+)
 def body(reading: Reading[BodyModel]) -> Description | None:
     """What the robot looks like and how it moves: links and joints, published for viewers and other programs.
 
@@ -80,93 +126,58 @@ def body(reading: Reading[BodyModel]) -> Description | None:
     read, report = reading.whole(), reading.report
     if read is None or reading.node is None:
         return None
-    packages = _packages(reading, reading.node, read)
-    if isinstance(packages, Finding):
-        report.add(packages)
+    parts = [_part(reading, reading.node, (), "", read, None)] if read.urdf or read.xacro else []
+    for name, piece in read.pieces.items():
+        parts.append(_part(reading, reading.node, (PIECES, name), name, piece, piece.attach))
+    if wrong := [one for one in parts if isinstance(one, Finding)]:
+        report.extend(wrong)
         return None
-    found = _urdf(reading, reading.node, read) if read.urdf else _xacro(reading, reading.node, read, packages)
-    if isinstance(found, Finding):
-        report.add(found)
-        return None
-    path, text, located, shown = found
-    root = read_urdf(located, shown)
-    if isinstance(root, Finding):
-        report.add(root)
-        return None
-    made, findings = read_body(root)
+    robot = reading.contents.root.get("name")
+    named = robot.text if isinstance(robot, ScalarNode) else ""
+    usable = [one for one in parts if not isinstance(one, Finding)]
+    found, findings = describe(named, usable, reading.contents.documents.sources)
     report.extend(findings)
-    if findings:
-        return None
-    meshes = _meshes(made, path, packages)
-    report.extend(lint(made, meshes))
-    return Description(path, text, made, "urdf" if read.urdf else "xacro", meshes)
+    return found
 
 
-def _meshes(body: Body, file: Path, packages: Mapping[str, Path]) -> dict[str, Path]:
-    """Return the mesh files that exist, by their names in the URDF; they lie in the project or in a package."""
-    shapes = [shape for link in body.links.values() for shape in (*link.visuals, *link.collisions)]
-    names = {shape.geometry.file for shape in shapes if shape.geometry.kind == "mesh"}
-    roots = [project_of(file), *packages.values()]
-    found = {name: mesh for name in names if (mesh := _mesh(name, file, packages)) is not None}
-    return {name: mesh for name, mesh in found.items() if any(mesh.is_relative_to(root) for root in roots)}
-
-
-def _mesh(name: str, file: Path, packages: Mapping[str, Path]) -> Path | None:
-    package, _, inside = name.removeprefix(PACKAGE).partition("/")
-    is_packaged = name.startswith(PACKAGE)
-    folder = packages.get(package) if is_packaged else file.parent
-    try:
-        path = (folder / (inside if is_packaged else name.removeprefix("file://"))).resolve() if folder else None
-        return path if path is not None and path.is_file() else None
-    except (OSError, ValueError):  # a name too long for the system, a zero byte
-        return None
-
-
-_Found = tuple[Path, str, str, str]  # the file, its URDF, that with places, and the file's name in findings
-
-
-def _file(reading: Reading[BodyModel], node: TreeNode, key: str, written: str) -> tuple[Path, Span, Path] | Finding:
-    """Return the file that a key names, the place of the key's value, and the file that was written in."""
-    span = value_span(node, (key,))
-    writer = reading.contents.documents.writer(span, reading.contents.file)
-    path = resolve(written, writer, span)
-    return path if isinstance(path, Finding) else (path, span, writer)
-
-
-def _urdf(reading: Reading[BodyModel], node: TreeNode, read: BodyModel) -> _Found | Finding:
-    named = _file(reading, node, "urdf", read.urdf or "")
-    if isinstance(named, Finding):
-        return named
-    path, span, _ = named
-    shown = shown_name(path)
-    text, findings = read_source(path, shown, reading.contents.documents.sources, URDF_BYTES, "a URDF file")
-    if text is None or findings:
-        return replace(findings[0], span=findings[0].span or span)
-    return path, text, text, shown
-
-
-def _xacro(
-    reading: Reading[BodyModel], node: TreeNode, read: BodyModel, packages: Mapping[str, Path]
-) -> _Found | Finding:
-    named = _file(reading, node, "xacro", read.xacro or "")
-    if isinstance(named, Finding):
-        return named
-    path, span, _ = named
+def _part(
+    reading: Reading[BodyModel],
+    node: TreeNode,
+    path: KeyPath,
+    name: str,
+    read: BodyFileModel,
+    attach: PieceAttachment | None,
+) -> BodyPart | Finding:
+    """Return a file of the body; relative paths begin at the file that wrote them."""
+    key = "xacro" if read.xacro else "urdf"
+    span = value_span(node, (*path, key))
+    file = resolve(read.xacro or read.urdf or "", _writer(reading, span), span)
+    packages = _packages(reading, node, (*path, "packages"), read)
+    if isinstance(file, Finding):
+        return file
+    if isinstance(packages, Finding):
+        return packages
     arguments = {name: _as_text(value) for name, value in read.with_.items()}
-    expanded, files = expand(path, arguments, packages, [project_of(path), library_root()], span)
-    for file in files:  # so that findings can show their lines
-        read_source(file, shown_name(file), reading.contents.documents.sources, URDF_BYTES, "a xacro file")
-    return expanded if isinstance(expanded, Finding) else (path, expanded.text, expanded.located, shown_name(path))
+    to = value_span(node, (*path, "attach", "to"))
+    place = key_span(node, path) if path else span
+    return BodyPart(name, BodyFile(file, span, key == "xacro", arguments, packages), attach, place, to)
 
 
-def _packages(reading: Reading[BodyModel], node: TreeNode, read: BodyModel) -> Mapping[str, Path] | Finding:
-    found = {LIBRARY: library_root()}
+def _writer(reading: Reading[BodyModel], span: Span) -> Path:
+    return reading.contents.documents.writer(span, reading.contents.file)
+
+
+def _packages(
+    reading: Reading[BodyModel], node: TreeNode, path: KeyPath, read: BodyFileModel
+) -> Mapping[str, Path] | Finding:
+    found = {}
     for name, written in read.packages.items():
-        writer = reading.contents.documents.writer(value_span(node, ("packages", name)), reading.contents.file)
+        span = value_span(node, (*path, name))
+        writer = _writer(reading, span)
         folder = _folder(written, writer)
         if folder is None or not folder.is_relative_to(project_of(writer)):
             message = f"the folder of package '{plain(name, 60)}' is not in the project: '{plain(written)}'"
-            return UNREADABLE.at(value_span(node, ("packages", name)), message)
+            return UNREADABLE.at(span, message)
         found[name] = folder
     return found
 
@@ -181,4 +192,10 @@ def _folder(written: str, writer: Path) -> Path | None:
 
 
 def _as_text(value: object) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    """Return a value as xacro takes it: flags in lower case, quantities in SI units."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str) and value[:1] in "+-.0123456789":
+        with suppress(UnitError):  # a word that begins like a number is a word
+            value = parse_quantity(value)
+    return repr(value.value) if isinstance(value, Quantity) else str(value)

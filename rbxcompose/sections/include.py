@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, SkipValidation
 
+from rbxcompose.body.attachment import PieceAttachment
 from rbxcompose.config import Config, Name
 from rbxcompose.manifest.fields import FileName, TopicName
 from rbxcompose.manifest.registry import section
@@ -27,6 +28,8 @@ class Include(Config):
     """Values of its arguments, by name."""
     connect: dict[TopicName, TopicName] = {}
     """Other names for its topics: those of its ports, of its muxes, and `MUX/INPUT` of a mux's inputs."""
+    attach: Annotated[PieceAttachment | None, SkipValidation] = None  # read as that of the piece, when it is filled in
+    """The link that carries the part's piece of the body, and where; without it, the piece is the base."""
 
 
 @section(

@@ -14,7 +14,7 @@ ROBOT = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
 PATROL = (ROOT / "missions/patrol.yaml").read_text(encoding="utf-8")
 HEADER = "rbx: 1\nkind: Mission\nname: example\n"
 EXAMPLE = f"{HEADER}do: recharge\n"
-URDF = '<robot name="example"/>\n'
+URDF = '<robot name="example"><link name="base_link"/></robot>\n'
 
 WALKED_THROUGH = ("tutorial.md", "missions.md", "sdk.md")  # their manifests need each other, or a package
 

@@ -53,7 +53,7 @@ ABOVE = {
     "sections",
     "compiler": "check_runner composition model plan",
     "components": "body diagnostics executive missions mux.core navigation.go_to sdk sim",
-    "composition": "sections",
+    "composition": "body.description sections",
     "diagnostics": "",
     "doctor": "bus.graph composition model.robot runtime.folder runtime.processes sdk sections",
     "executive": "missions sdk",
