@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandle
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from rbxcompose import units
-from rbxcompose.references import PLACE, Refers
+from rbxcompose.references import JOINT, LINK, PLACE, Refers
 from rbxcompose.units import Dimension, to_si
 
 
@@ -113,3 +113,7 @@ def _secret(value: object) -> Secret:
 
 PlaceName = Annotated[Place, Refers(PLACE)]
 """A field that names one of the robot's `places` and holds the place itself."""
+LinkName = Annotated[str, Refers(LINK)]
+"""A field that names a link of the robot's body."""
+JointName = Annotated[str, Refers(JOINT)]
+"""A field that names a joint of the robot's body."""

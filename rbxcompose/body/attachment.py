@@ -6,12 +6,7 @@ from typing import Annotated
 
 from rbxcompose.config import Angle, Config, Length
 from rbxcompose.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.references import JOINT, LINK, Refers
-
-LinkName = Annotated[str, Refers(LINK)]
-"""A field that names a link of the robot's body."""
-JointName = Annotated[str, Refers(JOINT)]
-"""A field that names a joint of the robot's body."""
+from rbxcompose.references import LINK, Refers
 
 
 class FramePose(Config):

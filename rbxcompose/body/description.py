@@ -19,9 +19,8 @@ from rbxcompose.findings import Finding, Span
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """The body of a robot: its (first) file, its URDF as text, and the links and joints in that."""
+    """The body of a robot: its URDF as text, and the links and joints in that."""
 
-    path: Path
     text: str
     body: Body
     meshes: Mapping[str, Path] = field(default_factory=dict)  # the files that exist, by their names in the URDF
@@ -39,11 +38,12 @@ class BodyPart:
 
 
 def describe(
-    name: str, parts: Sequence[BodyPart], sources: MutableMapping[str, str]
+    name: str, home: Path, parts: Sequence[BodyPart], sources: MutableMapping[str, str]
 ) -> tuple[Description | None, list[Finding]]:
     """Return the body that files make together, None if there are errors; and what is wrong with it.
 
-    `name` is that of the robot. The text of a single file that is not a piece stays as it is.
+    `name` is that of the robot; the names of its meshes are relative to the folder `home`. The text of a single file
+    that is not a piece stays as it is.
     """
     read = [part.file.read(sources) for part in parts]
     if findings := [one for one in read if isinstance(one, Finding)]:
@@ -52,21 +52,18 @@ def describe(
     meshes = [part.file.meshes(root) for part, (root, _) in zip(parts, found, strict=True)]
     if len(parts) == 1 and not parts[0].name:
         [(whole, text)], [there] = found, meshes
-        return _checked(parts[0].file.path, whole, text, there)
-    base = next((part for part in parts if part.attachment is None), parts[0]).file.path
+        return _checked(whole, text, there)
     pieces, there = [], {}
     for part, (root, _), files in zip(parts, found, meshes, strict=True):
-        names = {one: one if one.startswith(PACKAGE) else os.path.relpath(files[one], base.parent) for one in files}
+        names = {one: one if one.startswith(PACKAGE) else os.path.relpath(files[one], home) for one in files}
         there |= {names[one]: files[one] for one in files}
         pieces.append(PieceOfBody(part.name, with_meshes(root, names), part.attachment, part.span, part.to))
     joined = assembled(name, pieces)
-    return (None, joined) if isinstance(joined, list) else _checked(base, joined, to_xml(joined), there)
+    return (None, joined) if isinstance(joined, list) else _checked(joined, to_xml(joined), there)
 
 
-def _checked(
-    path: Path, root: XmlElement, text: str, meshes: Mapping[str, Path]
-) -> tuple[Description | None, list[Finding]]:
+def _checked(root: XmlElement, text: str, meshes: Mapping[str, Path]) -> tuple[Description | None, list[Finding]]:
     body, findings = read_body(root)
     if findings:
         return None, findings
-    return Description(path, text, body, meshes), list(lint(body, meshes))
+    return Description(text, body, meshes), list(lint(body, meshes))

@@ -15,7 +15,7 @@ def links_of(body: Body) -> Iterator[tuple[str, ...]]:
     """Yield a row of `LINKS` for each link, the root first."""
     for name, _ in body.walk():
         link, above = body.links[name], body.joint_above.get(name)
-        mass = f"{link.inertial.mass:g} kg" if link.inertial else ""
+        mass = f"{link.inertial.mass:.4g} kg" if link.inertial else ""
         yield name, above.parent if above else "", above.name if above else "", mass, shapes_of(link)
 
 

@@ -135,7 +135,7 @@ def body(reading: Reading[BodyModel]) -> Description | None:
     robot = reading.contents.root.get("name")
     named = robot.text if isinstance(robot, ScalarNode) else ""
     usable = [one for one in parts if not isinstance(one, Finding)]
-    found, findings = describe(named, usable, reading.contents.documents.sources)
+    found, findings = describe(named, reading.contents.file.parent, usable, reading.contents.documents.sources)
     report.extend(findings)
     return found
 

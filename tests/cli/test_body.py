@@ -14,7 +14,7 @@ from rbxcompose.cli.main import main
 from rbxcompose.testing.golden import Golden
 from tests.conftest import ROOT
 
-ROBOT = str(ROOT / "robots/box_robot")
+ROBOT = str(ROOT / "robots/pi_robot")
 
 
 def told(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> str:
@@ -34,9 +34,9 @@ def test_a_body_is_shown(
 def test_the_expansion_is_a_urdf_without_anything_of_xacro(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     text = told(capsys, "expand", ROBOT)
     assert "xacro:" not in text
-    assert 'size="0.025 0.025 0.6"' in text  # as the robot's file has it
-    told(capsys, "expand", ROBOT, "--set", "body.with.torso_height=0.9", "--out", str(tmp_path / "r.urdf"))
-    assert 'size="0.025 0.025 0.9"' in (tmp_path / "r.urdf").read_text()
+    assert 'size="0.0254 0.0254 0.75"' in text  # as the robot's file has it
+    told(capsys, "expand", ROBOT, "--set", "include.torso.with.height=90 cm", "--out", str(tmp_path / "r.urdf"))
+    assert 'size="0.0254 0.0254 0.9"' in (tmp_path / "r.urdf").read_text()
 
 
 def test_a_picture_shows_the_body_on_white(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -55,7 +55,7 @@ def test_a_picture_shows_the_body_on_white(capsys: pytest.CaptureFixture[str], t
 def test_wrong_input_is_told(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert "RBX2008" in told(capsys, "show", str(ROOT / "robots/turtlebot"), code=1)
+    assert "RBX2008" in told(capsys, "show", str(ROOT / "robots/house"), code=1)
     assert "no moving joint 'neck': base_l" in told(capsys, "picture", ROBOT, "--joint", "neck=1", code=2)
     assert "must be a number" in told(capsys, "picture", ROBOT, "--joint", "head_pan_joint=up", code=2)
     assert "cannot be written" in told(capsys, "expand", ROBOT, "--out", str(tmp_path / "no/file"), code=2)
