@@ -14,6 +14,7 @@ Quaternion = tuple[float, float, float, float]  # x, y, z, w
 
 NO_TRANSLATION: Vector3 = (0.0, 0.0, 0.0)
 NO_ROTATION: Quaternion = (0.0, 0.0, 0.0, 1.0)
+SMALL_SINE = 1e-4  # of half an angle, below which an arc is as good as its chord and its sine is inexact
 
 
 def wrap_angle(angle: float) -> float:
@@ -128,6 +129,23 @@ def rotate(rotation: Quaternion, vector: Vector3) -> Vector3:
     return (x, y, z)
 
 
+def slerp(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
+    """Return the unit quaternion at a fraction of the shortest arc from `a` to `b`, at a constant angular speed."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    cos = ax * bx + ay * by + az * bz + aw * bw
+    sign = -1.0 if cos < 0 else 1.0  # b and -b are the same rotation
+    angle = math.acos(min(1.0, cos * sign))
+    sine = math.sin(angle)
+    if sine < SMALL_SINE:
+        start, end = 1.0 - fraction, fraction * sign
+        x, y, z, w = start * ax + end * bx, start * ay + end * by, start * az + end * bz, start * aw + end * bw
+        length = math.hypot(x, y, z, w)
+        return (x / length, y / length, z / length, w / length)
+    start, end = math.sin((1.0 - fraction) * angle) / sine, sign * math.sin(fraction * angle) / sine
+    return (start * ax + end * bx, start * ay + end * by, start * az + end * bz, start * aw + end * bw)
+
+
 @dataclass(frozen=True, slots=True)
 class Transform3:
     """Pose of one frame in another: `translation` [m] and `rotation`, a unit quaternion (x, y, z, w)."""
@@ -152,6 +170,12 @@ class Transform3:
     def compose(self, other: Transform3) -> Transform3:
         """Return `T_a_c` from this `T_a_b` and `other`, which is `T_b_c`."""
         return Transform3(self.apply(other.translation), multiply(self.rotation, other.rotation))
+
+    def towards(self, other: Transform3, fraction: float) -> Transform3:
+        """Return the pose at a fraction of the way to another one: on a line, and by the shortest arc."""
+        (ax, ay, az), (bx, by, bz) = self.translation, other.translation
+        moved = (ax + (bx - ax) * fraction, ay + (by - ay) * fraction, az + (bz - az) * fraction)
+        return Transform3(moved, slerp(self.rotation, other.rotation, fraction))
 
     def inverse(self) -> Transform3:
         """Return the pose of the outer frame in the inner one."""

@@ -1,19 +1,33 @@
-"""The tree of frames: where each frame is in its parent now, and from that where any frame is in any other."""
+"""The tree of frames: where each frame is in its parent now and was lately, and so where any is in any other.
+
+There are two times. A pose is *received* at a robot time [s]: deadlines count from it, and an age is the time since. It
+was *measured* at its stamp [ns], by the clock of who sent it: look-ups at a time go by it.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+from rbxcompose.body.pose_history import PoseHistory
+from rbxcompose.body.transform_errors import (
+    NANOSECONDS,
+    ExtrapolationError,
+    KnownTimes,
+    NotConnectedError,
+    TransformError,
+    UnknownFrameError,
+)
 from rbxcompose.geometry import Transform3
 
 MOST_FRAMES = 10_000  # names come from outside; a tree must not grow without bound
+MOST_POSES = 200_000  # of all frames together, 64 B each; frames that move then remember less
 UNIT_TOLERANCE = 1e-2  # how far the length of a rotation may differ from 1, as in other transform trees
 
 
 @dataclass(frozen=True, slots=True)
 class TransformAnswer:
-    """Answer to `set`: whether the transform was accepted, and a message (a refusal, or a parent that was replaced)."""
+    """Answer to `set`: whether the transform was accepted, and a message if it was not, or was not like others."""
 
     accepted: bool
     message: str = ""
@@ -24,13 +38,19 @@ class _Link:
     parent: str
     transform: Transform3
     stamp: float
+    history: PoseHistory | None = None  # None if static
+
+    def at(self, time: int) -> Transform3 | None:
+        """Return the pose at a time [ns], None outside of what is known."""
+        return self.transform if self.history is None else self.history.at(time)
 
 
 class TransformTree:
-    """Latest pose of every frame in its parent; frames without a common root are not connected."""
+    """Newest and recent poses of every frame in its parent; frames without a common root are not connected."""
 
     def __init__(self) -> None:
         self._links: dict[str, _Link] = {}  # by child
+        self._kept = 0  # poses in all histories
 
     @property
     def frames(self) -> frozenset[str]:
@@ -42,26 +62,90 @@ class TransformTree:
         link = self._links.get(frame)
         return link.parent if link else None
 
-    def set(self, parent: str, child: str, transform: Transform3, *, stamp: float, static: bool) -> TransformAnswer:
+    def set(
+        self, parent: str, child: str, transform: Transform3, *, stamp: float, static: bool, measured: int | None = None
+    ) -> TransformAnswer:
         """Place `child` in `parent`, or refuse what would not be a tree; a later parent replaces an earlier one.
 
-        `stamp` is the robot time [s] at which the transform was received. A static transform never grows old.
+        `stamp` is the robot time [s] at which the transform was received, `measured` the stamp that it had [ns], by
+        default the same. A static transform never grows old, and holds for all times.
+
+        A pose that comes late is put between the others; the newest stays the newest. One with a known stamp replaces
+        that pose. If the stamps go back further, the clock was set back, and the history begins again.
         """
         refusal = self._refusal(parent, child, transform)
         if refusal:
             return TransformAnswer(False, refusal)
-        before = self.parent_of(child)
-        self._links[child] = _Link(parent, _normalised(transform), math.inf if static else stamp)
-        moved = before is not None and before != parent
-        return TransformAnswer(True, f"'{child}' has moved from '{before}' to '{parent}'" if moved else "")
+        before, transform = self._links.get(child), _normalised(transform)
+        moved = before is not None and before.parent != parent
+        note = f"'{child}' has moved from '{before.parent}' to '{parent}'" if before and moved else ""
+        if static:
+            self._replace(child, _Link(parent, transform, math.inf))
+            return TransformAnswer(True, note)
+        known = before.history if before and not moved else None
+        history = PoseHistory() if known is None else known
+        time = round(stamp * NANOSECONDS) if measured is None else measured
+        note = self._remember(child, history, _Link(parent, transform, stamp, history), time) or note
+        return TransformAnswer(True, note)
 
     def lookup(self, target: str, source: str) -> Transform3 | None:
-        """Return the pose of frame `source` in frame `target`, or None when they are not connected."""
+        """Return the newest pose of frame `source` in frame `target`, or None when they are not connected.
+
+        Each frame counts as it was last seen, so that a joint that is seldom reported does not hold up the others;
+        `lookup_common` is the look-up in which all of them have the same time.
+        """
         paths = self._paths(target, source)
         if paths is None:
             return None
         up, down = (self._chain(path) for path in paths)
         return up.inverse().compose(down)
+
+    def lookup_at(self, target: str, source: str, time: int) -> Transform3:
+        """Return the pose of `source` in `target` at a time [ns], interpolated between the poses that are known.
+
+        Raises:
+            TransformError: if a frame is unknown, the two are not connected, or the time is not known.
+        """
+        up, down = (self._chain_at(path, time) for path in self._connected(target, source))
+        if up is None or down is None:
+            raise ExtrapolationError((target, source), time, self._known(target, source))
+        return up.inverse().compose(down)
+
+    def lookup_across(self, target: str, target_time: int, source: str, source_time: int, fixed: str) -> Transform3:
+        """Return where `source` was at its time, as seen from where `target` was at its own [ns].
+
+        `fixed` is the frame that has not moved between the two times, such as `odom`.
+
+        Raises:
+            TransformError: as `lookup_at`.
+        """
+        return self.lookup_at(target, fixed, target_time).compose(self.lookup_at(fixed, source, source_time))
+
+    def lookup_common(self, target: str, source: str) -> Transform3:
+        """Return the pose at the newest time for which all frames between the two are known.
+
+        Raises:
+            TransformError: as `lookup_at`.
+        """
+        time = self.newest_common(target, source)
+        return self.lookup_at(target, source, 0 if time is None else time)
+
+    def newest_common(self, target: str, source: str) -> int | None:
+        """Return the newest time [ns] for which all frames between two are known, None if they hold for all times.
+
+        Raises:
+            TransformError: if a frame is unknown, or the two are not connected.
+        """
+        return min((one.newest for one in self._known(target, source)), default=None)
+
+    def problem(self, target: str, source: str) -> TransformError | None:
+        """Return why two frames have no pose in each other, None if they have one."""
+        frames = self.frames
+        for frame in (target, source):
+            if frame not in frames:
+                return UnknownFrameError(frame, frames)
+        roots = self._ancestry(target)[-1], self._ancestry(source)[-1]
+        return None if roots[0] == roots[1] else NotConnectedError(target, source, roots)
 
     def stamp_of(self, target: str, source: str) -> float | None:
         """Return the stamp [s] of the oldest dynamic link between two frames.
@@ -77,6 +161,26 @@ class TransformTree:
         """Return how long ago [s] the oldest dynamic link was received: 0 if all are static, None if not connected."""
         stamp = self.stamp_of(target, source)
         return None if stamp is None else max(0.0, now - stamp)
+
+    def _remember(self, child: str, history: PoseHistory, link: _Link, measured: int) -> str:
+        """Add the pose of a link to its history, and return what is unusual about its stamp, if anything."""
+        was_set_back = history.is_set_back(measured)
+        is_late = len(history) > 0 and measured < history.newest and not was_set_back
+        held = len(history)
+        history.add(measured, link.transform)
+        if self._kept + len(history) - held > MOST_POSES:
+            history.halve()
+        self._kept += len(history) - held
+        if is_late:
+            return f"a pose of '{child}' came late: only look-ups at a time use it"
+        self._replace(child, link)
+        return f"the stamps of '{child}' went back: its earlier poses are forgotten" if was_set_back else ""
+
+    def _replace(self, child: str, link: _Link) -> None:
+        before = self._links.get(child)
+        if before is not None and before.history is not None and before.history is not link.history:
+            self._kept -= len(before.history)
+        self._links[child] = link
 
     def _refusal(self, parent: str, child: str, transform: Transform3) -> str:
         if not parent or not child:
@@ -115,6 +219,31 @@ class TransformTree:
         for frame in path:  # from the leaf upwards
             pose = self._links[frame].transform.compose(pose)
         return pose
+
+    def _chain_at(self, path: list[str], time: int) -> Transform3 | None:
+        pose = Transform3()
+        for frame in path:
+            placed = self._links[frame].at(time)
+            if placed is None:
+                return None
+            pose = placed.compose(pose)
+        return pose
+
+    def _connected(self, target: str, source: str) -> tuple[list[str], list[str]]:
+        paths = self._paths(target, source)
+        if paths is None:
+            raise self.problem(target, source) or TransformError(f"'{source}' has no pose in '{target}'")
+        return paths
+
+    def _known(self, target: str, source: str) -> list[KnownTimes]:
+        """Return from when to when each moving frame between two is known."""
+        frames = (frame for path in self._connected(target, source) for frame in path)
+        links = ((frame, self._links[frame]) for frame in frames)
+        return [
+            KnownTimes(frame, link.parent, link.history.oldest, link.history.newest)
+            for frame, link in links
+            if link.history is not None
+        ]
 
 
 def _normalised(transform: Transform3) -> Transform3:

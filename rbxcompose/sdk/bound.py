@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Generic, Protocol, TypeVar
 
-from rbxcompose.geometry import Pose2
+from rbxcompose.geometry import Pose2, Transform3
 
 M = TypeVar("M")
 M_contra = TypeVar("M_contra", contravariant=True)
@@ -181,4 +181,12 @@ class Look(Protocol):
 
     def now(self) -> Pose2 | None:
         """Return the newest pose [m, m, rad], or None while the frames are not connected."""
+        ...
+
+    def transform(self, *, at: int | None = None) -> Transform3:
+        """Return the newest pose in space, or the one at a stamp [ns], interpolated.
+
+        Raises:
+            LookupError: if there is none; the text names the frames or the times that there are.
+        """
         ...

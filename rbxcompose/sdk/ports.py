@@ -223,7 +223,7 @@ def _require_outcomes(outcomes: Mapping[str, str], end: type[Message] | None) ->
 
 
 class Looks(Port[Look]):
-    """Looks up the pose of frame `source` in frame `target`."""
+    """Looks up the pose of frame `source` in frame `target`, newest or at a time."""
 
     kind = "looks"
 

@@ -11,7 +11,7 @@ from rbxcompose.clock import Clock, SteppedClock
 from rbxcompose.components.mission import Mission, MissionConfig
 from rbxcompose.expressions.types import FLAG, TEXT, TYPES
 from rbxcompose.findings import Report
-from rbxcompose.geometry import Pose2
+from rbxcompose.geometry import Pose2, Transform3
 from rbxcompose.levels import Level
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
@@ -133,6 +133,11 @@ class Look:
 
     def now(self) -> Pose2 | None:
         return self.pose
+
+    def transform(self, *, at: int | None = None) -> Transform3:
+        if self.pose is None:
+            raise LookupError
+        return Transform3.from_pose2(self.pose)
 
 
 class FakeWindow:

@@ -70,7 +70,7 @@ ABOVE = {
     "recording": "bus.attachment bus.classes bus.names bus.tokens bus.transport bus.witness",
     "rendering": "",
     "replay": "bus plan.model recording runtime.process_group runtime.records sdk",
-    "runtime": "body.transforms bus missions.program.sources params plan recording sdk",
+    "runtime": "body.transform_errors body.transforms bus missions.program.sources params plan recording sdk",
     "scaffold": "composition missions sdk",
     "schema": "missions sdk sections",
     "sdk": "",

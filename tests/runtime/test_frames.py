@@ -13,6 +13,7 @@ from rbxcompose.bus.transport import Arrival, NoTransport
 from rbxcompose.clock import SteppedClock
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
+from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.qos import Qos
@@ -51,11 +52,12 @@ class World(NoTransport):
             self.arrived.append(arrived)
         return self
 
-    def tell(self, time: float, x: float, child: str = "base") -> None:
-        """Have a pose arrive at `time` [s]."""
+    def tell(self, time: float, x: float, child: str = "base", stamp: float = 0.0) -> None:
+        """Have a pose arrive at `time` [s]; a stamp of 0 is none."""
+        header = Header(frame_id="odom", stamp=to_time(round(stamp * 1e9)))
         self.clock.advance_to(time)
         placed = Transform(translation=Vector3(x, 0.0, 0.0), rotation=Quaternion(w=1.0))
-        link = TransformStamped(header=Header(frame_id="odom"), child_frame_id=child, transform=placed)
+        link = TransformStamped(header=header, child_frame_id=child, transform=placed)
         for arrived in self.arrived:
             arrived(Came(encode(TFMessage(transforms=(link,)))))
 
@@ -101,3 +103,29 @@ def test_where_another_thread_looks_each_pose_is_taken_by_the_scheduler(*, is_pa
     assert (world.x(), world.woken) == (None, 1)
     world.scheduler.advance(0.0)
     assert world.x() == 3.0
+
+
+def test_who_looks_back_finds_the_pose_between_two_that_were_sent() -> None:
+    world = World(is_patient=True)
+    for number in (0, 1, 2):
+        world.tell(float(number), 10.0 * number, stamp=number + 5.0)
+    assert world.look.transform(at=6_500_000_000).translation == (15.0, 0.0, 0.0)
+    assert world.look.transform().translation == (20.0, 0.0, 0.0)
+
+
+def test_a_pose_without_a_stamp_was_measured_when_it_arrived() -> None:
+    world = World(is_patient=True)
+    world.tell(1.0, 1.0)
+    world.x()
+    world.tell(2.0, 2.0)
+    world.clock.advance_to(2.5)
+    assert world.look.transform(at=1_500_000_000).translation == (1.5, 0.0, 0.0)
+
+
+def test_who_looks_in_vain_is_told_the_frames_or_the_times_that_there_are() -> None:
+    world = World(is_patient=True)
+    with pytest.raises(LookupError, match="there is no frame 'odom'; there are none yet"):
+        world.look.transform()
+    world.tell(1.0, 0.0)
+    with pytest.raises(LookupError, match=r"known only until 1\.000 s, 1 s earlier"):
+        world.look.transform(at=2_000_000_000)

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
+from rbxcompose.body.transform_errors import TransformError
 from rbxcompose.body.transforms import TransformTree
 from rbxcompose.bus.bus import Bus
-from rbxcompose.clock import Clock
+from rbxcompose.clock import NANOSECONDS, Clock
 from rbxcompose.geometry import Pose2, Transform3
 from rbxcompose.msgs.geometry_msgs import TransformStamped
+from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.qos import Qos
 
 
 @dataclass(frozen=True, slots=True)
 class Lookup:
-    """The newest pose of frame `source` in frame `target`."""
+    """The pose of frame `source` in frame `target`, newest or at a time."""
 
     frames: Frames
     target: str
@@ -25,6 +28,14 @@ class Lookup:
         """Return the pose [m, m, rad], or None while the frames are not connected."""
         found = self.frames.lookup(self.target, self.source)
         return found.to_pose2() if found else None
+
+    def transform(self, *, at: int | None = None) -> Transform3:
+        """Return the newest pose, or that at a stamp [ns], interpolated.
+
+        Raises:
+            LookupError: if there is none; the text names the frames or the times that there are.
+        """
+        return self.frames.transform(self.target, self.source, at)
 
 
 class Frames:
@@ -38,6 +49,7 @@ class Frames:
     def __init__(self, owner: str, bus: Bus, clock: Clock, *, is_patient: bool) -> None:
         self.tree = TransformTree()
         self._clock = clock
+        self._lock = threading.Lock()  # who looks back from another thread must not see a history that changes
         self._moving = bus.subscribe(owner, "/tf", TFMessage, Qos.STATE, self._move, is_patient=is_patient)
         bus.subscribe(owner, "/tf_static", TFMessage, Qos.LATCHED, self._fix)
 
@@ -46,19 +58,42 @@ class Frames:
         self._moving.catch_up()
         return self.tree.lookup(target, source)
 
+    def transform(self, target: str, source: str, at: int | None = None) -> Transform3:
+        """Return the newest pose of frame `source` in frame `target`, or that at a stamp [ns].
+
+        Raises:
+            TransformError: if there is none.
+        """
+        self._moving.catch_up()
+        with self._lock:
+            found = self.tree.lookup(target, source) if at is None else self.tree.lookup_at(target, source, at)
+            if found is None:
+                raise self.tree.problem(target, source) or TransformError(f"'{source}' has no pose in '{target}'")
+        return found
+
     def hurry(self) -> None:
         """Take each pose when it arrives: another thread looks them up and must not take them itself."""
         self._moving.hurry()
 
     def _fix(self, message: TFMessage) -> None:
-        self._take(message, self._clock.now(), static=True)
+        self._take(message, 0.0, static=True)
 
     def _move(self, message: TFMessage) -> None:
-        self._take(message, self._clock.now() - self._moving.age, static=False)
+        self._take(message, self._moving.age, static=False)
 
-    def _take(self, message: TFMessage, stamp: float, *, static: bool) -> None:
-        for one in message.transforms:
-            self.tree.set(one.header.frame_id, one.child_frame_id, _transform(one), stamp=stamp, static=static)
+    def _take(self, message: TFMessage, age: float, *, static: bool) -> None:
+        received, unstamped = self._clock.now() - age, self._clock.stamp() - round(age * NANOSECONDS)
+        with self._lock:
+            for one in message.transforms:
+                time = to_nanoseconds(one.header.stamp) or unstamped
+                self.tree.set(
+                    one.header.frame_id,
+                    one.child_frame_id,
+                    _transform(one),
+                    stamp=received,
+                    static=static,
+                    measured=time,
+                )
 
 
 def _transform(message: TransformStamped) -> Transform3:
