@@ -7,6 +7,7 @@ Lengths are metres, angles radians, turning left is positive. `T_a_b` is the pos
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 Vector3 = tuple[float, float, float]  # x, y, z
@@ -125,8 +126,15 @@ def conjugate(rotation: Quaternion) -> Quaternion:
 
 def rotate(rotation: Quaternion, vector: Vector3) -> Vector3:
     """Return `vector` turned by a unit quaternion."""
-    x, y, z, _ = multiply(multiply(rotation, (*vector, 0.0)), conjugate(rotation))
-    return (x, y, z)
+    qx, qy, qz, qw = rotation
+    vx, vy, vz = vector
+    ax, ay, az = qw * vx + qy * vz - qz * vy, qw * vy - qx * vz + qz * vx, qw * vz + qx * vy - qy * vx
+    aw = qx * vx + qy * vy + qz * vz
+    return (
+        aw * qx + ax * qw - ay * qz + az * qy,
+        aw * qy + ax * qz + ay * qw - az * qx,
+        aw * qz - ax * qy + ay * qx + az * qw,
+    )
 
 
 def slerp(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
@@ -182,3 +190,16 @@ class Transform3:
         back = conjugate(self.rotation)
         x, y, z = rotate(back, self.translation)
         return Transform3((-x, -y, -z), back)
+
+
+def composed(poses: Iterable[Transform3]) -> Transform3:
+    """Return the pose of the innermost frame in the outermost one, from poses that begin with the innermost.
+
+    It does what `compose` does again and again, without an object for each step.
+    """
+    at, turn = NO_TRANSLATION, NO_ROTATION
+    for pose in poses:
+        x, y, z = pose.translation
+        dx, dy, dz = rotate(pose.rotation, at)
+        at, turn = (x + dx, y + dy, z + dz), multiply(pose.rotation, turn)
+    return Transform3(at, turn)

@@ -18,7 +18,7 @@ from rbxcompose.body.transform_errors import (
     TransformError,
     UnknownFrameError,
 )
-from rbxcompose.geometry import Transform3
+from rbxcompose.geometry import Transform3, composed
 
 MOST_FRAMES = 10_000  # names come from outside; a tree must not grow without bound
 MOST_POSES = 200_000  # of all frames together, 64 B each; frames that move then remember less
@@ -97,8 +97,8 @@ class TransformTree:
         paths = self._paths(target, source)
         if paths is None:
             return None
-        up, down = (self._chain(path) for path in paths)
-        return up.inverse().compose(down)
+        up, down = paths
+        return self._chain(up).inverse().compose(self._chain(down)) if up else self._chain(down)
 
     def lookup_at(self, target: str, source: str, time: int) -> Transform3:
         """Return the pose of `source` in `target` at a time [ns], interpolated between the poses that are known.
@@ -215,19 +215,13 @@ class TransformTree:
         return above_target, above_source
 
     def _chain(self, path: list[str]) -> Transform3:
-        pose = Transform3()
-        for frame in path:  # from the leaf upwards
-            pose = self._links[frame].transform.compose(pose)
-        return pose
+        links = self._links
+        return composed([links[frame].transform for frame in path])  # from the leaf upwards
 
     def _chain_at(self, path: list[str], time: int) -> Transform3 | None:
-        pose = Transform3()
-        for frame in path:
-            placed = self._links[frame].at(time)
-            if placed is None:
-                return None
-            pose = placed.compose(pose)
-        return pose
+        poses = [self._links[frame].at(time) for frame in path]
+        known = [pose for pose in poses if pose is not None]
+        return composed(known) if len(known) == len(poses) else None
 
     def _connected(self, target: str, source: str) -> tuple[list[str], list[str]]:
         paths = self._paths(target, source)
