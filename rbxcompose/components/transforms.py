@@ -14,14 +14,16 @@ from rbxcompose.body.urdf import read_body
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.findings import Finding
 from rbxcompose.geometry import Transform3
+from rbxcompose.msgs.builtin_interfaces import Time
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk import Capability, Component, Config, In, Out, Port, Setting, WritesFrame, component
 
 PERIOD = 0.1  # [s] after which the frames of all joints are published again
+MOST_LAG = 10_000_000_000  # [ns]; a stamp that is further off comes from another clock
 JOINT_STATES, TF = "joint_states", "tf"
 MOVING: dict[str, Port[Any]] = {
     JOINT_STATES: In(JointState, JOINT_STATES, is_open=True).named(JOINT_STATES),
@@ -79,48 +81,68 @@ class Transforms(Component[TransformsConfig]):
         """Read the body; no joint has been reported yet."""
         self.body = body_of(self.config.urdf)
         self.positions: dict[str, float] = {}
+        self.lags: dict[str, int] = {}  # [ns] by which stamps of joint states are behind ours
+        self.reported: set[str] = set()  # joints published since the last wake
         self.moving = [one for one in self.body.joints.values() if one.moves]
 
     def activate(self) -> None:
         """Publish the fixed frames once; late subscribers receive them, too."""
         fixed = (one for one in self.body.joints.values() if one.kind == "fixed")
-        coinciding = self.link(self.config.map, self.config.odom, Transform3())
-        self.tf_static(TFMessage(transforms=(coinciding, *self.links(fixed))))
+        time = to_time(self.stamp)
+        coinciding = link(time, self.config.map, self.config.odom, Transform3())
+        self.tf_static(TFMessage(transforms=(coinciding, *self.links(fixed, time))))
         self.wake()
 
     def on_joint_states(self, message: JointState) -> None:
-        """Publish the links that joints have moved."""
+        """Publish the links that joints have moved, at the time at which these were measured.
+
+        If the message has no stamp, or that of another clock, it is the time at which it came.
+        """
         moved = {}
         for name, position in zip(message.name, message.position, strict=False):
             if math.isfinite(position) and (joint := self.body.joints.get(name)) and joint.moves:
                 moved[name] = float(position)
         if moved:
             self.positions |= moved
-            affected = (one for one in self.moving if (one.mimic.joint if one.mimic else one.name) in moved)
-            self.publish(affected)
+            affected = [one for one in self.moving if (one.mimic.joint if one.mimic else one.name) in moved]
+            names, measured = [one.name for one in affected], to_nanoseconds(message.header.stamp)
+            lag = self.stamp - measured if measured and abs(self.stamp - measured) <= MOST_LAG else 0
+            self.reported.update(names)
+            self.lags |= dict.fromkeys(names, lag)
+            self.publish(affected, self.stamp - lag)
 
     def wake(self) -> None:
-        """Publish all that moves, so that a late subscriber has it soon."""
+        """Publish all that moves and was not reported, so that a late subscriber has it soon.
+
+        It goes by the clock of who reported the joint before, so that no later report seems to be an older one.
+        """
+        quiet: dict[int, list[BodyJoint]] = {}
+        for one in self.moving:
+            if one.name not in self.reported:
+                quiet.setdefault(self.lags.get(one.name, 0), []).append(one)
+        for lag, joints in quiet.items():
+            self.publish(joints, self.stamp - lag)
+        self.reported.clear()
         if self.moving:
-            self.publish(self.moving)
             self.context.wake_at(self.now + PERIOD)
 
-    def publish(self, joints: Iterable[BodyJoint]) -> None:
-        """Publish where the children of joints are now."""
-        self.bound[TF](TFMessage(transforms=tuple(self.links(joints))))
+    def publish(self, joints: Iterable[BodyJoint], stamp: int) -> None:
+        """Publish where the children of joints are at a time [ns]."""
+        self.bound[TF](TFMessage(transforms=tuple(self.links(joints, to_time(stamp)))))
 
-    def links(self, joints: Iterable[BodyJoint]) -> Iterable[TransformStamped]:
-        """Yield where the children of joints are now."""
+    def links(self, joints: Iterable[BodyJoint], time: Time) -> Iterable[TransformStamped]:
+        """Yield where the children of joints are."""
         for one in joints:
-            yield self.link(one.parent, one.child, one.at(self.body.position(one, self.positions)))
+            yield link(time, one.parent, one.child, one.at(self.body.position(one, self.positions)))
 
-    def link(self, parent: str, child: str, at: Transform3) -> TransformStamped:
-        """Return the pose of a frame in another one as a message."""
-        return TransformStamped(
-            header=Header(stamp=to_time(self.stamp), frame_id=parent),
-            child_frame_id=child,
-            transform=Transform(translation=Vector3(*at.translation), rotation=Quaternion(*at.rotation)),
-        )
+
+def link(time: Time, parent: str, child: str, at: Transform3) -> TransformStamped:
+    """Return the pose of a frame in another one as a message."""
+    return TransformStamped(
+        header=Header(stamp=time, frame_id=parent),
+        child_frame_id=child,
+        transform=Transform(translation=Vector3(*at.translation), rotation=Quaternion(*at.rotation)),
+    )
 
 
 @lru_cache(maxsize=4)

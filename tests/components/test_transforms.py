@@ -9,6 +9,8 @@ import pytest
 
 from rbxcompose.components.transforms import TransformsConfig, body_of
 from rbxcompose.msgs.sensor_msgs import JointState
+from rbxcompose.msgs.stamps import to_nanoseconds, to_time
+from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.qos import Qos
 from rbxcompose.testing import Bench, instance
@@ -32,6 +34,7 @@ class Listener:
         self.moving: dict[str, float] = {}
         self.static: set[str] = set()
         self.count = 0
+        self.stamps: list[tuple[str, float]] = []  # [s] of each transform that came
         robot.bus.subscribe("listener", "/tf", TFMessage, Qos.STATE, self._moved)
         robot.bus.subscribe("listener", "/tf_static", TFMessage, Qos.LATCHED, self._fixed)
         self.send = robot.bus.publisher("source", "/joint_states", JointState, Qos.STATE)
@@ -40,13 +43,16 @@ class Listener:
         self.count += 1
         for one in message.transforms:
             at = one.transform
+            self.stamps.append((one.child_frame_id, to_nanoseconds(one.header.stamp) / 1e9))
             self.moving[one.child_frame_id] = at.translation.x or 2 * math.atan2(at.rotation.z, at.rotation.w)
 
     def _fixed(self, message: TFMessage) -> None:
         self.static |= {one.child_frame_id for one in message.transforms}
 
-    def move(self, **positions: float) -> None:
-        self.send(JointState(name=tuple(positions), position=np.array(list(positions.values()))))
+    def move(self, *, stamp: float = 0.0, **positions: float) -> None:
+        """Report joints; a stamp of 0 is none."""
+        header = Header(stamp=to_time(round(stamp * 1e9)))
+        self.send(JointState(header=header, name=tuple(positions), position=np.array(list(positions.values()))))
         self.robot.advance(0.01)
 
 
@@ -68,6 +74,40 @@ def test_fixed_frames_are_published_once_and_moving_ones_at_rest_until_a_joint_i
 def test_a_joint_moves_its_link_and_those_that_mimic_it_at_once(listener: Listener) -> None:
     listener.move(pan=0.5)
     assert listener.moving == pytest.approx({"head": 0.5, "jaw": 0.0, "eye": -1.0})
+
+
+def test_a_link_is_where_it_was_when_the_joint_was_measured_not_when_that_was_heard(listener: Listener) -> None:
+    listener.stamps.clear()
+    listener.move(bite=0.25, stamp=0.125)
+    assert listener.stamps == [("jaw", 0.125)]
+
+
+@pytest.mark.parametrize("stamp", [0.0, 1e9, float(2**31 - 1)])
+def test_a_stamp_of_another_clock_does_not_reach_the_tree(listener: Listener, stamp: float) -> None:
+    now = listener.robot.clock.now()
+    listener.stamps.clear()
+    listener.move(bite=0.25, stamp=stamp)
+    listener.robot.advance(1.0)
+    assert {now <= one <= now + 1.1 for _, one in listener.stamps} == {True}
+
+
+def test_a_joint_that_falls_silent_is_published_again_by_the_clock_of_who_reported_it(listener: Listener) -> None:
+    now = listener.robot.clock.now()
+    listener.move(bite=0.25, stamp=now - 0.1)
+    listener.robot.advance(1.0)
+    stamps = [stamp for name, stamp in listener.stamps if name == "jaw" and stamp > now]
+    assert stamps == sorted(stamps)
+    assert len(stamps) >= 8
+    assert max(stamps) <= listener.robot.clock.now() - 0.1 + 1e-9
+
+
+def test_what_is_reported_often_is_published_as_often_and_not_once_more(listener: Listener) -> None:
+    listener.move(pan=0.0, bite=0.0)
+    listener.robot.advance(0.1)
+    listener.count = 0
+    for step in range(50):
+        listener.move(pan=0.01 * step, bite=0.001 * step)
+    assert listener.count == 50
 
 
 def test_joints_of_several_sources_are_merged(listener: Listener) -> None:
