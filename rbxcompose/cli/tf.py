@@ -1,4 +1,4 @@
-"""Show the tree of frames on the bus, or where one frame is in another.
+"""Show the tree of frames on the bus, or where one frame is in another; place a frame.
 
 A frame is at its last published pose; a static one never becomes outdated.
 """
@@ -9,8 +9,9 @@ import argparse
 import math
 from typing import Any
 
+from rbxcompose.body.pose_history import SPAN
+from rbxcompose.body.transform_errors import TransformError, UnknownFrameError
 from rbxcompose.body.transforms import TransformTree
-from rbxcompose.bus.graph import GraphName
 from rbxcompose.cli.bus.entities import (
     NO_NAME,
     NOBODY,
@@ -18,74 +19,55 @@ from rbxcompose.cli.bus.entities import (
     add_json_option,
     add_timeout_option,
     hertz,
+    signed,
     visit,
 )
-from rbxcompose.cli.bus.guest import Guest, HeardMessage
+from rbxcompose.cli.bus.guest import Guest
+from rbxcompose.cli.bus.heard_frames import HeardFrames
 from rbxcompose.cli.bus.messages import shown, to_json
 from rbxcompose.cli.bus.place import add_bus_options
-from rbxcompose.cli.bus.topic_echo import EchoReader
+from rbxcompose.cli.bus.tf_static import add_static_arguments, publish_static
 from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.clock import NANOSECONDS
+from rbxcompose.findings import Finding
 from rbxcompose.geometry import Transform3, yaw_of
-from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.printable import plain
+from rbxcompose.units import TIME
 
-_TOPICS = ("/tf", "/tf_static")
 _DIGITS = 4  # decimal places of metres and degrees
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="tree|echo", required=True)
+    actions = parser.add_subparsers(dest="action", metavar="tree|echo|static", required=True)
     tree = actions.add_parser("tree", help="show the tree of frames")
     tree.set_defaults(do=_tree)
     echo = actions.add_parser("echo", help="print where FRAME is in PARENT")
     echo.add_argument("parent", metavar="PARENT", help="the frame to look from, such as map")
     echo.add_argument("frame", metavar="FRAME", help="the frame to find, such as base_link")
+    words = "where it was at that time, counted from the newest one that is known (default: newest of each frame)"
+    echo.add_argument("--at", type=_past, metavar="-0.5s", help=words)
     echo.add_argument("--rate", type=hertz, default=1.0, metavar="1Hz", help="how often (default: 1 Hz)")
     add_count_options(echo)
     echo.set_defaults(do=_echo)
-    for one in (tree, echo):
+    static = actions.add_parser("static", help="place CHILD in PARENT until Ctrl-C; who has heard of it keeps it there")
+    add_static_arguments(static)
+    for one in (tree, echo, static):
         add_timeout_option(one, "2s")
-        add_json_option(one)
         add_bus_options(one)
+    for one in (tree, echo):
+        add_json_option(one)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
+    if arguments.action == "static":
+        return publish_static(arguments)
     return visit(arguments, lambda guest: int(arguments.do(guest, arguments)))
 
 
-class _Frames:
-    """The tree as received so far."""
-
-    def __init__(self, guest: Guest) -> None:
-        self.tree = TransformTree()
-        self._guest = guest
-        self._topics = [one for one in guest.graph().topics if one.name.endswith(_TOPICS)]
-        self._waiting = {end.gid for topic in self._topics for end in topic.givers}
-        for topic in self._topics:
-            self._listen(topic)
-
-    @property
-    def is_whole(self) -> bool:
-        """Return whether something has been received from every publisher."""
-        return not self._waiting
-
-    def _listen(self, topic: GraphName) -> None:
-        reader, is_static = EchoReader(topic), topic.name.endswith("_static")
-        self._guest.listen(topic, lambda heard: self._heard(reader, heard, is_static))
-
-    def _heard(self, reader: EchoReader, heard: HeardMessage, is_static: bool) -> None:
-        self._waiting.discard(heard.sender)
-        message = reader.read(heard)
-        for link in message.transforms if isinstance(message, TFMessage) else ():
-            moved, turned = link.transform.translation, link.transform.rotation
-            transform = Transform3((moved.x, moved.y, moved.z), (turned.x, turned.y, turned.z, turned.w))
-            self.tree.set(link.header.frame_id, link.child_frame_id, transform, stamp=heard.time, static=is_static)
-
-
 def _tree(guest: Guest, arguments: argparse.Namespace) -> int:
-    frames = _Frames(guest)
+    frames = HeardFrames(guest)
     guest.run(lambda: frames.is_whole, arguments.timeout)
     tree = frames.tree
     children: dict[str | None, list[str]] = {}
@@ -125,8 +107,8 @@ def _words(tree: TransformTree, parent: str | None, frame: str) -> str:
     return f"  ({kind}: x {x:g} m, y {y:g} m, z {z:g} m, yaw {placed['yaw']:g} deg)"
 
 
-def _placed(tree: TransformTree, parent: str, frame: str) -> dict[str, Any]:
-    transform = tree.lookup(parent, frame) or Transform3()
+def _placed(tree: TransformTree, parent: str, frame: str, at: int | None = None) -> dict[str, Any]:
+    transform = _pose(tree, parent, frame, at)
     return {
         "translation": [round(value, _DIGITS) for value in transform.translation],
         "rotation": list(transform.rotation),
@@ -135,21 +117,57 @@ def _placed(tree: TransformTree, parent: str, frame: str) -> dict[str, Any]:
     }
 
 
+def _pose(tree: TransformTree, parent: str, frame: str, at: int | None) -> Transform3:
+    """Return the newest pose, or the one `at` [ns] after the newest time for which all between them is known.
+
+    Raises:
+        TransformError: if there is none.
+    """
+    if problem := tree.problem(parent, frame):
+        raise problem
+    if at is None:
+        return tree.lookup(parent, frame) or Transform3()
+    return tree.lookup_at(parent, frame, (tree.newest_common(parent, frame) or 0) + at)
+
+
 def _echo(guest: Guest, arguments: argparse.Namespace) -> int:
-    frames, parent, frame = _Frames(guest), arguments.parent, arguments.frame
-    if not guest.run(lambda: frames.tree.lookup(parent, frame) is not None, arguments.timeout):
-        known = frames.tree.frames
-        for name in (parent, frame):
-            if name not in known:
-                return refuse(NO_NAME.misspelt(None, f"there is no frame '{name}'", name, known, "frames"))
-        return refuse(NOBODY.at(None, f"'{parent}' and '{frame}' are not connected"))
+    frames, parent, frame, at = HeardFrames(guest), arguments.parent, arguments.frame, arguments.at
+    tree, past = frames.tree, -(at or 0)
+    waits = arguments.timeout + (past / NANOSECONDS if past <= SPAN else 0.0)  # more is never remembered
+    guest.run(lambda: _is_known(tree, parent, frame, at), waits)
     told = 0
     while arguments.count is None or told < arguments.count:
         if told:
             guest.run(lambda: False, 1 / arguments.rate)
-        placed = _placed(frames.tree, parent, frame)
-        age = frames.tree.age(parent, frame, guest.clock.now()) or 0.0
+        try:
+            placed = _placed(tree, parent, frame, at)
+        except TransformError as problem:
+            return refuse(_finding(problem, tree))
+        age = tree.age(parent, frame, guest.clock.now()) or 0.0
         text = shown({**placed, "age": round(age, _DIGITS)}, arguments.json)
         tell(text if arguments.json else f"{text}\n---")
         told += 1
     return 0
+
+
+def _is_known(tree: TransformTree, parent: str, frame: str, at: int | None) -> bool:
+    try:
+        _pose(tree, parent, frame, at)
+    except TransformError:
+        return False
+    return True
+
+
+def _finding(problem: TransformError, tree: TransformTree) -> Finding:
+    if isinstance(problem, UnknownFrameError):
+        name = problem.frame
+        return NO_NAME.misspelt(None, f"there is no frame '{name}'", name, tree.frames, "frames")
+    return NOBODY.at(None, str(problem))
+
+
+def _past(text: str) -> int:
+    """Read `-0.5s` [ns]."""
+    time = signed(TIME)(text)
+    if time > 0:
+        raise argparse.ArgumentTypeError("must not be in the future: write '-0.5s'")
+    return round(time * NANOSECONDS)

@@ -14,6 +14,7 @@ import tempfile
 import termios
 from argparse import Namespace
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
@@ -168,6 +169,62 @@ def test_the_tree_of_frames_is_shown(robot: Robot) -> None:
     assert (
         "did you mean 'base_footprint'?" in robot.do("tf", "echo", "map", "base_footprin", "--timeout", "0.5s").stderr
     )
+
+
+def test_where_a_frame_was_is_shown_and_who_asks_for_too_much_is_told_what_is_known(robot: Robot) -> None:
+    assert len(robot.told("tf", "echo", "map", "base_footprint", "--once", "--at", "-100ms")["translation"]) == 3
+    assert robot.told("tf", "echo", "map", "odom", "--once", "--at", "-1h")["is_static"]
+    words = ("tf", "echo", "map", "base_footprint", "--once", "--timeout", "0.1s")
+    assert "must not be in the future" in robot.do(*words, "--at", "1s").stderr
+    assert "'base_footprint' in 'odom' is known only from" in robot.do(*words, "--at", "-1h").stderr
+    with publishing(robot, "map", "moon"), publishing(robot, "sun", "mars"):
+        done = robot.do("tf", "echo", "moon", "mars", "--timeout", "0.5s")
+    assert "RBX9025]: 'moon' and 'mars' are not connected: the root of 'moon' is 'map', that of 'mars' is 'sun'" in (
+        done.stderr
+    )
+
+
+@contextmanager
+def publishing(robot: Robot, *words: str) -> Iterator[None]:
+    """Place a frame, with `tf static`, until the end of the block."""
+    command = robot.command("tf", "static", *words)
+    with subprocess.Popen(command, env=robot.environment, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == f"'{words[1]}' is in '{words[0]}'; Ctrl-C ends it\n"
+        yield
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0
+
+
+def test_a_static_frame_is_in_the_tree_while_it_is_published(robot: Robot) -> None:
+    with publishing(robot, "base_footprint", "laser", "--z", "20cm", "--x", "-5mm", "--yaw", "-90deg"):
+        placed = next(one for one in robot.told("tf", "tree") if one["frame"] == "laser")
+        assert (placed["parent"], placed["is_static"]) == ("base_footprint", True)
+        assert (placed["translation"], placed["yaw"]) == ([-0.005, 0.0, 0.2], -90.0)
+        again = robot.do("tf", "static", "odom", "laser")
+    assert "RBX9043]: 'laser' is already placed in 'base_footprint', by another 'rbxcompose tf static'" in again.stderr
+    assert "laser" not in robot.do("tf", "tree").stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("base_footprint", "base_footprint"), "that is 'base_footprint' itself or is below it"),
+        (("map", "base_footprint"), "'base_footprint' is already placed in 'odom', by /base"),
+        (("odom", "map"), "that is 'map' itself or is below it"),
+        (("/map", "laser"), "names of frames do not begin with '/'"),
+        (("map", ""), "a frame needs a name"),
+    ],
+    ids=["itself", "taken", "cycle", "slash", "nameless"],
+)
+def test_what_would_not_be_a_tree_is_not_published(robot: Robot, words: tuple[str, str], reason: str) -> None:
+    done = robot.do("tf", "static", *words)
+    assert (done.returncode, "RBX9043" in done.stderr, reason in done.stderr) == (1, True, True), done.stderr
+
+
+def test_an_angle_of_a_static_frame_needs_its_unit(robot: Robot) -> None:
+    done = robot.do("tf", "static", "map", "laser", "--yaw", "-90")
+    assert (done.returncode, "write '90 deg' or '1.57 rad'" in done.stderr) == (2, True)
 
 
 def test_without_a_router_that_is_a_finding(robot: Robot) -> None:

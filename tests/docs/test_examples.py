@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
 import shlex
 import sys
@@ -10,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli.verbs import load, verbs
+from rbxcompose.cli.verbs import load, parser_of, verbs
 from rbxcompose.findings import Severity
 from rbxcompose.missions.program.registry import forget
 from rbxcompose.msgs.std_msgs import Float32
@@ -39,9 +38,7 @@ def commands(block: Block) -> list[list[str]]:
 def test_a_command_parses(block: Block) -> None:
     for verb, *words in commands(block):
         assert verb in verbs()
-        parser = argparse.ArgumentParser(verb, allow_abbrev=False, exit_on_error=False)
-        load(verb).add_arguments(parser)
-        parser.parse_args(words)
+        parser_of(verb, load(verb)).parse_args(words)
 
 
 def test_the_pages_show_commands() -> None:

@@ -167,6 +167,11 @@ def positive(dimension: Dimension) -> Callable[[str], float]:
     return lambda text: _positive(text, dimension)
 
 
+def signed(dimension: Dimension) -> Callable[[str], float]:
+    """Return a reader of quantities of this dimension [SI], which may be below zero."""
+    return lambda text: _quantity(text, dimension)
+
+
 def count(text: str) -> int:
     """Read a whole number of at least 1."""
     if not text.isdecimal() or int(text) < 1:
@@ -175,13 +180,17 @@ def count(text: str) -> int:
 
 
 def _positive(text: str, dimension: Dimension) -> float:
-    try:
-        value = to_si(text, dimension)
-    except UnitError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+    value = _quantity(text, dimension)
     if value <= 0:
         raise argparse.ArgumentTypeError("must be above zero")
     return value
+
+
+def _quantity(text: str, dimension: Dimension) -> float:
+    try:
+        return to_si(text, dimension)
+    except UnitError as error:
+        raise argparse.ArgumentTypeError(": ".join(filter(None, (str(error), error.detail, error.help)))) from error
 
 
 def _short(one: GraphName, ends: tuple[str, str]) -> dict[str, Any]:

@@ -8,11 +8,12 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import NoReturn, TextIO
+from typing import Any, NoReturn, TextIO
 
 from rbxcompose.findings import Finding, Report, Severity, Sources
 from rbxcompose.rendering.text import render_text
@@ -102,7 +103,14 @@ def refuse(finding: Finding) -> int:
 
 
 class Parser(argparse.ArgumentParser):
-    """Parses the words after a verb; what it refuses is noted as well."""
+    """Parses the words after a verb; what it refuses is noted as well.
+
+    A quantity below zero, `-90deg`, is a value and not an option.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._negative_number_matcher = re.compile(r"-\.?\d")  # by itself, it knows only numbers without a unit
 
     def error(self, message: str) -> NoReturn:
         """Note the error, report it with the usage, and end the command."""
