@@ -137,6 +137,12 @@ def rotate(rotation: Quaternion, vector: Vector3) -> Vector3:
     )
 
 
+def lerp(a: Vector3, b: Vector3, fraction: float) -> Vector3:
+    """Return the vector at a fraction of the line from `a` to `b`."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    return (ax + (bx - ax) * fraction, ay + (by - ay) * fraction, az + (bz - az) * fraction)
+
+
 def slerp(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
     """Return the unit quaternion at a fraction of the shortest arc from `a` to `b`, at a constant angular speed."""
     ax, ay, az, aw = a
@@ -178,12 +184,6 @@ class Transform3:
     def compose(self, other: Transform3) -> Transform3:
         """Return `T_a_c` from this `T_a_b` and `other`, which is `T_b_c`."""
         return Transform3(self.apply(other.translation), multiply(self.rotation, other.rotation))
-
-    def towards(self, other: Transform3, fraction: float) -> Transform3:
-        """Return the pose at a fraction of the way to another one: on a line, and by the shortest arc."""
-        (ax, ay, az), (bx, by, bz) = self.translation, other.translation
-        moved = (ax + (bx - ax) * fraction, ay + (by - ay) * fraction, az + (bz - az) * fraction)
-        return Transform3(moved, slerp(self.rotation, other.rotation, fraction))
 
     def inverse(self) -> Transform3:
         """Return the pose of the outer frame in the inner one."""

@@ -159,7 +159,8 @@ class Body:
     def position(self, joint: BodyJoint, positions: Mapping[str, float]) -> float:
         """Return the position of a joint; one that is not in `positions` is at rest."""
         if joint.mimic is None:
-            return positions.get(joint.name, joint.rest)
+            known = positions.get(joint.name)
+            return joint.rest if known is None else known
         return joint.mimic.multiplier * self.position(self.joints[joint.mimic.joint], positions) + joint.mimic.offset
 
     def poses(self, positions: Mapping[str, float]) -> dict[str, Transform3]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 from bisect import bisect_left
 
-from rbxcompose.geometry import Transform3
+from rbxcompose.geometry import Transform3, lerp, slerp
 
 SPAN = 10_000_000_000  # [ns] before the newest pose: what is older is forgotten
 LATE = 1_000_000_000  # [ns]; a stamp that is older by more comes from a clock that was set back
@@ -64,7 +64,7 @@ class PoseHistory:
         if after == self._first:
             return None
         start, end = stamps[after - 1], stamps[after]
-        return self._pose(after - 1).towards(self._pose(after), (stamp - start) / (end - start))
+        return self._between(after, (stamp - start) / (end - start))
 
     def halve(self) -> None:
         """Forget the older half, but not the newest pose."""
@@ -91,6 +91,13 @@ class PoseHistory:
         self._first = max(0, self._first - count)
 
     def _pose(self, index: int) -> Transform3:
-        x, y, z, *rotation = self._numbers[index * _WIDTH : (index + 1) * _WIDTH]
-        qx, qy, qz, qw = rotation
+        x, y, z, qx, qy, qz, qw = self._numbers[index * _WIDTH : (index + 1) * _WIDTH]
         return Transform3((x, y, z), (qx, qy, qz, qw))
+
+    def _between(self, after: int, fraction: float) -> Transform3:
+        numbers = self._numbers[(after - 1) * _WIDTH : (after + 1) * _WIDTH]
+        x, y, z, qx, qy, qz, qw, next_x, next_y, next_z, next_qx, next_qy, next_qz, next_qw = numbers
+        return Transform3(
+            lerp((x, y, z), (next_x, next_y, next_z), fraction),
+            slerp((qx, qy, qz, qw), (next_qx, next_qy, next_qz, next_qw), fraction),
+        )

@@ -12,7 +12,7 @@ from rbxcompose.body import pose_history, transforms
 from rbxcompose.body.pose_history import LATE, SPAN
 from rbxcompose.body.transform_errors import ExtrapolationError, NotConnectedError, TransformError, UnknownFrameError
 from rbxcompose.body.transforms import TransformAnswer, TransformTree
-from rbxcompose.geometry import Pose2, Transform3
+from rbxcompose.geometry import Pose2, Transform3, composed, lerp, slerp
 from tests.body.moving_frames import MOST, POSES, SECOND, Move, angle_between, fill, is_same, moves
 
 TIMES = st.integers(0, MOST)
@@ -20,6 +20,10 @@ TIMES = st.integers(0, MOST)
 
 def at(x: float, heading: float = 0.0) -> Transform3:
     return Transform3.from_pose2(Pose2(x, 0.0, heading))
+
+
+def between(a: Transform3, b: Transform3, fraction: float) -> Transform3:
+    return Transform3(lerp(a.translation, b.translation, fraction), slerp(a.rotation, b.rotation, fraction))
 
 
 def moved(tree: TransformTree, stamp: float, pose: Transform3, child: str = "base") -> TransformAnswer:
@@ -56,7 +60,7 @@ def test_at_a_stamp_the_pose_is_exactly_what_was_sent(poses: list[Move]) -> None
 def test_between_two_poses_it_is_on_the_line_and_on_the_shortest_arc(
     a: Transform3, b: Transform3, fraction: float
 ) -> None:
-    found, whole = a.towards(b, fraction), angle_between(a.rotation, b.rotation)
+    found, whole = between(a, b, fraction), angle_between(a.rotation, b.rotation)
     assert math.hypot(*found.rotation) == pytest.approx(1.0)
     assert angle_between(a.rotation, found.rotation) == pytest.approx(fraction * whole, abs=1e-6)
     assert angle_between(found.rotation, b.rotation) == pytest.approx((1 - fraction) * whole, abs=1e-6)
@@ -72,7 +76,21 @@ def test_a_quaternion_and_its_opposite_are_the_same_rotation_on_the_way(
     x, y, z, w = b.rotation
     turned = Transform3(b.translation, (-x, -y, -z, -w))
     if angle_between(a.rotation, b.rotation) < math.pi - 1e-3:  # at half a turn, both ways are the shortest
-        assert is_same(a.towards(b, fraction), a.towards(turned, fraction))
+        assert is_same(between(a, b, fraction), between(a, turned, fraction))
+
+
+@given(moves(), moves(), TIMES)
+def test_at_any_time_it_is_between_the_poses_before_and_after(base: list[Move], arm: list[Move], time: int) -> None:
+    tree = TransformTree()
+    fill(tree, "odom", "base", base)
+    fill(tree, "base", "arm", arm)
+    expected = []
+    for poses in (arm, base):
+        after = next(index for index in range(1, len(poses)) if poses[index][0] >= time)
+        (start, a), (end, b) = poses[after - 1], poses[after]
+        expected.append(between(a, b, (time - start) / (end - start)))
+    assert is_same(tree.lookup_at("odom", "arm", time), expected[1].compose(expected[0]))
+    assert is_same(composed(expected), expected[1].compose(expected[0]))
 
 
 @given(moves(), moves(), POSES, TIMES)
