@@ -70,8 +70,9 @@ class TransformTree:
         `stamp` is the robot time [s] at which the transform was received, `measured` the stamp that it had [ns], by
         default the same. A static transform never grows old, and holds for all times.
 
-        A pose that comes late is put between the others; the newest stays the newest. One with a known stamp replaces
-        that pose. If the stamps go back further, the clock was set back, and the history begins again.
+        The newest pose is the one received last: a clock that is set back must not freeze a robot's view of itself. In
+        the history, a pose that comes up to 1 s late is put in its place; one with a known stamp replaces that pose. If
+        stamps go back further, the history begins again.
         """
         refusal = self._refusal(parent, child, transform)
         if refusal:
@@ -84,9 +85,9 @@ class TransformTree:
             return TransformAnswer(True, note)
         known = before.history if before and not moved else None
         history = PoseHistory() if known is None else known
-        time = round(stamp * NANOSECONDS) if measured is None else measured
-        note = self._remember(child, history, _Link(parent, transform, stamp, history), time) or note
-        return TransformAnswer(True, note)
+        late = self._remember(history, transform, round(stamp * NANOSECONDS) if measured is None else measured)
+        self._replace(child, _Link(parent, transform, stamp, history))
+        return TransformAnswer(True, note or (f"the stamps of '{child}' went back{late}" if late else ""))
 
     def lookup(self, target: str, source: str) -> Transform3 | None:
         """Return the newest pose of frame `source` in frame `target`, or None when they are not connected.
@@ -162,19 +163,19 @@ class TransformTree:
         stamp = self.stamp_of(target, source)
         return None if stamp is None else max(0.0, now - stamp)
 
-    def _remember(self, child: str, history: PoseHistory, link: _Link, measured: int) -> str:
-        """Add the pose of a link to its history, and return what is unusual about its stamp, if anything."""
-        was_set_back = history.is_set_back(measured)
-        is_late = len(history) > 0 and measured < history.newest and not was_set_back
+    def _remember(self, history: PoseHistory, pose: Transform3, measured: int) -> str:
+        """Add a pose to a history; if its stamp is not the newest, return what becomes of the history."""
+        late = ""
+        if history.is_set_back(measured):
+            late = ": its earlier poses are forgotten"
+        elif len(history) and measured < history.newest:
+            late = ", by less than a second"
         held = len(history)
-        history.add(measured, link.transform)
+        history.add(measured, pose)
         if self._kept + len(history) - held > MOST_POSES:
             history.halve()
         self._kept += len(history) - held
-        if is_late:
-            return f"a pose of '{child}' came late: only look-ups at a time use it"
-        self._replace(child, link)
-        return f"the stamps of '{child}' went back: its earlier poses are forgotten" if was_set_back else ""
+        return late
 
     def _replace(self, child: str, link: _Link) -> None:
         before = self._links.get(child)

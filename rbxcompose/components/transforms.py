@@ -114,7 +114,7 @@ class Transforms(Component[TransformsConfig]):
     def wake(self) -> None:
         """Publish all that moves and was not reported, so that a late subscriber has it soon.
 
-        It goes by the clock of who reported the joint before, so that no later report seems to be an older one.
+        It goes by the clock of who reported the joint before, so that no later report seems to be older.
         """
         quiet: dict[int, list[BodyJoint]] = {}
         for one in self.moving:

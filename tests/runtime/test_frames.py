@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -11,13 +12,14 @@ from rbxcompose.bus.attachment import Attachment
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.transport import Arrival, NoTransport
 from rbxcompose.clock import SteppedClock
+from rbxcompose.levels import Level
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.qos import Qos
-from rbxcompose.runtime.process_group.frames import Frames, Lookup
+from rbxcompose.runtime.process_group.frames import MOST_TOLD, Frames, Lookup
 from rbxcompose.scheduler import Scheduler
 
 
@@ -36,11 +38,15 @@ class World(NoTransport):
     is_patient: bool
     woken: int = 0
     arrived: list[Callable[[Arrival], None]] = field(default_factory=list)
+    logged: list[tuple[Level, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.clock, self.scheduler = SteppedClock(), Scheduler()
         bus = Bus(self.scheduler, self.clock, transport=self, log=lambda owner, text: None)
-        self.frames = Frames("host", bus, self.clock, is_patient=self.is_patient)
+        log = self.logged.append
+        self.frames = Frames(
+            "host", bus, self.clock, is_patient=self.is_patient, log=lambda level, text: log((level, text))
+        )
         self.look = Lookup(self.frames, "odom", "base")
 
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
@@ -129,3 +135,19 @@ def test_who_looks_in_vain_is_told_the_frames_or_the_times_that_there_are() -> N
     world.tell(1.0, 0.0)
     with pytest.raises(LookupError, match=r"known only until 1\.000 s, 1 s earlier"):
         world.look.transform(at=2_000_000_000)
+
+
+def test_what_is_wrong_with_transforms_is_logged_once_and_not_without_end() -> None:
+    world = World(is_patient=True)
+    for number in range(100):
+        world.tell(0.02 * number, 0.0, child="odom")
+        world.tell(0.02 * number, 0.0, child="base", stamp=50.0 - 2.0 * (number % 2))
+        world.x()
+    assert world.logged == [
+        (Level.WARN, "a transform is refused: 'odom' cannot be placed in 'odom': that is 'odom' itself or is below it"),
+        (Level.OK, "the stamps of 'base' went back: its earlier poses are forgotten"),
+    ]
+    for number in range(100):
+        world.tell(2.0 + 0.02 * number, math.nan, child=f"lamp_{number}")
+        world.x()
+    assert len(world.logged) == MOST_TOLD

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from rbxcompose.body.transform_errors import TransformError
-from rbxcompose.body.transforms import TransformTree
+from rbxcompose.body.transforms import TransformAnswer, TransformTree
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import NANOSECONDS, Clock
 from rbxcompose.geometry import Pose2, Transform3
+from rbxcompose.levels import Level
 from rbxcompose.msgs.geometry_msgs import TransformStamped
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.printable import plain
 from rbxcompose.qos import Qos
+
+MOST_TOLD = 20  # things about transforms that are logged
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +51,12 @@ class Frames:
     each run.
     """
 
-    def __init__(self, owner: str, bus: Bus, clock: Clock, *, is_patient: bool) -> None:
+    def __init__(
+        self, owner: str, bus: Bus, clock: Clock, *, is_patient: bool, log: Callable[[Level, str], None]
+    ) -> None:
         self.tree = TransformTree()
-        self._clock = clock
+        self._clock, self._log = clock, log
+        self._told: set[str] = set()
         self._lock = threading.Lock()  # who looks back from another thread must not see a history that changes
         self._moving = bus.subscribe(owner, "/tf", TFMessage, Qos.STATE, self._move, is_patient=is_patient)
         bus.subscribe(owner, "/tf_static", TFMessage, Qos.LATCHED, self._fix)
@@ -86,14 +94,21 @@ class Frames:
         with self._lock:
             for one in message.transforms:
                 time = to_nanoseconds(one.header.stamp) or unstamped
-                self.tree.set(
-                    one.header.frame_id,
-                    one.child_frame_id,
-                    _transform(one),
-                    stamp=received,
-                    static=static,
-                    measured=time,
-                )
+                parent, child, pose = one.header.frame_id, one.child_frame_id, _transform(one)
+                answer = self.tree.set(parent, child, pose, stamp=received, static=static, measured=time)
+                if answer.message:
+                    self._tell(answer)
+
+    def _tell(self, answer: TransformAnswer) -> None:
+        """Log once what is unusual about a transform; after very many such, nothing more."""
+        text = plain(answer.message)
+        if text in self._told or len(self._told) == MOST_TOLD:
+            return
+        self._told.add(text)
+        if answer.accepted:
+            self._log(Level.OK, text)
+        else:
+            self._log(Level.WARN, f"a transform is refused: {text}")
 
 
 def _transform(message: TransformStamped) -> Transform3:

@@ -89,7 +89,8 @@ class Host:
         looking = (port for one in instances for port in component_type(one.type).ports(one.config).values())
         if not any(isinstance(port, Looks) for port in looking):
             return None
-        return Frames(self.owner, self.bus, self.clock, is_patient=self._post is not None)
+        log = partial(self.log, self.owner)
+        return Frames(self.owner, self.bus, self.clock, is_patient=self._post is not None, log=log)
 
     # Lifecycle of the whole process
 
