@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import rbxcompose
+from rbxcompose.body.prefixes import missing_prefixes
 from rbxcompose.body.xml_reader import PLACE, span_of_place
 from rbxcompose.findings import Finding, Span, kind
 from rbxcompose.manifest.files import shown_name
@@ -50,9 +51,10 @@ _PLACES = re.compile(rf' {PLACE}="[^"]*"')
 
 @dataclass(frozen=True, slots=True)
 class Expanded:
-    """URDF text whose elements say where they were written."""
+    """URDF text whose elements say where they were written; `notes` are what to say about the xacro files."""
 
     located: str
+    notes: tuple[Finding, ...] = ()
 
     @property
     def text(self) -> str:
@@ -81,7 +83,7 @@ def expand(
     if "error" in answer:
         place = span_of_place(answer["place"]) if answer["place"] else span
         return NOT_EXPANDED.at(place, plain(" ".join(answer["error"].split()), 300)), files
-    return Expanded(answer["text"]), files
+    return Expanded(answer["text"], tuple(missing_prefixes(answer["bare"]))), files
 
 
 @once  # profiles are tried one after another, and few change the body

@@ -1,0 +1,77 @@
+"""Tags of xacro without a prefix: what `check` says about them, and the edits that write the prefix."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from rbxcompose.findings import Edit, Finding, Fix, Severity, Span, kind
+from rbxcompose.manifest.files import shown_name
+from rbxcompose.manifest.library import library_root
+from rbxcompose.printable import plain
+
+NO_PREFIX = kind(
+    "RBX2014",
+    """Tags of xacro without the prefix `xacro:`
+
+ROS 1 read `<macro>`, `<property>`, `<include>`, `<if>` and calls of macros without a prefix. xacro of ROS 2 takes them
+for URDF and leaves them as they are. They are read here as they were meant; `check --fix` writes the prefix, so that
+other programs can read the file, too.
+
+Bad:
+```xml
+<robot name="cart">
+  <property name="side" value="left"/>
+  <macro name="wheel" params="name"><link name="${name}_wheel"/></macro>
+  <wheel name="${side}"/>
+</robot>
+```
+Good:
+```xml
+<robot name="cart" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:property name="side" value="left"/>
+  <xacro:macro name="wheel" params="name"><link name="${name}_wheel"/></xacro:macro>
+  <xacro:wheel name="${side}"/>
+</robot>
+```
+""",
+    Severity.WARNING,
+    is_fixable=True,
+)
+PREFIX = "xacro:"
+BINDING = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+_SHOWN = 60  # characters of a name in a message
+
+
+def missing_prefixes(files: Mapping[str, Mapping[str, Any]]) -> Iterator[Finding]:
+    """Yield one finding for each file with bare tags, as the fenced process tells them."""
+    for path, found in files.items():
+        file, (line, column, name, _) = shown_name(Path(path)), found["tags"][0]
+        count = len(found["tags"])
+        others = "" if count == 1 else f", like {count - 1} other {'tag' if count == 2 else 'tags'} of this file"
+        is_ours = not Path(path).is_relative_to(library_root())
+        yield NO_PREFIX.at(
+            Span(file, line, column, line, column + len(name) + 1),
+            f"'<{plain(name, _SHOWN)}>' lacks the prefix '{PREFIX}'{others}",
+            help="write it, since xacro of ROS 2 needs it",
+            fix=Fix(
+                tuple(_edits(file, found)), True, f"prefix '{PREFIX}' for {count} {'tag' if count == 1 else 'tags'}"
+            )
+            if is_ours
+            else None,
+        )
+
+
+def _edits(file: str, found: Mapping[str, Any]) -> Iterator[Edit]:
+    if found["root"] is not None:
+        line, column, name, _ = found["root"]
+        yield _edit(file, line, column, f"<{name}", f"<{name} {BINDING}")
+    for line, column, name, closed in found["tags"]:
+        yield _edit(file, line, column, f"<{name}", f"<{PREFIX}{name}")
+        if closed is not None:
+            yield _edit(file, closed[0], closed[1], f"</{name}", f"</{PREFIX}{name}")
+
+
+def _edit(file: str, line: int, column: int, old: str, new: str) -> Edit:
+    return Edit(Span(file, line, column, line, column + len(old)), old, new)
