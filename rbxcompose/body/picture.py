@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rbxcompose.body.mesh_files import FORMATS, LARGEST, mesh_problem
 from rbxcompose.body.model import Body, Geometry, Shape
 from rbxcompose.findings import Finding, kind
 from rbxcompose.geometry import Transform3
 from rbxcompose.printable import plain
+from rbxcompose.regular_files import read_regular
 
 Trimesh = Any  # of an extra, which may be missing
 
@@ -37,7 +39,7 @@ _LIGHT = (0.4, -0.75, 1.0)
 _AMBIENT = 0.35
 _FIELD = math.radians(30)  # of view
 _MARGIN = 1.08
-_LARGEST_MESH = 64_000_000  # [bytes]
+_FARTHEST = 1e6  # [m] from the root: more is no robot, and rays are computed with few digits
 _ROUND = 48  # faces around a cylinder
 _NEEDED = ("trimesh", "embreex", "PIL")
 
@@ -71,6 +73,8 @@ def draw(body: Body, positions: Mapping[str, float], meshes: Mapping[str, Path])
         raise ValueError("the body has no shapes")
     colours = np.concatenate([np.tile(colour[:3], (len(solid.faces), 1)) for solid, colour in solids])
     whole: Any = trimesh.util.concatenate([solid for solid, _ in solids])
+    if not np.abs(whole.vertices).max() <= _FARTHEST:  # also if it is not a number
+        raise ValueError(f"a part of the body is further than {_FARTHEST:g} m away")
     pixels = _rendered(whole, colours, SIZE * _FINER)
     picture = Image.fromarray((pixels * 255).round().astype(np.uint8)).resize((SIZE, SIZE), Image.Resampling.BOX)
     out = io.BytesIO()
@@ -116,10 +120,13 @@ def _solid(geometry: Geometry, meshes: Mapping[str, Path]) -> Any:
     path = meshes.get(geometry.file)
     if path is None:
         return None
-    if path.stat().st_size > _LARGEST_MESH:
-        raise ValueError(f"the mesh '{plain(geometry.file)}' is larger than {_LARGEST_MESH:,} bytes")
+    if problem := mesh_problem(path):
+        raise ValueError(f"the mesh '{plain(geometry.file)}' {problem}")
+    if (ending := path.suffix.lower()) not in FORMATS:
+        raise ValueError(f"the mesh '{plain(geometry.file)}' is none of {', '.join(FORMATS)}")
     try:
-        mesh: Any = load_mesh(path)
+        data = io.BytesIO(read_regular(path, LARGEST))  # without its path, a mesh cannot name further files
+        mesh: Any = load_mesh(data, file_type=ending.removeprefix("."))
         mesh.apply_scale(geometry.size)
         is_empty = not len(mesh.faces)
     except Exception as error:  # readers of many formats raise anything

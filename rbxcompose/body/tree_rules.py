@@ -75,11 +75,11 @@ def _unknown_links(body: Body) -> Iterator[Finding]:
 
 
 def _wrong_mimics(body: Body) -> Iterator[Finding]:
+    moving = [one.name for one in body.moving]
     for joint in body.joints.values():
         if joint.mimic is None:
             continue
         other = body.joints.get(joint.mimic.joint)
-        moving = [one.name for one in body.moving]
         if other is None:
             message = f"joint '{plain(joint.name, _SHOWN)}' mimics a joint that does not exist"
             yield NO_LINK.misspelt(joint.mimic.span, message, joint.mimic.joint, moving, "joints that move")

@@ -65,6 +65,7 @@ _SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("
 _GEOMETRIES = ("box", *_SIZES, "mesh")
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _SHOWN = 60
+LARGEST = 1e100  # so that sums and squares of numbers stay finite
 Colour = tuple[float, float, float, float]
 T = TypeVar("T")
 N = TypeVar("N", BodyLink, BodyJoint)
@@ -249,8 +250,9 @@ def numbers(element: XmlElement, name: str, count: int) -> tuple[float, ...]:
     """Return an attribute that is `count` finite numbers."""
     written = text(element, name)
     found = tuple(_numbers_in(written)) if len(written) < 1000 else ()
-    if len(found) != count or not all(map(math.isfinite, found)):
+    if len(found) != count or not all(abs(one) <= LARGEST for one in found):
         what = "a finite number" if count == 1 else f"{count} finite numbers"
+        what += f" up to {LARGEST:g}" if all(map(math.isfinite, found)) and len(found) == count else ""
         message = f"'{name}' of '<{element.name}>' must be {what}, not '{plain(written, _SHOWN)}'"
         raise _MistakeError(WRONG_VALUE.at(element.span, message))
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -24,7 +25,8 @@ NOT_EXPANDED = kind(
     """A xacro file cannot be expanded
 
 An expression is wrong, a macro or a property does not exist, an included file is missing, or the expansion takes more
-than 2 s or 256 MB. `$(find PACKAGE)` looks up `packages:` of the `body`; the environment is not read.
+than 1.2 s of processor time or 140 MB. `$(find PACKAGE)` looks up `packages:` of the `body`; the environment is not
+read.
 
 A xacro file is a program. It runs in a process of its own without the environment, may read files of the project and of
 its packages only, and writes nothing. That fences it, but does not make a stranger's file safe.
@@ -90,19 +92,27 @@ def expand(
 def _answer(request: str) -> dict[str, Any] | None:
     """Return the child's answer to a request in JSON; None if it does not end within its limits."""
     package = str(Path(rbxcompose.__file__).parents[1])
+    with os.fdopen(os.memfd_create("xacro"), "rb") as output:  # a file, since its size can be limited
+        try:
+            child = subprocess.run(
+                [sys.executable, "-E", "-s", "-B", "-c", _RUN, package],
+                input=request.encode(),
+                stdout=output,
+                stderr=subprocess.DEVNULL,  # xacro warns there of what is deprecated
+                timeout=DEADLINE,
+                env={},
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            return None
+        output.seek(0)
+        return _read(output.read()) if child.returncode == 0 else None
+
+
+def _read(answer: bytes) -> dict[str, Any] | None:
+    """Return the answer; None if it is none, since what a file brings along may have ended the process."""
     try:
-        child = subprocess.run(
-            [sys.executable, "-E", "-s", "-B", "-c", _RUN, package],
-            input=request,
-            capture_output=True,
-            text=True,
-            timeout=DEADLINE,
-            env={},
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
+        read = json.loads(answer)
+    except ValueError:
         return None
-    if child.returncode != 0:
-        return None
-    answer: dict[str, Any] = json.loads(child.stdout)
-    return answer
+    return read if isinstance(read, dict) and read.keys() >= {"files"} else None

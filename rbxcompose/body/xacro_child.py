@@ -10,7 +10,7 @@ from __future__ import annotations
 import glob
 import json
 import os
-import resource
+import re
 import sys
 import xml.dom.minidom
 from collections.abc import Callable, Iterator
@@ -21,19 +21,15 @@ import xacro
 from xacro import substitution_args
 
 from rbxcompose.body.bare_tags import PLACE, BareTags
-from rbxcompose.body.located_xml import LocatedXml
+from rbxcompose.body.fence import fence, is_below
+from rbxcompose.body.located_xml import LocatedXml, RefusedXmlError
 from rbxcompose.regular_files import read_regular
 
-SECONDS = 2  # of processor time
-MEMORY = 256_000_000  # [bytes] of address space beyond what it has at its start
 OUTPUT = 8_000_000  # [bytes] of expanded text
 FILE = 2_000_000  # [bytes] of one file
 DEPTH = 16  # of files that include each other
-NO_TIME = 3  # exit code
-_REFUSED = ("socket.", "subprocess.", "os.exec", "os.system", "os.fork", "os.posix_spawn", "os.kill", "os.remove",
-            "os.rename", "os.mkdir", "os.rmdir", "os.chmod", "os.link", "os.symlink", "os.truncate", "os.putenv",
-            "ctypes.", "shutil.", "import", "sys._getframe")  # fmt: skip
-_LISTED = ("os.listdir", "os.scandir")
+TOO_MUCH = "it needs more memory or deeper macros than a description may"
+_CLASS = re.compile(r"^<class '[^']*'>: ")  # what xacro writes before some messages
 
 
 class _Expansion:
@@ -49,7 +45,7 @@ class _Expansion:
     def parse(self, inp: object, filename: str | None = None) -> xml.dom.minidom.Document:
         """Read a file in the place of `xacro.parse`: only one below the roots; each element keeps its place."""
         path = os.path.realpath(filename or "")
-        if not _is_below(path, self.roots):
+        if not is_below(path, self.roots):
             raise xacro.XacroException(f"'{filename}' is outside the project and its packages")
         if len(xacro.filestack) > DEPTH:
             raise xacro.XacroException(f"files include each other more than {DEPTH} deep")
@@ -63,6 +59,9 @@ class _Expansion:
         builder = LocatedXml(path, data)
         try:
             document = builder.parseString(data)
+        except RefusedXmlError as error:
+            self.place = f"{path}|{error.lineno}|{error.offset + 1}|1"
+            raise xacro.XacroException(str(error)) from None
         except Exception as error:
             self.place = f"{path}|{getattr(error, 'lineno', 1)}|{getattr(error, 'offset', 0) + 1}|1"
             raise xacro.XacroException(f"this is not XML: {error}") from None
@@ -116,50 +115,29 @@ def expand(request: dict[str, Any]) -> dict[str, Any]:
     try:
         document = xacro.process_file(request["file"], mappings=dict(request["arguments"]))
         text = document.toxml()
-    except (MemoryError, RecursionError):
-        return {"error": "it needs more memory or deeper macros than a description may", "place": expansion.where(),
-                "files": expansion.files}  # fmt: skip
     except BaseException as error:  # its expressions may raise anything
-        return {"error": str(error) or type(error).__name__, "place": expansion.where(), "files": expansion.files}
-    if len(text) > OUTPUT:
+        return {"error": _reason(error), "place": expansion.where(), "files": expansion.files}
+    if len(text.encode(errors="replace")) > OUTPUT:
         return {"error": f"it expands to more than {OUTPUT:,} bytes", "place": "", "files": expansion.files}
     return {"text": text, "files": expansion.files, "bare": expansion.bare.told()}
 
 
-def _is_below(path: str, roots: list[str]) -> bool:
-    return any(os.path.commonpath([path, root]) == root for root in roots)
-
-
-def fence(roots: list[str]) -> None:
-    """Limit what this process can use, and refuse what a description has no use for."""
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-    most = pages * resource.getpagesize() + MEMORY
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
-    for limit in (resource.RLIMIT_FSIZE, resource.RLIMIT_CORE):
-        resource.setrlimit(limit, (0, 0))
-    resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
-    real = [os.path.realpath(root) for root in roots]
-
-    def audit(event: str, arguments: tuple[Any, ...]) -> None:
-        if event == "open" and isinstance(arguments[0], str | bytes):
-            path = os.path.realpath(os.fsdecode(arguments[0]))
-            is_read = not arguments[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND)
-            if not (is_read and _is_below(path, real)):
-                raise PermissionError("a description may only read files of its project")
-        elif event in _LISTED and isinstance(arguments[0], str | bytes):
-            if not _is_below(os.path.realpath(os.fsdecode(arguments[0])), real):
-                raise PermissionError("a description may only list folders of its project")
-        elif event.startswith((*_REFUSED, *_LISTED)):
-            raise PermissionError(f"a description may not use {event}")
-
-    sys.addaudithook(audit)
+def _reason(error: BaseException) -> str:
+    """Return what to say about an error; xacro wraps errors, and those about memory have no words of their own."""
+    one: BaseException | None = error
+    while one is not None:
+        if isinstance(one, MemoryError | RecursionError):
+            return TOO_MUCH
+        one = one.__cause__ or one.__context__
+    words = _CLASS.sub("", str(error)) or type(error).__name__
+    half = len(words) // 2
+    return words[:half] if words[:half] == words[half + 1 :] else words  # xacro says some things twice
 
 
 def main() -> None:
     """Answer one request."""
     request = json.load(sys.stdin)
     fence(request["roots"])
-    sys.stdout.write(json.dumps(expand(request)))
-    sys.stdout.flush()
+    sys.stdout.buffer.write(json.dumps(expand(request), ensure_ascii=False).encode(errors="replace"))
+    sys.stdout.buffer.flush()
     os._exit(0)

@@ -28,7 +28,7 @@ NOT_SHOWN = {
     "RBX1303": "the mistake is on the command line",
     "RBX1308": "the mistake is in two files",
     **dict.fromkeys(
-        [f"RBX20{n:02}" for n in range(1, 15)], "the mistake is in a URDF file; tests of these try the examples"
+        [f"RBX20{n:02}" for n in range(1, 16)], "the mistake is in a URDF file; tests of these try the examples"
     ),
     "RBX7003": "the example would be too large to read",
     "RBX4115": "the example is cut short: nobody wants to read 40 levels",

@@ -1,0 +1,62 @@
+"""What a process that evaluates the text of strangers may use: little time and memory, and files of its project."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+SECONDS = 1.2  # of processor time; with the rest of `check`, a file that never ends is told within 2 s
+MEMORY = 140_000_000  # [bytes] of address space beyond what it has at its start
+ANSWER = 20_000_000  # [bytes] that it may write in all, to files that are open already
+_HARMLESS = {"compile", "exec", "glob.glob", "glob.glob/2", "builtins.id"}
+_LISTS = ("os.listdir", "os.scandir")
+_WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+
+
+def is_below(path: str, roots: Iterable[str]) -> bool:
+    """Return whether a real path is one of the roots or lies below one."""
+    return any(os.path.commonpath([path, root]) == root for root in roots)
+
+
+def fence(roots: Iterable[str]) -> None:
+    """Limit what this process can use from now on, and refuse whatever Python reports that is not needed."""
+    real = [os.path.realpath(root) for root in roots]
+    _limit()
+
+    def audit(event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open":
+            if not _may_open(arguments[0], arguments[2], real):
+                raise PermissionError("a description may only read files of its project")
+        elif event in _LISTS:
+            if not _may_open(arguments[0], os.O_RDONLY, real):
+                raise PermissionError("a description may only list folders of its project")
+        elif event not in _HARMLESS:
+            raise PermissionError(f"a description may not use {event}")
+
+    sys.addaudithook(audit)
+
+
+def _limit() -> None:
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    most = pages * resource.getpagesize() + MEMORY
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    signal.setitimer(signal.ITIMER_PROF, SECONDS)  # ends the process
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    last = int(used.ru_utime + used.ru_stime + SECONDS) + 1  # if it resets the timer
+    resource.setrlimit(resource.RLIMIT_CPU, (last, last))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (ANSWER, ANSWER))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+
+
+def _may_open(file: object, flags: int, roots: list[str]) -> bool:
+    if isinstance(file, int):  # it is open already
+        return True
+    return (
+        isinstance(file, str | bytes) and not flags & _WRITES and is_below(os.path.realpath(os.fsdecode(file)), roots)
+    )
