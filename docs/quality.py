@@ -20,6 +20,8 @@ examples), `make soak` the numbers in the table. A failure becomes a file that e
   system, give a value beyond the limits, or take half a second; each batch has 200 MB.
 - **Hostile manifests** (`tests/hostile`): written to take time or memory, to read what they may not, or to write to the
   terminal. Each must be refused with a place, within 2 s (times 3 for slow machines) and 200 MB.
+- **Poses of links** (`tests/body`): where every link of a body is at random positions of its joints, by our model, by
+  Pinocchio and by yourdfpy. No entry of a matrix may differ by more than 1e-9.
 - **Storms over simulated robots** (`tests/simulated_faults`): runs the patrol robot with its real conductor and
   processes, in virtual time, over a network that delays, loses, duplicates and reorders. Processes are killed and
   hang, links break, components raise, commands make no sense, people stop, release and set parameters, all from one

@@ -1,0 +1,73 @@
+"""Two libraries and ours agree where every link is: for shipped robots and for random ones, at random positions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rbxcompose.body.description import Description
+from rbxcompose.compiler import compile_robot
+from tests.body.kinematics import Three, description_of
+from tests.body.random_bodies import positions, urdfs
+from tests.soak import Soak
+
+ROBOTS = sorted((Path(__file__).parents[2] / "robots").glob("*/robot.yaml"))
+CLOSE = 1e-9
+
+
+def bodies() -> dict[str, Description]:
+    """Return the body of each robot that has one, in each profile."""
+    found = {}
+    for file in ROBOTS:
+        plain = compile_robot(str(file), environment={}).robot
+        assert plain, file
+        if plain.manifest.body is None:
+            continue
+        found[file.parent.name] = plain.manifest.body
+        for profile in plain.manifest.profiles:
+            robot = compile_robot(str(file), profiles=[profile], environment={}).robot
+            assert robot, (file, profile)
+            assert robot.manifest.body
+            found[f"{file.parent.name} {profile}"] = robot.manifest.body
+    return found
+
+
+@pytest.mark.timeout(600)
+def test_three_libraries_agree_on_every_link_of_the_shipped_robots(soak: Soak) -> None:
+    examples = soak.examples(20, 1000)
+    found = bodies()
+    for name, description in found.items():
+        _agree(name, Three(description), examples)
+    links = sum(len(one.body.links) for one in found.values())
+    note = f"{links} links of {', '.join(found)} at each example, beside two libraries"
+    soak.tell("poses of links: shipped robots", examples, 0, note)
+
+
+def _agree(name: str, three: Three, examples: int) -> None:
+    @settings(max_examples=examples, deadline=None, database=None)
+    @given(positions(three.body))
+    def agree(at: dict[str, float]) -> None:
+        assert three.largest_difference(at) < CLOSE, name
+
+    agree()
+
+
+@pytest.mark.timeout(600)
+def test_three_libraries_agree_on_every_link_of_a_random_body(soak: Soak) -> None:
+    examples = soak.examples(40, 1000)
+    links: list[int] = []
+
+    @settings(max_examples=examples, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @given(st.data(), urdfs())
+    def agree(data: st.DataObject, text: str) -> None:
+        three = Three(description_of(text))
+        links.append(len(three.body.links))
+        for _ in range(3):
+            assert three.largest_difference(data.draw(positions(three.body))) < CLOSE
+
+    agree()
+    note = f"{sum(links):,} links at 3 positions, beside two libraries"
+    soak.tell("poses of links: random bodies", examples, 0, note)
