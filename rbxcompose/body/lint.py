@@ -5,80 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator
 
-import numpy as np
-
-from rbxcompose.body.model import Body, BodyLink, Inertial, Shape
+from rbxcompose.body.masses import mass_mistakes
+from rbxcompose.body.model import Body, BodyJoint, BodyLink, JointLimits, Shape
 from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
 
-NO_MASS = kind(
-    "RBX2009",
-    """A link that moves has no mass
-
-Physics engines cannot move a link without mass, and the dynamics of an arm would be wrong. Links without shapes are
-frames and need none.
-
-Bad:
-```xml
-<link name="base"/>
-<link name="wheel">
-  <visual><geometry><sphere radius="0.05"/></geometry></visual>
-</link>
-<joint name="turn" type="continuous">
-  <parent link="base"/>
-  <child link="wheel"/>
-</joint>
-```
-Good:
-```xml
-<link name="base"/>
-<link name="wheel">
-  <visual><geometry><sphere radius="0.05"/></geometry></visual>
-  <inertial>
-    <mass value="0.1"/>
-    <inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-4"/>
-  </inertial>
-</link>
-<joint name="turn" type="continuous">
-  <parent link="base"/>
-  <child link="wheel"/>
-</joint>
-```
-""",
-    Severity.WARNING,
-)
-NO_INERTIA = kind(
-    "RBX2010",
-    """No rigid body has this inertia
-
-A mass is positive. The principal moments of inertia are positive, and none is larger than the sum of the two others.
-
-Bad:
-```xml
-<link name="base">
-  <inertial>
-    <mass value="1"/>
-    <inertia ixx="1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>
-  </inertial>
-</link>
-```
-Good:
-```xml
-<link name="base">
-  <inertial>
-    <mass value="1"/>
-    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>
-  </inertial>
-</link>
-```
-""",
-    Severity.WARNING,
-)
 NO_MOTION = kind(
     "RBX2011",
     """The limits of a joint let it do nothing
 
-Its range has no length, or its greatest speed or effort is zero. Planners and controllers would never move it.
+Its range has no length, or its greatest speed is zero. Some programs never move such a joint, others take a speed of
+zero for no limit.
 
 Bad:
 ```xml
@@ -145,55 +82,35 @@ Good:
     Severity.WARNING,
 )
 LARGEST = 20.0  # [m]
-_TOLERANCE = 1e-6  # relative, of moments that were rounded when they were written
+_WRITE = "write what the motor can do"
+_UNWRITTEN = "a limit that is not written is 0; joints without limits are 'continuous', those that never move 'fixed'"
 _SHOWN = 60
 
 
 def lint(body: Body, meshes: Collection[str]) -> Iterator[Finding]:
     """Yield what is wrong with a body; `meshes` are the names of the mesh files that exist."""
-    moved = _moved(body)
+    yield from mass_mistakes(body)
     for link in body.links.values():
-        if link.name in moved and link.inertial is None and (link.visuals or link.collisions):
-            yield NO_MASS.at(link.span, f"link '{plain(link.name, _SHOWN)}' moves and has no mass")
-        if link.inertial is not None and (problem := _impossible(link.inertial)):
-            yield NO_INERTIA.at(link.inertial.span, f"link '{plain(link.name, _SHOWN)}' {problem}")
         yield from _shapes(link, meshes)
     for joint in body.joints.values():
-        if joint.limits is None or not joint.moves:
+        if joint.limits is None or not joint.moves or not (stuck := list(_stuck(joint, joint.limits))):
             continue
-        limits, stuck = joint.limits, [name for name in ("effort", "velocity") if getattr(joint.limits, name) == 0.0]
-        if joint.kind != "continuous" and limits.lower == limits.upper:
-            stuck.insert(0, "range")
-        if stuck:
-            message = f"the {' and the '.join(stuck)} of joint '{plain(joint.name, _SHOWN)}' {_be(stuck)} zero"
-            yield NO_MOTION.at(limits.span, message, help="write what the motor can do")
+        message = f"the {' and the '.join(stuck)} of joint '{plain(joint.name, _SHOWN)}' {_be(stuck)} zero"
+        yield NO_MOTION.at(joint.limits.span, message, help=_UNWRITTEN if stuck == ["range"] else _WRITE)
+
+
+def _stuck(joint: BodyJoint, limits: JointLimits) -> Iterator[str]:
+    """Yield the limits that are zero. An effort of zero alone makes a passive joint, such as that of a caster."""
+    if joint.kind != "continuous" and (limits.lower or 0.0) == (limits.upper or 0.0):
+        yield "range"
+    if limits.velocity == 0.0 and joint.mimic is None:  # a follower is as fast as its leader
+        yield "velocity"
+        if limits.effort == 0.0:
+            yield "effort"
 
 
 def _be(words: list[str]) -> str:
     return "is" if len(words) == 1 else "are"
-
-
-def _moved(body: Body) -> set[str]:
-    """Return the links below any joint that moves."""
-    found: set[str] = set()
-    for name, _ in body.walk():
-        for joint in body.joints_below[name]:
-            if joint.moves or name in found:
-                found.add(joint.child)
-    return found
-
-
-def _impossible(inertial: Inertial) -> str:
-    """Return why no rigid body has this mass and inertia, or nothing."""
-    if inertial.mass <= 0.0:
-        return f"has the mass {inertial.mass:g} kg"
-    ixx, ixy, ixz, iyy, iyz, izz = inertial.inertia
-    least, middle, most = np.linalg.eigvalsh([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    if least <= 0.0:
-        return "has a moment of inertia that is not positive"
-    if most > (least + middle) * (1 + _TOLERANCE):
-        return "has a moment of inertia larger than the two others together"
-    return ""
 
 
 def _shapes(link: BodyLink, meshes: Collection[str]) -> Iterator[Finding]:

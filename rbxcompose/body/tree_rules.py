@@ -81,7 +81,8 @@ def _wrong_mimics(body: Body) -> Iterator[Finding]:
             continue
         other = body.joints.get(joint.mimic.joint)
         if other is None:
-            message = f"joint '{plain(joint.name, _SHOWN)}' mimics a joint that does not exist"
+            words = f"joint '{plain(joint.name, _SHOWN)}' mimics a joint that does not exist"
+            message = f"{words}: '{plain(joint.mimic.joint, _SHOWN)}'"
             yield NO_LINK.misspelt(joint.mimic.span, message, joint.mimic.joint, moving, "joints that move")
         elif other.mimic is not None or not other.moves:
             does = "mimics another joint itself" if other.mimic else "does not move"

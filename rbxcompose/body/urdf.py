@@ -154,6 +154,8 @@ class _BodyReader:
         if kind_ in ("revolute", "prismatic") and limit is None:
             message = f"joint '{plain(name, _SHOWN)}' is {kind_} and needs '<limit>'"
             raise _MistakeError(WRONG_VALUE.at(element.span, message, help="or make it 'continuous'"))
+        if kind_ in ("fixed", "floating"):
+            axis = None  # exporters write zeros, since nothing uses it
         return BodyJoint(
             name,
             kind_,

@@ -103,7 +103,11 @@ TWO = '<link name="a"/><link name="b"/>'
 MISTAKES = {
     "a number that is none": (TWO + JOINT + '<origin xyz="0 0 nan"/></joint>', "RBX2003", "3 finite numbers"),
     "too few numbers": (TWO + JOINT + '<origin xyz="0 0"/></joint>', "RBX2003", "3 finite numbers"),
-    "an axis of no length": (TWO + JOINT + '<axis xyz="0 0 0"/></joint>', "RBX2003", "length zero"),
+    "an axis of no length": (
+        TWO + JOINT.replace("fixed", "continuous") + '<axis xyz="0 0 0"/></joint>',
+        "RBX2003",
+        "length zero",
+    ),
     "an unknown type": (TWO + JOINT.replace("fixed", "revolut") + "</joint>", "RBX2003", "type 'revolut'"),
     "no limits": (TWO + JOINT.replace("fixed", "revolute") + "</joint>", "RBX2003", "needs '<limit>'"),
     "limits the wrong way round": (

@@ -1,0 +1,158 @@
+"""Rules for the masses of a body; what fixed joints hold together is one rigid body, as in physics engines. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbxcompose.body.model import Body, BodyLink, Inertial
+from rbxcompose.findings import Finding, Severity, kind
+from rbxcompose.geometry import Transform3, rotate
+from rbxcompose.printable import plain
+
+NO_MASS = kind(
+    "RBX2009",
+    """A link that moves has no mass
+
+Physics engines cannot move a link without mass, and the dynamics of an arm would be wrong. Links without shapes are
+frames and need none; so is a link that a fixed joint holds to one with mass.
+
+Bad:
+```xml
+<link name="base"/>
+<link name="wheel">
+  <visual><geometry><sphere radius="0.05"/></geometry></visual>
+</link>
+<joint name="turn" type="continuous">
+  <parent link="base"/>
+  <child link="wheel"/>
+</joint>
+```
+Good:
+```xml
+<link name="base"/>
+<link name="wheel">
+  <visual><geometry><sphere radius="0.05"/></geometry></visual>
+  <inertial>
+    <mass value="0.1"/>
+    <inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-4"/>
+  </inertial>
+</link>
+<joint name="turn" type="continuous">
+  <parent link="base"/>
+  <child link="wheel"/>
+</joint>
+```
+""",
+    Severity.WARNING,
+)
+NO_INERTIA = kind(
+    "RBX2010",
+    """No rigid body has this inertia
+
+No mass and no principal moment of inertia is negative, and no moment is larger than the sum of the two others. A link
+may be a point or a line only if others are fixed to it, so that no moment of all of them together is zero.
+
+Bad:
+```xml
+<link name="base">
+  <inertial>
+    <mass value="1"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>
+  </inertial>
+</link>
+```
+Good:
+```xml
+<link name="base">
+  <inertial>
+    <mass value="1"/>
+    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>
+  </inertial>
+</link>
+```
+""",
+    Severity.WARNING,
+)
+_TOLERANCE = 1e-6  # relative, of moments that were rounded when they were written
+_THIN = 1e-6  # [m]: a mass that is nearer than this to an axis has no moment about it
+_SHOWN = 60
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+Array = NDArray[np.float64]
+
+
+def mass_mistakes(body: Body) -> Iterator[Finding]:
+    """Yield links that lack a mass, and masses and inertias that nothing has."""
+    for link in body.links.values():
+        if link.inertial is not None and (problem := _impossible(link.inertial)):
+            yield NO_INERTIA.at(link.inertial.span, f"link '{plain(link.name, _SHOWN)}' {problem}")
+    for links in _rigid_bodies(body):
+        yield from _mistakes_of_one(body, links)
+
+
+def _rigid_bodies(body: Body) -> list[list[BodyLink]]:
+    """Return the links that fixed joints hold together; the first link of each carries the others."""
+    found: dict[str, list[BodyLink]] = {}
+    for name, _ in body.walk():
+        joint = body.joint_above.get(name)
+        found[name] = found[joint.parent] if joint is not None and joint.kind == "fixed" else []
+        found[name].append(body.links[name])
+    return [links for name, links in found.items() if links[0].name == name]
+
+
+def _mistakes_of_one(body: Body, links: Sequence[BodyLink]) -> Iterator[Finding]:
+    first = links[0]
+    heavy = [link for link in links if link.inertial is not None and link.inertial.mass > 0.0]
+    if not heavy and first.name in body.joint_above and any(link.visuals or link.collisions for link in links):
+        yield NO_MASS.at(first.span, f"link '{plain(first.name, _SHOWN)}' moves and has no mass")
+    parts = [link.inertial for link in heavy if link.inertial is not None]
+    if any(_impossible(one) for one in parts) or not all(_is_thin(one.mass, _tensor(one)) for one in parts):
+        return
+    if heavy and _is_thin(*_together(body, heavy)):
+        others = " and what is fixed to it have" if len(links) > 1 else " has"
+        message = f"link '{plain(heavy[0].name, _SHOWN)}'{others} a mass and no moment of inertia about an axis"
+        yield NO_INERTIA.at(parts[0].span, message)
+
+
+def _impossible(inertial: Inertial) -> str:
+    """Return why no rigid body has this mass and inertia, or nothing. Zeros alone are those of a frame."""
+    if inertial.mass < 0.0:
+        return f"has the mass {inertial.mass:g} kg"
+    if inertial.mass == 0.0:
+        return "has a moment of inertia and no mass" if any(inertial.inertia) else ""
+    least, middle, most = np.linalg.eigvalsh(_tensor(inertial))
+    slack = inertial.mass * _THIN**2 + most * _TOLERANCE
+    if least < -slack:
+        return "has a negative moment of inertia"
+    if most > least + middle + slack:
+        return "has a moment of inertia larger than the two others together"
+    return ""
+
+
+def _tensor(inertial: Inertial) -> Array:
+    ixx, ixy, ixz, iyy, iyz, izz = inertial.inertia
+    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+
+
+def _is_thin(mass: float, tensor: Array) -> bool:
+    return bool(np.linalg.eigvalsh(tensor)[0] <= mass * _THIN**2)
+
+
+def _together(body: Body, links: Sequence[BodyLink]) -> tuple[float, Array]:
+    """Return the mass of links that are fixed to each other, and their inertia about the centre of mass."""
+    poses, parts = body.poses({}), [(link.name, link.inertial) for link in links if link.inertial is not None]
+    places = [(poses[name].compose(one.origin), one) for name, one in parts]
+    mass = sum(one.mass for _, one in places)
+    centre = np.sum([one.mass * np.array(at.translation) for at, one in places], axis=0) / mass
+    return mass, np.sum([_about(centre, at, one) for at, one in places], axis=0)
+
+
+def _about(centre: Array, at: Transform3, inertial: Inertial) -> Array:
+    """Return the inertia of a link about a point, by the parallel axis theorem."""
+    turn = np.transpose([rotate(at.rotation, axis) for axis in _AXES])
+    arm = np.array(at.translation) - centre
+    moved: Array = turn @ _tensor(inertial) @ turn.T + inertial.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return moved
