@@ -11,6 +11,18 @@ LINKS = ("link", "on", "by", "mass", "shapes")
 JOINTS = ("joint", "type", "from", "to", "effort", "speed")
 
 
+def extent_of(body: Body) -> str:
+    """Return how many links and moving joints a body has, and its mass, in words."""
+    links, joints = len(body.links), len(body.moving)
+    joints_words = "1 joint that moves" if joints == 1 else f"{joints} joints that move"
+    return f"{links} link{'' if links == 1 else 's'}, {joints_words}, {mass_of(body):.4g} kg"
+
+
+def mass_of(body: Body) -> float:
+    """Return the mass of all links [kg]."""
+    return sum(link.inertial.mass for link in body.links.values() if link.inertial)
+
+
 def links_of(body: Body) -> Iterator[tuple[str, ...]]:
     """Yield a row of `LINKS` for each link, the root first."""
     for name, _ in body.walk():

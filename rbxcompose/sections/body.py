@@ -157,7 +157,7 @@ def _part(
         return file
     if isinstance(packages, Finding):
         return packages
-    arguments = {name: _as_text(value) for name, value in read.with_.items()}
+    arguments = {name: as_xacro_text(value) for name, value in read.with_.items()}
     to = value_span(node, (*path, "attach", "to"))
     place = key_span(node, path) if path else span
     return BodyPart(name, BodyFile(file, span, key == "xacro", arguments, packages), attach, place, to)
@@ -191,7 +191,7 @@ def _folder(written: str, writer: Path) -> Path | None:
         return None
 
 
-def _as_text(value: object) -> str:
+def as_xacro_text(value: object) -> str:
     """Return a value as xacro takes it: flags in lower case, quantities in SI units."""
     if isinstance(value, bool):
         return str(value).lower()

@@ -1,0 +1,1 @@
+"""The actions of `body`, one file each, and what they share."""

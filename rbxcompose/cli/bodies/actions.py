@@ -1,0 +1,73 @@
+"""What the actions of `body` share: the description that PATH names, and files that they write."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeAlias
+
+from rbxcompose.atomic_files import replace_file
+from rbxcompose.body.description import Description
+from rbxcompose.cli.bodies.source import MisuseError, add_source_options, described, is_description
+from rbxcompose.cli.output.console import FINDINGS, misused, refuse, tell, tell_report
+from rbxcompose.findings import Finding, kind
+
+NO_BODY = kind(
+    "RBX2008",
+    """The robot has no body
+
+`body` commands show what the section `body` of a robot names, or a URDF or xacro file.
+
+Bad: `rbxcompose body show robots/turtlebot`, whose file has no `body`.
+Good:
+```yaml
+body:
+  urdf: robot.urdf
+```
+""",
+)
+Use = Callable[[argparse.Namespace, Description], int]
+Actions: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+
+
+def add_action(actions: Actions, name: str, about: str, use: Use) -> argparse.ArgumentParser:
+    """Declare an action that does something with a body; return its parser."""
+    parser = actions.add_parser(name, help=about, description=about)
+    add_source_options(parser)
+    parser.set_defaults(do=lambda arguments: _used(arguments, use))
+    return parser
+
+
+def _used(arguments: argparse.Namespace, use: Use) -> int:
+    """Read the body, write its findings to stderr, and use it."""
+    try:
+        found = described(arguments)
+    except MisuseError as error:
+        return misused("body", str(error))
+    tell_report(found.report, found.sources)
+    if found.description is None:
+        return FINDINGS if found.report.has_errors else refuse(no_body(arguments.path))
+    return use(arguments, found.description) or (FINDINGS if found.report.has_errors else 0)
+
+
+def no_body(path: str) -> Finding:
+    """Return the finding that there is no body."""
+    message = "this file has no links" if is_description(path) else "this robot has no body"
+    return NO_BODY.at(None, message)
+
+
+def file_of(arguments: argparse.Namespace, description: Description, ending: str) -> Path:
+    """Return the file that `--out` names, or one in this folder that has the name of the body."""
+    return Path(arguments.out or f"{re.sub(r'[^A-Za-z0-9_-]', '_', description.body.name) or 'body'}{ending}")
+
+
+def write(file: Path, content: bytes) -> int:
+    """Write a file and say so; return the exit code."""
+    try:
+        replace_file(file.resolve(), content)
+    except OSError as error:
+        return misused("body", f"'{file}' cannot be written: {error.strerror}")
+    tell(f"wrote {file}")
+    return 0

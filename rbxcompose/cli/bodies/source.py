@@ -1,0 +1,123 @@
+"""The body that PATH names: that of a robot, or a URDF or xacro file without a robot."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rbxcompose.body.description import BodyPart, Description, describe
+from rbxcompose.body.files import BodyFile
+from rbxcompose.cli.project.robot_options import add_layer_options, compiled
+from rbxcompose.findings import Finding, Report, Span
+from rbxcompose.manifest.files import find, shown_name
+from rbxcompose.per_compile import one_compile
+from rbxcompose.sections.body import as_xacro_text
+
+URDF, XACRO = ".urdf", ".xacro"
+_LAYERS = {"profile": "--profile", "overlays": "-f", "sets": "--set", "real": "--real"}
+_FILES = {"with_": "--with", "packages": "--package"}
+
+
+@dataclass(slots=True)
+class DescribedBody:
+    """A body, None if it could not be read or there is none; the findings, and the texts that they point into."""
+
+    description: Description | None = None
+    report: Report = field(default_factory=Report)
+    sources: dict[str, str] = field(default_factory=dict)
+
+
+class MisuseError(Exception):
+    """Raised with what is wrong in the words of a command."""
+
+
+def add_source_options(parser: argparse.ArgumentParser) -> None:
+    """Declare PATH and the options that belong to it."""
+    words = "the robot's file, its folder, or rbx:robots/NAME; or a .urdf or .xacro file without a robot"
+    parser.add_argument("path", metavar="PATH", help=words)
+    add_layer_options(parser)
+    parser.add_argument(
+        "--with", action="append", default=[], dest="with_", metavar="NAME=VALUE", help="an argument of the xacro file"
+    )
+    parser.add_argument(
+        "--package",
+        action="append",
+        default=[],
+        dest="packages",
+        metavar="NAME=FOLDER",
+        help="the folder of a ROS package that the URDF or xacro file names",
+    )
+
+
+def described(arguments: argparse.Namespace) -> DescribedBody:
+    """Return the body that PATH names.
+
+    Raises:
+        MisuseError: if an option does not fit it.
+    """
+    if not is_description(arguments.path):
+        _refuse_options(arguments, _FILES, "is for .urdf and .xacro files; a robot names it in its 'body'")
+        compilation = compiled(arguments.path, arguments)
+        description = compilation.robot.manifest.body if compilation.robot else None
+        return DescribedBody(_usable(description), compilation.report, compilation.sources)
+    _refuse_options(arguments, _LAYERS, "is for robots, not for .urdf and .xacro files")
+    if arguments.with_ and arguments.path.endswith(URDF):
+        raise MisuseError("--with is for .xacro files: a URDF has no arguments")
+    values = dict(_pair(written, "--with") for written in arguments.with_)
+    folders = {name: _folder(value) for name, value in (_pair(one, "--package") for one in arguments.packages)}
+    return _bare(arguments.path, {name: _value(one) for name, one in values.items()}, folders)
+
+
+def is_description(path: str) -> bool:
+    """Return whether a path names a URDF or xacro file, by its ending."""
+    return path.endswith((URDF, XACRO))
+
+
+def _refuse_options(arguments: argparse.Namespace, options: dict[str, str], why: str) -> None:
+    for name, option in options.items():
+        if getattr(arguments, name):
+            raise MisuseError(f"{option} {why}")
+
+
+@one_compile()
+def _bare(path: str, values: dict[str, str], folders: dict[str, Path]) -> DescribedBody:
+    """Return the body of a file without a robot; it may use what its project and the packages contain."""
+    found, out = find(path), DescribedBody()
+    if isinstance(found, Finding):
+        out.report.add(found)
+        return out
+    span = Span(shown_name(found), 1, 1, 1, 1)
+    file = BodyFile(found, span, path.endswith(XACRO), values, folders)
+    description, findings = describe("", [BodyPart("", file, None, span, span)], out.sources)
+    out.description = _usable(description)
+    out.report.extend(findings)
+    return out
+
+
+def _usable(description: Description | None) -> Description | None:
+    return description if description is not None and description.body.links else None
+
+
+def _pair(written: str, option: str) -> tuple[str, str]:
+    name, equals, value = written.partition("=")
+    if not (name and equals):
+        raise MisuseError(f"{option} needs NAME=VALUE, not '{written}'")
+    return name, value
+
+
+def _value(written: str) -> str:
+    """Return a value as xacro takes it: a plain number as it is written, a quantity in SI units."""
+    with suppress(ValueError):
+        float(written)
+        return written
+    return as_xacro_text(written)
+
+
+def _folder(written: str) -> Path:
+    folder = Path(os.path.expanduser(written)).resolve()
+    if not folder.is_dir():
+        raise MisuseError(f"--package: '{written}' is not a folder")
+    return folder
