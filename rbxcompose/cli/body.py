@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.bodies import expand, picture, show, tree
+from rbxcompose.cli.bodies import check, expand, picture, show, tree
 
-ACTIONS = (show, tree, expand, picture)
+ACTIONS = (show, tree, check, expand, picture)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

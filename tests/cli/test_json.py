@@ -20,6 +20,7 @@ MISTAKES = {
     "action ls": "",
     "action send": "go_to",
     "apply": "nowhere.yaml",
+    "body check": "nowhere.yaml",
     "doctor": "nobody",
     "down": "nobody",
     "expand": "nowhere.yaml",

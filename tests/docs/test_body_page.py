@@ -18,4 +18,4 @@ def test_a_command_prints_what_stands_below_it(asked: Block, shown: Block, capsy
 
 
 def test_the_page_shows_commands() -> None:
-    assert len(SHOWN) == 2
+    assert len(SHOWN) == 3

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from rbxcompose.atomic_files import replace_file
 from rbxcompose.body.description import Description
-from rbxcompose.cli.bodies.source import MisuseError, add_source_options, described, is_description
+from rbxcompose.cli.bodies.source import DescribedBody, MisuseError, add_source_options, described, is_description
 from rbxcompose.cli.output.console import FINDINGS, misused, refuse, tell, tell_report
 from rbxcompose.findings import Finding, kind
 
@@ -29,23 +29,32 @@ body:
 """,
 )
 Use = Callable[[argparse.Namespace, Description], int]
+Read = Callable[[argparse.Namespace, DescribedBody], int]
 Actions: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def add_action(actions: Actions, name: str, about: str, use: Use) -> argparse.ArgumentParser:
-    """Declare an action that does something with a body; return its parser."""
+    """Declare an action that uses a body, after its findings are written to stderr; return its parser."""
+    return add_reader(actions, name, about, lambda arguments, found: _used(arguments, found, use))
+
+
+def add_reader(actions: Actions, name: str, about: str, do: Read) -> argparse.ArgumentParser:
+    """Declare an action that does something with what was read at PATH; return its parser."""
     parser = actions.add_parser(name, help=about, description=about)
     add_source_options(parser)
-    parser.set_defaults(do=lambda arguments: _used(arguments, use))
+    parser.set_defaults(do=lambda arguments: _read(arguments, do))
     return parser
 
 
-def _used(arguments: argparse.Namespace, use: Use) -> int:
-    """Read the body, write its findings to stderr, and use it."""
+def _read(arguments: argparse.Namespace, do: Read) -> int:
     try:
         found = described(arguments)
     except MisuseError as error:
         return misused("body", str(error))
+    return do(arguments, found)
+
+
+def _used(arguments: argparse.Namespace, found: DescribedBody, use: Use) -> int:
     tell_report(found.report, found.sources)
     if found.description is None:
         return FINDINGS if found.report.has_errors else refuse(no_body(arguments.path))
