@@ -22,9 +22,9 @@ NO_GRAPHVIZ = kind(
     "RBX9013",
     """Graphviz is not installed
 
-The pictures of `graph --format html`, and of machines in `mission show --format html`, are laid out by Graphviz, which
-robots do not need; it is an extra: `pip install 'rbxcompose[graph]'`. `--format dot` and
-`--format mermaid` work without it.
+The pictures of `graph --format html`, of machines in `mission show --format html`, and of `body tree --format svg` are
+laid out by Graphviz, which robots do not need; it is an extra: `pip install 'rbxcompose[graph]'`. `--format dot`,
+`--format mermaid` and `--format text` work without it.
 """,
 )
 
@@ -85,6 +85,20 @@ class Layout:
     height: float
 
 
+def graphviz() -> Any:
+    """Return the module that runs Graphviz.
+
+    Raises:
+        NotDrawnError: if it is not installed.
+    """
+    if find_spec("pygraphviz") is None:
+        help_text = "install it with: pip install 'rbxcompose[graph]'"
+        raise NotDrawnError(NO_GRAPHVIZ.at(None, "a picture needs Graphviz, which is not installed", help=help_text))
+    import pygraphviz
+
+    return pygraphviz
+
+
 def effort(items: int, edges: int) -> int:
     """Return about how hard a picture is to lay out: it grows with its size, and with the edges that no tree has."""
     return (items + edges) * max(1, edges - items)
@@ -96,12 +110,7 @@ def lay_out(items: Sequence[LayoutItem], edges: Sequence[Edge]) -> Layout:
     Raises:
         NotDrawnError: if Graphviz is not installed.
     """
-    if find_spec("pygraphviz") is None:
-        help_text = "install it with: pip install 'rbxcompose[graph]'"
-        raise NotDrawnError(NO_GRAPHVIZ.at(None, "a picture needs Graphviz, which is not installed", help=help_text))
-    import pygraphviz
-
-    graph = pygraphviz.AGraph(strict=False, directed=True, **_GRAPH)
+    graph = graphviz().AGraph(strict=False, directed=True, **_GRAPH)
     graph.node_attr.update(_NODE)
     graph.edge_attr.update(dir="none")
     for item in items:

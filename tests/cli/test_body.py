@@ -11,6 +11,7 @@ from PIL import Image
 
 from rbxcompose.body import picture
 from rbxcompose.cli.main import main
+from rbxcompose.inspection import layout
 from rbxcompose.testing.golden import Golden
 from tests.conftest import ROOT
 
@@ -50,6 +51,20 @@ def test_a_picture_shows_the_body_on_white(capsys: pytest.CaptureFixture[str], t
     edges = np.concatenate([drawn[0], drawn[-1], drawn[:, 0], drawn[:, -1]])
     assert not edges.any(), "something is out of sight"
     assert (first != second).any()
+
+
+def test_the_tree_is_drawn_as_a_graph(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    svg = told(capsys, "tree", ROBOT, "--format", "svg")
+    assert all(word in svg for word in ("<svg", "head_pan_joint", "revolute, z", "camera_depth_optical_frame"))
+    assert "wrote box_robot.pdf" in told(capsys, "tree", ROBOT, "--format", "pdf")
+    assert (tmp_path / "box_robot.pdf").read_bytes().startswith(b"%PDF-")
+    told(capsys, "tree", ROBOT, "--out", "tree.txt")
+    assert (tmp_path / "tree.txt").read_text() == told(capsys, "tree", ROBOT)
+    monkeypatch.setattr(layout, "find_spec", lambda name: None)
+    assert "pip install 'rbxcompose[graph]'" in told(capsys, "tree", ROBOT, "--format", "svg", code=1)
 
 
 def test_wrong_input_is_told(

@@ -58,7 +58,7 @@ ABOVE = {
     "doctor": "bus.graph composition model.robot runtime.folder runtime.processes sdk sections",
     "executive": "missions sdk",
     "finding_pages": "check_runner missions.analysis",
-    "inspection": "bus.names bus.wire composition missions model plan schema sdk sections",
+    "inspection": "body.model bus.names bus.wire composition missions model plan schema sdk sections",
     "lsp": "compiler composition missions model.robot schema sections",
     "mission_tests": "compiler components.mission composition executive missions model plan.model sdk testing.bench",
     "missions": "",
