@@ -5,32 +5,17 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterator, Mapping
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbxcompose.body.mesh_files import FORMATS, LARGEST, mesh_problem
+from rbxcompose.body.extra import need
+from rbxcompose.body.meshes import Trimesh, read_mesh
 from rbxcompose.body.model import Body, Geometry, Shape
-from rbxcompose.findings import Finding, kind
 from rbxcompose.geometry import Transform3
-from rbxcompose.printable import plain
-from rbxcompose.regular_files import read_regular
 
-Trimesh = Any  # of an extra, which may be missing
-
-NOT_DRAWN = kind(
-    "RBX9042",
-    """The libraries for pictures are not installed
-
-Pictures of a body are made by trimesh, embreex and Pillow. Robots do not need them; they are an extra.
-
-Bad: `rbxcompose body picture` without them.
-Good: `pip install 'rbxcompose[picture]'`
-""",
-)
 SIZE = 800  # [pixels] of each side
 _FINER = 2  # rays per pixel and direction
 _GREY = (0.6, 0.62, 0.65, 1.0)
@@ -39,32 +24,20 @@ _LIGHT = (0.4, -0.75, 1.0)
 _AMBIENT = 0.35
 _FIELD = math.radians(30)  # of view
 _MARGIN = 1.08
-_FARTHEST = 1e6  # [m] from the root: more is no robot, and rays are computed with few digits
 _ROUND = 48  # faces around a cylinder
 _NEEDED = ("trimesh", "embreex", "PIL")
 
 Array = NDArray[np.float64]
 
 
-class NoPictureError(Exception):
-    """Raised where the libraries are missing."""
-
-    def __init__(self, finding: Finding) -> None:
-        super().__init__(finding.message)
-        self.finding = finding
-
-
 def draw(body: Body, positions: Mapping[str, float], meshes: Mapping[str, Path]) -> bytes:
     """Return a PNG of the body with its joints at `positions` [rad or m]; `meshes` are files by the names in the URDF.
 
     Raises:
-        NoPictureError: if a library is missing.
+        MissingLibraryError: if a library is missing.
         ValueError: if there is nothing to draw, or a mesh cannot be read.
     """
-    missing = [name for name in _NEEDED if find_spec(name) is None]
-    if missing:
-        message = f"pictures need {' and '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} not installed"
-        raise NoPictureError(NOT_DRAWN.at(None, message, help="pip install 'rbxcompose[picture]'"))
+    need("pictures", *_NEEDED)
     import trimesh
     from PIL import Image
 
@@ -73,8 +46,6 @@ def draw(body: Body, positions: Mapping[str, float], meshes: Mapping[str, Path])
         raise ValueError("the body has no shapes")
     colours = np.concatenate([np.tile(colour[:3], (len(solid.faces), 1)) for solid, colour in solids])
     whole: Any = trimesh.util.concatenate([solid for solid, _ in solids])
-    if not np.abs(whole.vertices).max() <= _FARTHEST:  # also if it is not a number
-        raise ValueError(f"a part of the body is further than {_FARTHEST:g} m away")
     pixels = _rendered(whole, colours, SIZE * _FINER)
     picture = Image.fromarray((pixels * 255).round().astype(np.uint8)).resize((SIZE, SIZE), Image.Resampling.BOX)
     out = io.BytesIO()
@@ -106,7 +77,7 @@ def _placed(solid: Trimesh, shape: Shape, link: Transform3) -> Trimesh:
 
 def _solid(geometry: Geometry, meshes: Mapping[str, Path]) -> Any:
     """Return the triangles of a geometry; None for a mesh that is not there."""
-    from trimesh import creation, load_mesh
+    from trimesh import creation
 
     match geometry.kind:
         case "box":
@@ -120,19 +91,8 @@ def _solid(geometry: Geometry, meshes: Mapping[str, Path]) -> Any:
     path = meshes.get(geometry.file)
     if path is None:
         return None
-    if problem := mesh_problem(path):
-        raise ValueError(f"the mesh '{plain(geometry.file)}' {problem}")
-    if (ending := path.suffix.lower()) not in FORMATS:
-        raise ValueError(f"the mesh '{plain(geometry.file)}' is none of {', '.join(FORMATS)}")
-    try:
-        data = io.BytesIO(read_regular(path, LARGEST))  # without its path, a mesh cannot name further files
-        mesh: Any = load_mesh(data, file_type=ending.removeprefix("."))
-        mesh.apply_scale(geometry.size)
-        is_empty = not len(mesh.faces)
-    except Exception as error:  # readers of many formats raise anything
-        raise ValueError(f"the mesh '{plain(geometry.file)}' cannot be read") from error
-    if is_empty:
-        raise ValueError(f"the mesh '{plain(geometry.file)}' has no triangles")
+    mesh = read_mesh(path, geometry.file)
+    mesh.apply_scale(geometry.size)
     return mesh
 
 

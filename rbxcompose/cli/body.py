@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.bodies import check, expand, picture, show, tree
+from rbxcompose.cli.bodies import check, expand, picture, show, simplify, tree
 
-ACTIONS = (show, tree, check, expand, picture)
+ACTIONS = (show, tree, check, expand, picture, simplify)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

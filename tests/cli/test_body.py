@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from rbxcompose.body import picture
+from rbxcompose.body import extra, picture
 from rbxcompose.cli.main import main
 from rbxcompose.inspection import layout
 from rbxcompose.testing.golden import Golden
@@ -74,7 +74,7 @@ def test_wrong_input_is_told(
     assert "no moving joint 'neck': base_l" in told(capsys, "picture", ROBOT, "--joint", "neck=1", code=2)
     assert "must be a number" in told(capsys, "picture", ROBOT, "--joint", "head_pan_joint=up", code=2)
     assert "cannot be written" in told(capsys, "expand", ROBOT, "--out", str(tmp_path / "no/file"), code=2)
-    monkeypatch.setattr(picture, "find_spec", lambda name: None)
+    monkeypatch.setattr(extra, "find_spec", lambda name: None)
     assert "RBX9042" in told(capsys, "picture", ROBOT, "--out", str(tmp_path / "c.png"), code=1)
 
 

@@ -28,6 +28,17 @@ body:
 ```
 """,
 )
+UNKNOWN = kind(
+    "RBX2018",
+    """The body has nothing of this name
+
+`body show` lists the joints that move; a joint that mimics another one has no position of its own. `body simplify`
+knows meshes by the name in the URDF, or by its last part.
+
+Bad: `rbxcompose body pose --joint head_pan=0.5`
+Good: `rbxcompose body pose --joint head_pan_joint=0.5`
+""",
+)
 Use = Callable[[argparse.Namespace, Description], int]
 Read = Callable[[argparse.Namespace, DescribedBody], int]
 Actions: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
@@ -35,18 +46,19 @@ Actions: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def add_action(actions: Actions, name: str, about: str, use: Use) -> argparse.ArgumentParser:
     """Declare an action that uses a body, after its findings are written to stderr; return its parser."""
-    return add_reader(actions, name, about, lambda arguments, found: _used(arguments, found, use))
+    return add_reader(actions, name, about, lambda arguments, found: used(arguments, found, use))
 
 
 def add_reader(actions: Actions, name: str, about: str, do: Read) -> argparse.ArgumentParser:
     """Declare an action that does something with what was read at PATH; return its parser."""
     parser = actions.add_parser(name, help=about, description=about)
     add_source_options(parser)
-    parser.set_defaults(do=lambda arguments: _read(arguments, do))
+    parser.set_defaults(do=lambda arguments: read(arguments, do))
     return parser
 
 
-def _read(arguments: argparse.Namespace, do: Read) -> int:
+def read(arguments: argparse.Namespace, do: Read) -> int:
+    """Do something with what was read at PATH; return the exit code."""
     try:
         found = described(arguments)
     except MisuseError as error:
@@ -54,7 +66,8 @@ def _read(arguments: argparse.Namespace, do: Read) -> int:
     return do(arguments, found)
 
 
-def _used(arguments: argparse.Namespace, found: DescribedBody, use: Use) -> int:
+def used(arguments: argparse.Namespace, found: DescribedBody, use: Use) -> int:
+    """Write the findings to stderr, and use the body if there is one; return the exit code."""
     tell_report(found.report, found.sources)
     if found.description is None:
         return FINDINGS if found.report.has_errors else refuse(no_body(arguments.path))

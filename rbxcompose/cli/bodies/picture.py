@@ -6,8 +6,9 @@ import argparse
 import math
 
 from rbxcompose.body.description import Description
+from rbxcompose.body.extra import MissingLibraryError
 from rbxcompose.body.model import Body
-from rbxcompose.body.picture import NoPictureError, draw
+from rbxcompose.body.picture import draw
 from rbxcompose.cli.bodies.actions import Actions, add_action, file_of, write
 from rbxcompose.cli.output.console import misused, refuse
 
@@ -28,7 +29,7 @@ def _picture(arguments: argparse.Namespace, description: Description) -> int:
         picture = draw(body, positions, description.meshes)
     except ValueError as error:
         return misused("body", str(error))
-    except NoPictureError as error:
+    except MissingLibraryError as error:
         return refuse(error.finding)
     return write(file_of(arguments, description, ".png"), picture)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,8 +18,9 @@ from rbxcompose.per_compile import one_compile
 from rbxcompose.sections.body import as_xacro_text
 
 URDF, XACRO = ".urdf", ".xacro"
-_LAYERS = {"profile": "--profile", "overlays": "-f", "sets": "--set", "real": "--real"}
-_FILES = {"with_": "--with", "packages": "--package"}
+_LAYERS: Mapping[str, str] = {"profile": "--profile", "overlays": "-f", "sets": "--set", "real": "--real"}
+_FILES: Mapping[str, str] = {"with_": "--with", "packages": "--package"}
+_ALL = {**_LAYERS, **_FILES}
 
 
 @dataclass(slots=True)
@@ -76,10 +78,14 @@ def is_description(path: str) -> bool:
     return path.endswith((URDF, XACRO))
 
 
-def _refuse_options(arguments: argparse.Namespace, options: dict[str, str], why: str) -> None:
-    for name, option in options.items():
-        if getattr(arguments, name):
-            raise MisuseError(f"{option} {why}")
+def given_options(arguments: argparse.Namespace, options: Mapping[str, str] = _ALL) -> Iterator[str]:
+    """Yield those of the options that belong to PATH that were given."""
+    yield from (option for name, option in options.items() if getattr(arguments, name))
+
+
+def _refuse_options(arguments: argparse.Namespace, options: Mapping[str, str], why: str) -> None:
+    for option in given_options(arguments, options):
+        raise MisuseError(f"{option} {why}")
 
 
 @one_compile()
@@ -91,7 +97,7 @@ def _bare(path: str, values: dict[str, str], folders: dict[str, Path]) -> Descri
         return out
     span = Span(shown_name(found), 1, 1, 1, 1)
     file = BodyFile(found, span, path.endswith(XACRO), values, folders)
-    description, findings = describe("", [BodyPart("", file, None, span, span)], out.sources)
+    description, findings = describe("", found.parent, [BodyPart("", file, None, span, span)], out.sources)
     out.description = _usable(description)
     out.report.extend(findings)
     return out

@@ -1,0 +1,132 @@
+"""Meshes with fewer triangles, and how far the original surface is from the simplified one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbxcompose.body.extra import need
+from rbxcompose.body.meshes import Trimesh, read_mesh, scaled
+from rbxcompose.printable import plain
+
+LEAST_FACES = 4  # of a closed body
+POINTS = 10_000  # on the original surface, and at most as many of its corners
+_SEED = 0
+_AT_ONCE = 250  # points, each with all triangles that may be nearest
+_SLACK = 1e-9  # relative, so that rounding loses no triangle
+
+Scale = tuple[float, ...]
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class SimplifiedMesh:
+    """A binary STL file in place of another file; distances in metres, by the scale in the URDF."""
+
+    data: bytes
+    triangles: tuple[int, int]  # before, after
+    bytes: tuple[int, int]
+    largest: float
+    mean: float
+    wanted: int
+    """How many triangles were wanted: more than there were, or fewer than the shape could be reduced to."""
+
+
+def faces_for(ratio: float, faces: int) -> int:
+    """Return how many of the triangles are left at a ratio, at least those of a closed body."""
+    return max(LEAST_FACES, round(ratio * faces))
+
+
+def simplify(
+    path: Path, name: str, scales: Iterable[Scale], faces: int | None = None, ratio: float = 1.0
+) -> SimplifiedMesh:
+    """Return a mesh file with at most `faces` triangles, or with a `ratio` of them.
+
+    It has the error at the worst of the `scales` by which the file is used.
+
+    Raises:
+        MissingLibraryError: if a library is missing.
+        ValueError: if it cannot be read or simplified.
+    """
+    need("simpler meshes", "fast_simplification", "rtree", "trimesh")
+    mesh = _closed(read_mesh(path, name), name)
+    before = len(mesh.faces)
+    wanted = faces_for(ratio, before) if faces is None else faces
+    simple = mesh if wanted >= before else _decimated(mesh, wanted, name)
+    distances = [(0.0, 0.0) if simple is mesh else distance(mesh, simple, one) for one in scales]
+    data: bytes = simple.export(file_type="stl")
+    largest, mean = max(distances)
+    sizes = path.stat().st_size, len(data)
+    return SimplifiedMesh(data, (before, len(simple.faces)), sizes, largest, mean, wanted)
+
+
+def _closed(mesh: Trimesh, name: str) -> Trimesh:
+    """Return a mesh whose triangles share their corners: where a texture or a normal ends there are several."""
+    import trimesh
+
+    if not np.isfinite(mesh.vertices).all() or not mesh.area > 0:
+        raise ValueError(f"the mesh '{plain(name)}' has no surface")
+    return trimesh.Trimesh(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def _decimated(mesh: Trimesh, faces: int, name: str) -> Trimesh:
+    import fast_simplification
+    import trimesh
+
+    corners, triangles = fast_simplification.simplify(mesh.vertices, mesh.faces.astype(np.int32), target_count=faces)
+    simple: Any = trimesh.Trimesh(corners, triangles, process=False)
+    if not len(triangles) or not simple.area > 0:
+        raise ValueError(f"nothing is left of the mesh '{plain(name)}' with {faces} triangles")
+    return simple
+
+
+def distance(original: Trimesh, simple: Trimesh, scale: Scale = (1.0, 1.0, 1.0)) -> tuple[float, float]:
+    """Return the largest and the mean distance from the surface of one mesh to that of another.
+
+    The mean is that of points spread evenly over the original; the largest may be at one of its corners.
+    """
+    from trimesh.sample import sample_surface
+
+    first, second = scaled(original, scale), scaled(simple, scale)
+    points = np.asarray(sample_surface(first, POINTS, seed=_SEED)[0])
+    corners = np.asarray(first.vertices)[:: max(1, -(-len(first.vertices) // POINTS))]
+    spread = nearest(second, points)
+    return float(max(spread.max(), nearest(second, corners).max())), float(spread.mean())
+
+
+def nearest(mesh: Trimesh, points: Array) -> Array:
+    """Return the distance of each point from the surface of a mesh."""
+    triangles, tree = np.asarray(mesh.triangles), mesh.triangles_tree
+    parts = [points[start : start + _AT_ONCE] for start in range(0, len(points), _AT_ONCE)]
+    return np.concatenate([_nearest(triangles, tree, np.ascontiguousarray(part)) for part in parts])
+
+
+def _nearest(triangles: Array, tree: Any, points: Array) -> Array:
+    """Return distances: the triangle with the nearest box bounds the distance, and what lies within that is tried."""
+    first, _ = tree.nearest_v(points, points, strict=True)
+    bounds = _distances(triangles[first], points)
+    reach = (bounds + _SLACK * (bounds + np.abs(points).max()))[:, None]
+    found, counts = tree.intersection_v(points - reach, points + reach)
+    many = counts.astype(np.int64)
+    tried = _distances(triangles[found], np.repeat(points, many, axis=0))
+    return np.asarray(np.minimum.reduceat(tried, np.cumsum(many) - many))
+
+
+def _distances(triangles: Array, points: Array) -> Array:
+    """Return the distance of each point from the triangle in the same row."""
+    from trimesh.triangles import closest_point
+
+    closest: Any = closest_point
+    first = triangles[:, 0]
+    edges, offsets = triangles - first[:, None], points - first
+    sizes = np.abs(edges).max(axis=(1, 2))
+    sizes[sizes == 0.0] = 1.0
+    offsets = offsets / sizes[:, None]  # the library takes small numbers for zero, so that each triangle has size 1
+    along = np.linalg.norm(closest(edges / sizes[:, None, None], offsets) - offsets, axis=1)
+    corners = np.linalg.norm(offsets, axis=1)
+    return np.asarray(np.fmin(along, corners) * sizes)  # a triangle without area gives no number
