@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rbxcompose.body.attachment import PieceAttachment
-from rbxcompose.body.files import PACKAGE, BodyFile
+from rbxcompose.body.files import PACKAGE, BodyFile, ReadFile, read_files
 from rbxcompose.body.lint import lint
+from rbxcompose.body.mesh_files import mesh_mistakes
 from rbxcompose.body.model import Body
 from rbxcompose.body.pieces import PieceOfBody, assembled, to_xml, with_meshes
 from rbxcompose.body.urdf import read_body
@@ -45,25 +46,28 @@ def describe(
     `name` is that of the robot; the names of its meshes are relative to the folder `home`. The text of a single file
     that is not a piece stays as it is.
     """
-    read = [part.file.read(sources) for part in parts]
+    read = read_files([part.file for part in parts], sources)
     if findings := [one for one in read if isinstance(one, Finding)]:
         return None, findings
-    found = [one for one in read if not isinstance(one, Finding)]
-    meshes = [part.file.meshes(root) for part, (root, _) in zip(parts, found, strict=True)]
+    files = [one for one in read if isinstance(one, ReadFile)]
+    notes = [note for one in files for note in one.notes]
+    meshes = [part.file.meshes(one.root) for part, one in zip(parts, files, strict=True)]
     if len(parts) == 1 and not parts[0].name:
-        [(whole, text)], [there] = found, meshes
-        return _checked(whole, text, there)
-    pieces, there = [], {}
-    for part, (root, _), files in zip(parts, found, meshes, strict=True):
-        names = {one: one if one.startswith(PACKAGE) else os.path.relpath(files[one], home) for one in files}
-        there |= {names[one]: files[one] for one in files}
-        pieces.append(PieceOfBody(part.name, with_meshes(root, names), part.attachment, part.span, part.to))
+        return _checked(files[0].root, files[0].text, meshes[0], notes)
+    pieces: list[PieceOfBody] = []
+    there: dict[str, Path] = {}
+    for part, file, found in zip(parts, files, meshes, strict=True):
+        names = {one: one if one.startswith(PACKAGE) else os.path.relpath(found[one], home) for one in found}
+        there |= {names[one]: found[one] for one in found}
+        pieces.append(PieceOfBody(part.name, with_meshes(file.root, names), part.attachment, part.span, part.to))
     joined = assembled(name, pieces)
-    return (None, joined) if isinstance(joined, list) else _checked(joined, to_xml(joined), there)
+    return (None, [*notes, *joined]) if isinstance(joined, list) else _checked(joined, to_xml(joined), there, notes)
 
 
-def _checked(root: XmlElement, text: str, meshes: Mapping[str, Path]) -> tuple[Description | None, list[Finding]]:
+def _checked(
+    root: XmlElement, text: str, meshes: Mapping[str, Path], notes: Sequence[Finding]
+) -> tuple[Description | None, list[Finding]]:
     body, findings = read_body(root)
     if findings:
-        return None, findings
-    return Description(text, body, meshes), list(lint(body, meshes))
+        return None, [*notes, *findings]
+    return Description(text, body, meshes), [*notes, *lint(body, meshes), *mesh_mistakes(body, meshes)]

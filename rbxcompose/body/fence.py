@@ -23,8 +23,11 @@ def is_below(path: str, roots: Iterable[str]) -> bool:
     return any(os.path.commonpath([path, root]) == root for root in roots)
 
 
-def fence(roots: Iterable[str]) -> None:
-    """Limit what this process can use from now on, and refuse whatever Python reports that is not needed."""
+def fence(roots: Iterable[str], used: set[str]) -> None:
+    """Limit what this process can use from now on, and refuse whatever Python reports that is not needed.
+
+    The files and folders that it reads, or tries to read, are added to `used`.
+    """
     real = [os.path.realpath(root) for root in roots]
     _limit()
 
@@ -37,6 +40,10 @@ def fence(roots: Iterable[str]) -> None:
                 raise PermissionError("a description may only list folders of its project")
         elif event not in _HARMLESS:
             raise PermissionError(f"a description may not use {event}")
+        else:
+            return
+        if isinstance(arguments[0], str | bytes):
+            used.add(os.path.realpath(os.fsdecode(arguments[0])))
 
     sys.addaudithook(audit)
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rbxcompose.body.xacro import expand
+from rbxcompose.body.xacro import Expanded, XacroFile, expand_all
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.files import project_of, shown_name
@@ -29,28 +29,11 @@ class BodyFile:
     arguments: Mapping[str, str] = field(default_factory=dict)
     packages: Mapping[str, Path] = field(default_factory=dict)
 
-    def read(self, sources: MutableMapping[str, str]) -> tuple[XmlElement, str] | Finding:
-        """Return the root and the text of the URDF; every file that was read is added to `sources`."""
-        found = self._expanded(sources) if self.is_xacro else self._text(sources)
-        if isinstance(found, Finding):
-            return found
-        text, located = found
-        root = read_urdf(located, shown_name(self.path))
-        return root if isinstance(root, Finding) else (root, text)
-
-    def _text(self, sources: MutableMapping[str, str]) -> tuple[str, str] | Finding:
-        text, findings = read_source(self.path, shown_name(self.path), sources, URDF_BYTES, "a URDF file")
-        if text is None or findings:
-            return replace(findings[0], span=findings[0].span or self.span)
-        return text, text
-
-    def _expanded(self, sources: MutableMapping[str, str]) -> tuple[str, str] | Finding:
+    @property
+    def as_xacro(self) -> XacroFile:
+        """Return what is to be expanded."""
         packages = {LIBRARY: library_root(), **self.packages}
-        roots = [project_of(self.path), library_root()]
-        expanded, files = expand(self.path, self.arguments, packages, roots, self.span)
-        for file in files:  # so that findings can show their lines
-            read_source(file, shown_name(file), sources, URDF_BYTES, "a xacro file")
-        return expanded if isinstance(expanded, Finding) else (expanded.text, expanded.located)
+        return XacroFile(self.path, self.arguments, packages, [project_of(self.path), library_root()], self.span)
 
     def meshes(self, root: XmlElement) -> dict[str, Path]:
         """Return the mesh files that exist, by their names in the URDF; they lie in the project or in a package."""
@@ -67,6 +50,41 @@ class BodyFile:
             return path if path is not None and path.is_file() else None
         except (OSError, ValueError):  # a name too long for the system, a zero byte
             return None
+
+
+@dataclass(frozen=True, slots=True)
+class ReadFile:
+    """The root and the text of a URDF, and what is to be said about the files that it was made of."""
+
+    root: XmlElement
+    text: str
+    notes: tuple[Finding, ...] = ()
+
+
+def read_files(files: Sequence[BodyFile], sources: MutableMapping[str, str]) -> list[ReadFile | Finding]:
+    """Return the URDF of each file, or why there is none; the texts of all that were read are added to `sources`."""
+    xacros = [file for file in files if file.is_xacro]
+    expansions = iter(expand_all([file.as_xacro for file in xacros]) if xacros else ())
+    return [_expanded(file, *next(expansions), sources) if file.is_xacro else _plain(file, sources) for file in files]
+
+
+def _plain(file: BodyFile, sources: MutableMapping[str, str]) -> ReadFile | Finding:
+    text, findings = read_source(file.path, shown_name(file.path), sources, URDF_BYTES, "a URDF file")
+    if text is None or findings:
+        return replace(findings[0], span=findings[0].span or file.span)
+    root = read_urdf(text, shown_name(file.path))
+    return root if isinstance(root, Finding) else ReadFile(root, text)
+
+
+def _expanded(
+    file: BodyFile, expanded: Expanded | Finding, used: Sequence[Path], sources: MutableMapping[str, str]
+) -> ReadFile | Finding:
+    for path in used:  # so that findings can show their lines
+        read_source(path, shown_name(path), sources, URDF_BYTES, "a xacro file")
+    if isinstance(expanded, Finding):
+        return expanded
+    root = read_urdf(expanded.located, shown_name(file.path))
+    return root if isinstance(root, Finding) else ReadFile(root, expanded.text, expanded.notes)
 
 
 def mesh_names(element: XmlElement) -> Iterator[str]:

@@ -41,7 +41,7 @@ def mesh_mistakes(body: Body, meshes: Mapping[str, Path]) -> Iterator[Finding]:
                 yield BAD_MESH.at(shape.span, f"the mesh '{plain(shape.geometry.file, _SHOWN)}' {words}")
 
 
-def mesh_problem(path: Path) -> str:
+def mesh_problem(path: Path, most: int = LARGEST) -> str:
     """Return why a file can be no mesh of the format that its name says; nothing if it may be one."""
     try:
         size = path.stat().st_size
@@ -49,8 +49,8 @@ def mesh_problem(path: Path) -> str:
             head = file.read(_HEAD)
     except OSError as error:
         return f"cannot be read: {error.strerror}"
-    if size > LARGEST:
-        return f"is larger than {LARGEST:,} bytes"
+    if size > most:
+        return f"is larger than {most:,} bytes"
     if size == 0:
         return "is empty"
     look = _FORMATS.get(path.suffix.lower())

@@ -16,8 +16,8 @@ Trimesh = Any  # of an extra, which may be missing
 _COLLADA = ".dae"
 
 
-def read_mesh(path: Path, name: str) -> Trimesh:
-    """Return the triangles of a file; `name` is that in messages.
+def read_mesh(path: Path, name: str, most: int = LARGEST) -> Trimesh:
+    """Return the triangles of a file of at most `most` bytes; `name` is that in messages.
 
     Lengths are those of the file, but a Collada file has a unit, and is read in metres, as viewers do.
 
@@ -25,7 +25,7 @@ def read_mesh(path: Path, name: str) -> Trimesh:
         MissingLibraryError: if a library for this format is missing.
         ValueError: if it cannot be read.
     """
-    if problem := mesh_problem(path):
+    if problem := mesh_problem(path, most):
         raise ValueError(f"the mesh '{plain(name)}' {problem}")
     if (ending := path.suffix.lower()) not in FORMATS:
         raise ValueError(f"the mesh '{plain(name)}' is none of {', '.join(FORMATS)}")
@@ -34,7 +34,7 @@ def read_mesh(path: Path, name: str) -> Trimesh:
     from trimesh import load_scene, units
 
     try:
-        data = io.BytesIO(read_regular(path, LARGEST))  # without its path, a mesh cannot name further files
+        data = io.BytesIO(read_regular(path, most))  # without its path, a mesh cannot name further files
         scene = load_scene(data, file_type=ending.removeprefix("."))
         mesh: Any = scene.to_mesh()
         if ending == _COLLADA and scene.units:

@@ -14,6 +14,7 @@ from rbxcompose.body.extra import need
 from rbxcompose.body.meshes import Trimesh, read_mesh, scaled
 from rbxcompose.printable import plain
 
+LARGEST_FILE = 512_000_000  # [bytes]
 LEAST_FACES = 4  # of a closed body
 POINTS = 10_000  # on the original surface, and at most as many of its corners
 _SEED = 0
@@ -54,7 +55,7 @@ def simplify(
         ValueError: if it cannot be read or simplified.
     """
     need("simpler meshes", "fast_simplification", "rtree", "trimesh")
-    mesh = _closed(read_mesh(path, name), name)
+    mesh = _closed(read_mesh(path, name, LARGEST_FILE), name)
     before = len(mesh.faces)
     wanted = faces_for(ratio, before) if faces is None else faces
     simple = mesh if wanted >= before else _decimated(mesh, wanted, name)

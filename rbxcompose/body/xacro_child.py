@@ -1,8 +1,8 @@
 """Expands a xacro file in a process of its own: xacro evaluates Python, so that it must not run among what we trust.
 
-It reads a request as JSON from its standard input and writes the answer to its standard output. Before it reads the
-first byte of xacro, it limits its processor time and memory, and refuses whatever a description has no use for. This
-is a fence against mistakes and simple attacks, no sandbox.
+It reads requests as JSON from its standard input and writes the answers to its standard output. Each request has a
+process that limits its time and memory, and refuses whatever a description has no use for, before it reads the
+first byte of xacro. This is a fence against mistakes and simple attacks, no sandbox.
 """
 
 from __future__ import annotations
@@ -135,9 +135,22 @@ def _reason(error: BaseException) -> str:
 
 
 def main() -> None:
-    """Answer one request."""
-    request = json.load(sys.stdin)
-    fence(request["roots"])
-    sys.stdout.buffer.write(json.dumps(expand(request), ensure_ascii=False).encode(errors="replace"))
+    """Answer requests, each in a process of its own: the length in 8 bytes and the answer, or 0 if there is none."""
+    answers = [_begun(request) for request in json.load(sys.stdin)]
+    for process, file in answers:
+        _, status = os.waitpid(process, 0)
+        answer = os.pread(file, os.fstat(file).st_size, 0) if status == 0 else b""
+        sys.stdout.buffer.write(len(answer).to_bytes(8, "little") + answer)
     sys.stdout.buffer.flush()
-    os._exit(0)
+
+
+def _begun(request: dict[str, Any]) -> tuple[int, int]:
+    """Return the process that answers a request, and the file that it writes the answer to."""
+    file = os.memfd_create("answer")  # a file, since its size can be limited
+    process = os.fork()
+    if process == 0:
+        used: set[str] = set()
+        fence(request["roots"], used)
+        answer = json.dumps(expand(request) | {"used": sorted(used)}, ensure_ascii=False).encode(errors="replace")
+        os._exit(0 if os.write(file, answer) == len(answer) else 1)
+    return process, file

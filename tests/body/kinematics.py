@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 import yourdfpy
@@ -27,7 +26,7 @@ def description_of(text: str) -> Description:
     assert isinstance(root, XmlElement), root
     body, findings = read_body(root)
     assert not findings
-    return Description(Path("robot.urdf"), text, body)
+    return Description(text, body)
 
 
 def matrix(pose: Transform3) -> Array:

@@ -11,7 +11,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body import simplification as module
+from rbxcompose.body.meshes import scaled
 from rbxcompose.body.simplification import distance, faces_for, nearest, simplify
 from rbxcompose.cli.bodies.mesh_names import file_names
 
@@ -48,7 +48,7 @@ def test_the_nearest_point_is_that_of_all_triangles(seed: int, spread: float) ->
 def test_distances_grow_with_the_scale(seed: int, power: int) -> None:
     ball, points = sphere(finer=1), np.random.default_rng(seed).normal(size=(20, 3))
     factor = 10.0**power
-    grown = module.scaled(ball, (factor,) * 3)
+    grown = scaled(ball, (factor,) * 3)
     assert nearest(grown, points * factor) == pytest.approx(nearest(ball, points) * factor, rel=1e-6, abs=factor * 1e-9)
 
 

@@ -1,0 +1,103 @@
+"""Answers of the fenced process that expands xacro files. They are kept as long as no file that it used changes."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections import OrderedDict
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from xxhash import xxh3_128_hexdigest
+
+import rbxcompose
+from rbxcompose.per_compile import once
+from rbxcompose.regular_files import read_regular
+
+Answer = dict[str, Any]
+
+DEADLINE = 4.0  # [s] of real time; the processes limit their processor time themselves
+KEPT = 64  # answers
+_LARGEST = 8_000_000  # [bytes] of a file that xacro reads
+_RUN = "import sys; sys.path.insert(0, sys.argv[1]); from rbxcompose.body.xacro_child import main; main()"
+_answers: OrderedDict[str, tuple[Answer, dict[str, str]]] = OrderedDict()
+
+
+def answers(requests: Sequence[str]) -> list[Answer | None]:
+    """Return the answer to each request in JSON; None where the process did not end within its limits."""
+    failed = _failed()
+    known = {one: _kept(one) for one in requests}
+    new = [one for one, answer in known.items() if answer is None and one not in failed]
+    for request, answer in zip(new, _asked(new) if new else (), strict=True):
+        known[request] = answer
+        if answer is None:
+            failed.add(request)
+        else:
+            _answers[request] = answer, {path: _digest(path) for path in answer["used"]}
+            if len(_answers) > KEPT:
+                _answers.popitem(last=False)
+    return [known[one] for one in requests]
+
+
+@once
+def _failed() -> set[str]:
+    """Return the requests of this compile that had no answer: profiles are tried one after another."""
+    return set()
+
+
+def _kept(request: str) -> Answer | None:
+    answer, used = _answers.get(request, (None, {}))
+    if answer is None or any(_digest(path) != digest for path, digest in used.items()):
+        return None
+    _answers.move_to_end(request)
+    return answer
+
+
+def _digest(path: str) -> str:
+    """Return a digest of what a file or folder contains; none for what cannot be read."""
+    try:
+        is_folder = os.path.isdir(path)
+        data = "\0".join(sorted(os.listdir(path))).encode() if is_folder else read_regular(Path(path), _LARGEST)
+        return xxh3_128_hexdigest(data)
+    except OSError:
+        return ""
+
+
+def _asked(requests: Sequence[str]) -> list[Answer | None]:
+    package = str(Path(rbxcompose.__file__).parents[1])
+    with subprocess.Popen(
+        [sys.executable, "-E", "-s", "-B", "-c", _RUN, package],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,  # xacro warns there of what is deprecated
+        env={},
+        start_new_session=True,
+    ) as process:
+        try:
+            output, _ = process.communicate(f"[{','.join(requests)}]".encode(), timeout=DEADLINE)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            output = b""
+    found = [_read(one) for one in _split(output)]
+    return found if len(found) == len(requests) else [None] * len(requests)
+
+
+def _split(output: bytes) -> Iterator[bytes]:
+    """Yield the answers, each of which follows its length."""
+    while output:
+        end = 8 + int.from_bytes(output[:8], "little")
+        yield output[8:end]
+        output = output[end:]
+
+
+def _read(answer: bytes) -> Answer | None:
+    """Return an answer; None if it is none, since what a file brings along may have ended the process."""
+    try:
+        read = json.loads(answer)
+    except ValueError:
+        return None
+    return read if isinstance(read, dict) and read.keys() >= {"files", "used"} else None
