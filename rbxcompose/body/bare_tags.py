@@ -10,6 +10,8 @@ from collections import defaultdict
 from typing import Any
 from xml.dom import minidom
 
+from rbxcompose.body.xacro_answer import BareFile, BareTag
+
 PREFIX = "xacro:"
 PLACE = "rbx-place"  # an attribute of elements of the expansion: where they were written
 _WORDS = {"macro": ("name",), "property": ("name",), "include": ("filename",), "if": ("value",), "unless": ("value",),
@@ -21,15 +23,13 @@ _CLOSED = {"origin", "mass", "inertia", "box", "cylinder", "capsule", "sphere", 
            "collision_checking", "contact_coefficients", "robot", "gazebo", "transmission", "sensor", "ros2_control",
            "model_state", "group", "gripper_state"}  # fmt: skip
 """Tags that are no calls whatever macros there are; what is in them belongs to others, such as a simulator."""
-Tag = tuple[int, int, str, tuple[int, int] | None]
-"""Its line, its column, its name, and the place of the tag that closes it, if there is one."""
 
 
 class BareTags:
     """The bare tags of one expansion that xacro means, by file."""
 
     def __init__(self) -> None:
-        self._files: dict[str, tuple[dict[tuple[int, int], Tag], Tag | None]] = {}
+        self._files: dict[str, tuple[dict[tuple[int, int], BareTag], BareTag | None]] = {}
         self._macros: set[str] = set()
         self._waiting: dict[str, list[Any]] = defaultdict(list)
         self._pending: list[Any] = []
@@ -45,10 +45,10 @@ class BareTags:
                 if child.nodeType == child.ELEMENT_NODE:
                     self._look_at(child)
 
-    def told(self) -> dict[str, dict[str, Any]]:
-        """Return, for each file that has such tags, the tags in order, and the root if it does not bind `xacro`."""
+    def told(self) -> dict[str, BareFile]:
+        """Return the files that have such tags."""
         found = {file: (tags, root) for file, (tags, root) in self._files.items() if tags}
-        return {file: {"tags": [tags[at] for at in sorted(tags)], "root": root} for file, (tags, root) in found.items()}
+        return {file: BareFile(tuple(tags[at] for at in sorted(tags)), root) for file, (tags, root) in found.items()}
 
     def _look_at(self, element: Any) -> None:
         name = element.tagName
@@ -66,7 +66,7 @@ class BareTags:
     def _give_prefix(self, element: Any) -> None:
         tag = _tag(element)
         tags, _ = self._files[element.place.rsplit("|", 3)[0]]
-        tags[tag[0], tag[1]] = tag
+        tags[tag.line, tag.column] = tag
         element.tagName = element.nodeName = PREFIX + element.tagName
         element.removeAttribute(PLACE)
         self._pending.append(element)
@@ -78,6 +78,6 @@ class BareTags:
                 self._give_prefix(call)
 
 
-def _tag(element: Any) -> Tag:
+def _tag(element: Any) -> BareTag:
     _, line, column, _ = element.place.rsplit("|", 3)
-    return int(line), int(column), element.tagName, element.closed
+    return BareTag(int(line), int(column), element.tagName, element.closed)

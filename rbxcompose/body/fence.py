@@ -6,11 +6,14 @@ import os
 import resource
 import signal
 import sys
+import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 SECONDS = 1.2  # of processor time; with the rest of `check`, a file that never ends is told within 2 s
+STARTS = 12  # on a slow machine, as much processor time as so many starts of this process,
+MOST_SECONDS = 4.0  # but no more than this
 MEMORY = 140_000_000  # [bytes] of address space beyond what it has at its start
 ANSWER = 20_000_000  # [bytes] that it may write in all, to files that are open already
 _HARMLESS = {"compile", "exec", "glob.glob", "glob.glob/2", "builtins.id"}
@@ -23,13 +26,14 @@ def is_below(path: str, roots: Iterable[str]) -> bool:
     return any(os.path.commonpath([path, root]) == root for root in roots)
 
 
-def fence(roots: Iterable[str], used: set[str]) -> None:
+def fence(roots: Iterable[str], used: set[str], start: float) -> None:
     """Limit what this process can use from now on, and refuse whatever Python reports that is not needed.
 
-    The files and folders that it reads, or tries to read, are added to `used`.
+    The files and folders that it reads, or tries to read, are added to `used`. `start` is the processor time [s] that the
+    start of such a process takes here.
     """
     real = [os.path.realpath(root) for root in roots]
-    _limit()
+    _limit(start)
 
     def audit(event: str, arguments: tuple[Any, ...]) -> None:
         if event == "open":
@@ -48,13 +52,13 @@ def fence(roots: Iterable[str], used: set[str]) -> None:
     sys.addaudithook(audit)
 
 
-def _limit() -> None:
+def _limit(start: float) -> None:
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
     most = pages * resource.getpagesize() + MEMORY
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
-    signal.setitimer(signal.ITIMER_PROF, SECONDS)  # ends the process
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    last = int(used.ru_utime + used.ru_stime + SECONDS) + 1  # if it resets the timer
+    seconds = min(max(SECONDS, STARTS * start), MOST_SECONDS)
+    signal.setitimer(signal.ITIMER_PROF, seconds)  # ends the process
+    last = int(time.process_time() + seconds) + 1  # if it resets the timer
     resource.setrlimit(resource.RLIMIT_CPU, (last, last))
     resource.setrlimit(resource.RLIMIT_FSIZE, (ANSWER, ANSWER))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

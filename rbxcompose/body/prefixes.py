@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
+from rbxcompose.body.xacro_answer import BareFile
+from rbxcompose.body.xml_reader import XACRO
 from rbxcompose.findings import Edit, Finding, Fix, Severity, Span, kind
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.library import library_root
@@ -39,38 +40,33 @@ Good:
     Severity.WARNING,
     is_fixable=True,
 )
-PREFIX = "xacro:"
 BINDING = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 _SHOWN = 60  # characters of a name in a message
 
 
-def missing_prefixes(files: Mapping[str, Mapping[str, Any]]) -> Iterator[Finding]:
+def missing_prefixes(files: Mapping[str, BareFile]) -> Iterator[Finding]:
     """Yield one finding for each file with bare tags, as the fenced process tells them."""
     for path, found in files.items():
-        file, (line, column, name, _) = shown_name(Path(path)), found["tags"][0]
-        count = len(found["tags"])
+        file, first, count = shown_name(Path(path)), found.tags[0], len(found.tags)
         others = "" if count == 1 else f", like {count - 1} other {'tag' if count == 2 else 'tags'} of this file"
         is_ours = not Path(path).is_relative_to(library_root())
         yield NO_PREFIX.at(
-            Span(file, line, column, line, column + len(name) + 1),
-            f"'<{plain(name, _SHOWN)}>' lacks the prefix '{PREFIX}'{others}",
+            Span(file, first.line, first.column, first.line, first.column + len(first.name) + 1),
+            f"'<{plain(first.name, _SHOWN)}>' lacks the prefix '{XACRO}'{others}",
             help="write it, since xacro of ROS 2 needs it",
-            fix=Fix(
-                tuple(_edits(file, found)), True, f"prefix '{PREFIX}' for {count} {'tag' if count == 1 else 'tags'}"
-            )
+            fix=Fix(tuple(_edits(file, found)), True, f"prefix '{XACRO}' for {count} {'tag' if count == 1 else 'tags'}")
             if is_ours
             else None,
         )
 
 
-def _edits(file: str, found: Mapping[str, Any]) -> Iterator[Edit]:
-    if found["root"] is not None:
-        line, column, name, _ = found["root"]
-        yield _edit(file, line, column, f"<{name}", f"<{name} {BINDING}")
-    for line, column, name, closed in found["tags"]:
-        yield _edit(file, line, column, f"<{name}", f"<{PREFIX}{name}")
-        if closed is not None:
-            yield _edit(file, closed[0], closed[1], f"</{name}", f"</{PREFIX}{name}")
+def _edits(file: str, found: BareFile) -> Iterator[Edit]:
+    if root := found.root:
+        yield _edit(file, root.line, root.column, f"<{root.name}", f"<{root.name} {BINDING}")
+    for tag in found.tags:
+        yield _edit(file, tag.line, tag.column, f"<{tag.name}", f"<{XACRO}{tag.name}")
+        if tag.closed is not None:
+            yield _edit(file, *tag.closed, f"</{tag.name}", f"</{XACRO}{tag.name}")
 
 
 def _edit(file: str, line: int, column: int, old: str, new: str) -> Edit:

@@ -7,10 +7,10 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rbxcompose.body.prefixes import missing_prefixes
-from rbxcompose.body.xacro_answers import answers
+from rbxcompose.body.xacro_answer import Answer
+from rbxcompose.body.xacro_answers import Request, answers
 from rbxcompose.body.xml_reader import PLACE, span_of_place
 from rbxcompose.findings import Finding, Span, kind
 from rbxcompose.manifest.files import shown_name
@@ -21,8 +21,8 @@ NOT_EXPANDED = kind(
     """A xacro file cannot be expanded
 
 An expression is wrong, a macro or a property does not exist, an included file is missing, or the expansion takes more
-than 1.2 s of processor time or 140 MB. `$(find PACKAGE)` looks up `packages:` of the `body`; the environment is not
-read.
+than 1.2 s of processor time (more on a slow machine) or 140 MB. `$(find PACKAGE)` looks up `packages:` of the `body`;
+the environment is not read.
 
 A xacro file is a program. It runs in a process of its own without the environment, may read files of the project and of
 its packages only, and writes nothing. That fences it, but does not make a stranger's file safe.
@@ -72,12 +72,12 @@ class XacroFile:
     span: Span
 
     @property
-    def request(self) -> str:
+    def request(self) -> Request:
         """Return what the fenced process is asked."""
         packages = {name: str(folder) for name, folder in self.packages.items()}
-        roots = [str(root) for root in (*self.roots, *self.packages.values())]
+        roots = tuple(str(root) for root in (*self.roots, *self.packages.values()))
         request = {"file": str(self.path), "arguments": dict(self.arguments), "packages": packages, "roots": roots}
-        return json.dumps(request)
+        return Request(json.dumps(request), roots)
 
 
 def expand_all(xacros: Sequence[XacroFile]) -> list[tuple[Expanded | Finding, Sequence[Path]]]:
@@ -92,12 +92,12 @@ def expand(
     return expand_all([XacroFile(path, arguments, packages, roots, span)])[0]
 
 
-def _told(xacro: XacroFile, answer: Mapping[str, Any] | None) -> tuple[Expanded | Finding, Sequence[Path]]:
+def _told(xacro: XacroFile, answer: Answer | None) -> tuple[Expanded | Finding, Sequence[Path]]:
     if answer is None:
         message = f"'{plain(shown_name(xacro.path))}' does not end within its limits of time and memory"
         return NOT_EXPANDED.at(xacro.span, message, help="does a macro call itself?"), ()
-    files = tuple(dict.fromkeys(map(Path, answer["files"])))
-    if "error" in answer:
-        place = span_of_place(answer["place"]) if answer["place"] else xacro.span
-        return NOT_EXPANDED.at(place, plain(" ".join(answer["error"].split()), 300)), files
-    return Expanded(answer["text"], tuple(missing_prefixes(answer["bare"]))), files
+    files = tuple(dict.fromkeys(map(Path, answer.files)))
+    if answer.error:
+        place = span_of_place(answer.place) if answer.place else xacro.span
+        return NOT_EXPANDED.at(place, plain(" ".join(answer.error.split()), 300)), files
+    return Expanded(answer.text, tuple(missing_prefixes(answer.bare))), files

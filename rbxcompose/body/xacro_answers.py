@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -10,25 +9,32 @@ import sys
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 from xxhash import xxh3_128_hexdigest
 
 import rbxcompose
+from rbxcompose.body.xacro_answer import Answer, read_answer
 from rbxcompose.per_compile import once
 from rbxcompose.regular_files import read_regular
 
-Answer = dict[str, Any]
 
-DEADLINE = 4.0  # [s] of real time; the processes limit their processor time themselves
+class Request(NamedTuple):
+    """What is asked, as JSON, and the folders that the answer may be about."""
+
+    text: str
+    roots: tuple[str, ...]
+
+
+DEADLINE = 12.0  # [s] of real time, on a busy machine; the processes limit their processor time themselves
 KEPT = 64  # answers
 _LARGEST = 8_000_000  # [bytes] of a file that xacro reads
 _RUN = "import sys; sys.path.insert(0, sys.argv[1]); from rbxcompose.body.xacro_child import main; main()"
-_answers: OrderedDict[str, tuple[Answer, dict[str, str]]] = OrderedDict()
+_answers: OrderedDict[Request, tuple[Answer, dict[str, str]]] = OrderedDict()
 
 
-def answers(requests: Sequence[str]) -> list[Answer | None]:
-    """Return the answer to each request in JSON; None where the process did not end within its limits."""
+def answers(requests: Sequence[Request]) -> list[Answer | None]:
+    """Return the answer to each request; None where the process did not end within its limits."""
     failed = _failed()
     known = {one: _kept(one) for one in requests}
     new = [one for one, answer in known.items() if answer is None and one not in failed]
@@ -37,19 +43,19 @@ def answers(requests: Sequence[str]) -> list[Answer | None]:
         if answer is None:
             failed.add(request)
         else:
-            _answers[request] = answer, {path: _digest(path) for path in answer["used"]}
+            _answers[request] = answer, {path: _digest(path) for path in answer.used}
             if len(_answers) > KEPT:
                 _answers.popitem(last=False)
     return [known[one] for one in requests]
 
 
 @once
-def _failed() -> set[str]:
+def _failed() -> set[Request]:
     """Return the requests of this compile that had no answer: profiles are tried one after another."""
     return set()
 
 
-def _kept(request: str) -> Answer | None:
+def _kept(request: Request) -> Answer | None:
     answer, used = _answers.get(request, (None, {}))
     if answer is None or any(_digest(path) != digest for path, digest in used.items()):
         return None
@@ -67,7 +73,7 @@ def _digest(path: str) -> str:
         return ""
 
 
-def _asked(requests: Sequence[str]) -> list[Answer | None]:
+def _asked(requests: Sequence[Request]) -> list[Answer | None]:
     package = str(Path(rbxcompose.__file__).parents[1])
     with subprocess.Popen(
         [sys.executable, "-E", "-s", "-B", "-c", _RUN, package],
@@ -78,12 +84,14 @@ def _asked(requests: Sequence[str]) -> list[Answer | None]:
         start_new_session=True,
     ) as process:
         try:
-            output, _ = process.communicate(f"[{','.join(requests)}]".encode(), timeout=DEADLINE)
+            output, _ = process.communicate(f"[{','.join(one.text for one in requests)}]".encode(), timeout=DEADLINE)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             output = b""
-    found = [_read(one) for one in _split(output)]
-    return found if len(found) == len(requests) else [None] * len(requests)
+    written = list(_split(output))
+    if len(written) != len(requests):
+        return [None] * len(requests)
+    return [read_answer(one, request.roots) for one, request in zip(written, requests, strict=True)]
 
 
 def _split(output: bytes) -> Iterator[bytes]:
@@ -92,12 +100,3 @@ def _split(output: bytes) -> Iterator[bytes]:
         end = 8 + int.from_bytes(output[:8], "little")
         yield output[8:end]
         output = output[end:]
-
-
-def _read(answer: bytes) -> Answer | None:
-    """Return an answer; None if it is none, since what a file brings along may have ended the process."""
-    try:
-        read = json.loads(answer)
-    except ValueError:
-        return None
-    return read if isinstance(read, dict) and read.keys() >= {"files", "used"} else None

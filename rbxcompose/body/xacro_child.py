@@ -12,8 +12,10 @@ import json
 import os
 import re
 import sys
+import time
 import xml.dom.minidom
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,9 @@ from xacro import substitution_args
 from rbxcompose.body.bare_tags import PLACE, BareTags
 from rbxcompose.body.fence import fence, is_below
 from rbxcompose.body.located_xml import LocatedXml, RefusedXmlError
+from rbxcompose.body.xacro_answer import Answer
 from rbxcompose.regular_files import read_regular
+from rbxcompose.typed_json import to_data
 
 OUTPUT = 8_000_000  # [bytes] of expanded text
 FILE = 2_000_000  # [bytes] of one file
@@ -103,8 +107,8 @@ class _Expansion:
         return self.place or next((place for place in places if place), "")
 
 
-def expand(request: dict[str, Any]) -> dict[str, Any]:
-    """Return the expanded `text`, or the `error` with its `place`; and the `files` that were read."""
+def expand(request: dict[str, Any]) -> Answer:
+    """Return the expanded text, or the error with its place; and the files that were read."""
     expansion = _Expansion(request["packages"], request["roots"])
     xacro.parse = expansion.parse
     xacro.eval_all = expansion.remembering(xacro.eval_all)
@@ -116,10 +120,10 @@ def expand(request: dict[str, Any]) -> dict[str, Any]:
         document = xacro.process_file(request["file"], mappings=dict(request["arguments"]))
         text = document.toxml()
     except BaseException as error:  # its expressions may raise anything
-        return {"error": _reason(error), "place": expansion.where(), "files": expansion.files}
+        return Answer(tuple(expansion.files), error=_reason(error), place=expansion.where())
     if len(text.encode(errors="replace")) > OUTPUT:
-        return {"error": f"it expands to more than {OUTPUT:,} bytes", "place": "", "files": expansion.files}
-    return {"text": text, "files": expansion.files, "bare": expansion.bare.told()}
+        return Answer(tuple(expansion.files), error=f"it expands to more than {OUTPUT:,} bytes")
+    return Answer(tuple(expansion.files), text, bare=expansion.bare.told())
 
 
 def _reason(error: BaseException) -> str:
@@ -136,7 +140,8 @@ def _reason(error: BaseException) -> str:
 
 def main() -> None:
     """Answer requests, each in a process of its own: the length in 8 bytes and the answer, or 0 if there is none."""
-    answers = [_begun(request) for request in json.load(sys.stdin)]
+    start = time.process_time()
+    answers = [_begun(request, start) for request in json.load(sys.stdin)]
     for process, file in answers:
         _, status = os.waitpid(process, 0)
         answer = os.pread(file, os.fstat(file).st_size, 0) if status == 0 else b""
@@ -144,13 +149,14 @@ def main() -> None:
     sys.stdout.buffer.flush()
 
 
-def _begun(request: dict[str, Any]) -> tuple[int, int]:
+def _begun(request: dict[str, Any], start: float) -> tuple[int, int]:
     """Return the process that answers a request, and the file that it writes the answer to."""
     file = os.memfd_create("answer")  # a file, since its size can be limited
     process = os.fork()
     if process == 0:
         used: set[str] = set()
-        fence(request["roots"], used)
-        answer = json.dumps(expand(request) | {"used": sorted(used)}, ensure_ascii=False).encode(errors="replace")
+        fence(request["roots"], used, start)
+        found = to_data(replace(expand(request), used=tuple(sorted(used))))
+        answer = json.dumps(found, ensure_ascii=False).encode(errors="replace")
         os._exit(0 if os.write(file, answer) == len(answer) else 1)
     return process, file

@@ -94,7 +94,7 @@ XML = {
         "RBX2007", '<!DOCTYPE robot [<!ENTITY a SYSTEM "../secret.yaml">]><robot>&a;</robot>', True
     ),
     "100,000 elements inside each other in xacro": xacro("<a>" * 100_000 + "</a>" * 100_000),
-    "100,000 elements in xacro": xacro('<xacro:nothing a="1"/>' + "<a/>" * 100_000),
+    "100,000 elements in xacro": xacro('<xacro:nothing a="1"/>' + "<a/>" * 100_000, is_placed=False),
     "100,000 elements": urdf("<a/>" * 100_000 + '<link name=""/>'),
     "a tag of 1 MB": xacro(f"<xacro:{'a' * 1_000_000}/>"),
 }

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
 
 from rbxcompose.body.xacro import Expanded, expand
+from rbxcompose.body.xacro_answer import Answer, BareFile, BareTag, read_answer
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.findings import Finding, Span
 from rbxcompose.per_compile import one_compile
+from rbxcompose.typed_json import to_data
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
+TAG = BareTag(1, 2, "macro", (3, 4))
 HERE = Span("robot.yaml", 5, 10, 5, 20)
 MACROS = HEAD + (
     '  <xacro:macro name="wheel" params="side">\n    <link name="${side}_wheel"/>\n  </xacro:macro>\n</robot>\n'
@@ -109,3 +114,28 @@ def test_what_is_no_xml_is_a_finding_at_its_line(tmp_path: Path) -> None:
     refused, _ = expanded(tmp_path, '<!DOCTYPE robot [<!ENTITY a "b">]>' + HEAD + "</robot>")
     assert isinstance(refused, Finding)
     assert "DOCTYPE" in refused.message
+
+
+FORGED = {
+    "no answer": b"",
+    "another type": b"[]",
+    "no text": b'{"text": 1}',
+    "deep": b"[" * 100_000,
+    "other fields": b'{"answer": ""}',
+    "a bare tag without a place": b'{"bare": {"/r.xacro": {"tags": [{"name": "a"}]}}}',
+}
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_an_answer_of_another_shape_is_none(name: str) -> None:
+    assert read_answer(FORGED[name], ["/"]) is None
+
+
+def test_an_answer_about_files_elsewhere_is_not_believed() -> None:
+    answer = Answer(("/a/r.xacro", "/b/r.xacro"), "", "no", "/b/r.xacro|1|1|1", {"/b/r.xacro": BareFile((TAG,))})
+    assert read_answer(json.dumps(to_data(answer)).encode(), ["/a"]) == Answer(("/a/r.xacro",), "", "no")
+    there = replace(answer, place="/a/r.xacro|1|1|1", files=("/a/r.xacro",), bare={"/a/r.xacro": BareFile((TAG,))})
+    assert read_answer(json.dumps(to_data(there)).encode(), ["/a"]) == there
+    for place in ("/a/r.xacro|0|1|1", "/a/r.xacro", "/a/r.xacro|1|1|99999999999"):
+        found = read_answer(json.dumps(to_data(replace(there, place=place))).encode(), ["/a"])
+        assert found == replace(there, place="")
