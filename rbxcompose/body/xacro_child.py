@@ -23,9 +23,9 @@ import xacro
 from xacro import substitution_args
 
 from rbxcompose.body.bare_tags import PLACE, BareTags
-from rbxcompose.body.fence import fence, is_below
 from rbxcompose.body.located_xml import LocatedXml, RefusedXmlError
 from rbxcompose.body.xacro_answer import Answer
+from rbxcompose.fence import fence, is_below
 from rbxcompose.regular_files import read_regular
 from rbxcompose.typed_json import to_data
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body import fence
+from rbxcompose import fence
 from rbxcompose.body.lint import lint
 from rbxcompose.body.mesh_files import FORMATS, mesh_problem
 from rbxcompose.body.model import Body

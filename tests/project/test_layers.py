@@ -19,6 +19,7 @@ GROUND = {
     "edits": "findings",
     "endpoints": "",
     "expressions": "findings units",
+    "fence": "",
     "findings": "per_compile",
     "formats": "findings plugins",
     "geometry": "",
