@@ -1,4 +1,4 @@
-"""Show, check and draw the body of a robot, or of a URDF or xacro file.
+"""Show, check, draw and pose the body of a robot, or of a URDF or xacro file.
 
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.bodies import check, expand, picture, show, simplify, tree
+from rbxcompose.cli.bodies import check, expand, picture, pose, show, simplify, tree
 
-ACTIONS = (show, tree, check, expand, picture, simplify)
+ACTIONS = (show, tree, check, expand, picture, simplify, pose)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -20,9 +20,8 @@ from rbxcompose.cli.bus.entities import NO_NAME, NOBODY, add_timeout_option, pos
 from rbxcompose.cli.bus.guest import NAME, Guest
 from rbxcompose.cli.bus.place import add_bus_options
 from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.output.terminal import raw
+from rbxcompose.cli.output.terminal import NO_TERMINAL, raw
 from rbxcompose.cli.robots.lookup import NotDoneError
-from rbxcompose.findings import kind
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.qos import Qos
 from rbxcompose.units import ANGULAR_SPEED, SPEED
@@ -30,17 +29,6 @@ from rbxcompose.units import ANGULAR_SPEED, SPEED
 _INPUT = "/cmd_vel/teleop"
 _HELP = "ready: arrows or w a s d: drive   space: stop   q: quit"
 _MOST_READ = 4096  # bytes of keys per read
-
-NO_TERMINAL = kind(
-    "RBX9027",
-    """Driving needs a keyboard
-
-`rbxcompose drive` reads keys from a terminal. Without one, use `rbxcompose topic pub` to send velocities.
-
-Bad: `rbxcompose drive < keys.txt`
-Good: `rbxcompose drive`
-""",
-)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,67 +3,31 @@
 from __future__ import annotations
 
 import json
-import os
-import pty
-import select
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
-import termios
-from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Self
 
 import pytest
 
 from rbxcompose.bus.graph import find
 from rbxcompose.cli.bus.guest import Guest, HeardMessage
-from rbxcompose.cli.bus.place import BusPlace, find_place
 from rbxcompose.msgs.cdr import decode
 from rbxcompose.msgs.geometry_msgs import Twist
+from tests.cli.live_robot import PATIENCE, Keyboard, Robot
+from tests.conftest import ROOT
 
-ROOT = Path(__file__).parents[2]
-PATIENCE = 20.0  # [s]
 FAR = "{pose: {header: {frame_id: map}, pose: {position: {x: 50}, orientation: {w: 1}}}}"
 NEAR = "{pose: {header: {frame_id: map}, pose: {orientation: {w: 1}}}}"
-
-
-class Robot:
-    """A turtlebot without a mission, so that it does only what it is told."""
-
-    def __init__(self, base: Path) -> None:
-        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(base), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
-        self.file = base / "robot.yaml"
-        text = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
-        self.file.write_text(text.partition("\nmissions:")[0] + "\n", encoding="utf-8")
-
-    def command(self, *words: str) -> list[str]:
-        return [sys.executable, "-m", "rbxcompose", *words]
-
-    def do(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            self.command(*words), env=self.environment, capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT
-        )
-
-    def told(self, *words: str) -> Any:
-        """Return what a command answers in JSON."""
-        done = self.do(*words, "--json")
-        assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)
-
-    def place(self) -> BusPlace:
-        endpoint = self.told("ps")["router"]["endpoint"]
-        return find_place(Namespace(router=endpoint, domain=None))
 
 
 @pytest.fixture(scope="module")
 def robot() -> Iterator[Robot]:
     base = Path(tempfile.mkdtemp(prefix="rbx"))
-    made = Robot(base)
+    made = Robot(base, (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8").partition("\nmissions:")[0])
     up = made.do("up", "-d", str(made.file), "--set", "bus.port=7890")
     assert up.returncode == 0, up.stderr
     yield made
@@ -233,40 +197,8 @@ def test_without_a_router_that_is_a_finding(robot: Robot) -> None:
     assert robot.told("topic", "ls", "--domain", "7") == []
 
 
-class Keyboard:
-    """`drive` at a terminal of its own."""
-
-    def __init__(self, robot: Robot, early: str = "") -> None:
-        self.ours, self.theirs = pty.openpty()
-        self.press(early)
-        self.before = termios.tcgetattr(self.theirs)
-        self.process = subprocess.Popen(
-            robot.command("drive", "--speed", "0.1 m/s"),
-            env=robot.environment,
-            cwd=ROOT,
-            stdin=self.theirs,
-            stdout=self.theirs,
-            stderr=self.theirs,
-            start_new_session=True,
-        )
-
-    def until_ready(self) -> Self:
-        shown = ""
-        while "ready: " not in shown:
-            assert select.select([self.ours], [], [], PATIENCE)[0], shown
-            shown += os.read(self.ours, 4096).decode()
-        return self
-
-    def press(self, keys: str) -> None:
-        os.write(self.ours, keys.encode())
-
-    def end(self) -> int:
-        """Wait for the end; the terminal must be what it was."""
-        code = self.process.wait(PATIENCE)
-        assert termios.tcgetattr(self.theirs) == self.before
-        os.close(self.ours)
-        os.close(self.theirs)
-        return code
+def driving(robot: Robot, early: str = "") -> Keyboard:
+    return Keyboard(robot, "drive", "--speed", "0.1 m/s", early=early, ready="ready: ")
 
 
 def test_the_robot_moves_only_while_a_key_is_pressed(robot: Robot) -> None:
@@ -275,7 +207,7 @@ def test_the_robot_moves_only_while_a_key_is_pressed(robot: Robot) -> None:
         assert topic is not None
         speeds: list[float] = []
         guest.listen(topic, lambda heard: speeds.append(decode(Twist, heard.arrival.payload).linear.x))
-        keyboard = Keyboard(robot, early="ww\x1b[A").until_ready()
+        keyboard = driving(robot, early="ww\x1b[A").until_ready()
         assert not guest.run(lambda: speeds != [], 0.2)
         keyboard.press("\x1b[A")
         assert guest.run(lambda: 0.0 in speeds, PATIENCE)
@@ -288,18 +220,18 @@ def test_the_robot_moves_only_while_a_key_is_pressed(robot: Robot) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_the_terminal_is_what_it_was_after_every_end(robot: Robot, number: signal.Signals) -> None:
-    keyboard = Keyboard(robot).until_ready()
+    keyboard = driving(robot).until_ready()
     keyboard.process.send_signal(number)
     assert keyboard.end() == 0
 
 
 @pytest.mark.parametrize("keys", ["wq", "\x04", "w\n\x04"])
 def test_an_end_that_was_typed_before_it_was_ready_counts(robot: Robot, keys: str) -> None:
-    assert Keyboard(robot, early=keys).end() == 0
+    assert driving(robot, early=keys).end() == 0
 
 
 def test_the_end_of_input_ends_driving(robot: Robot) -> None:
-    keyboard = Keyboard(robot).until_ready()
+    keyboard = driving(robot).until_ready()
     keyboard.press("\x04")
     assert keyboard.end() == 0
 
