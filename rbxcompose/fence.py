@@ -29,8 +29,8 @@ def is_below(path: str, roots: Iterable[str]) -> bool:
 def fence(roots: Iterable[str], used: set[str], start: float) -> None:
     """Limit what this process can use from now on, and refuse whatever Python reports that is not needed.
 
-    The files and folders that it reads, or tries to read, are added to `used`. `start` is the processor time [s] that the
-    start of such a process takes here.
+    The files and folders that it reads, or tries to read, are added to `used`. `start` is the processor time [s] that
+    the start of such a process takes here.
     """
     real = [os.path.realpath(root) for root in roots]
     _limit(start)

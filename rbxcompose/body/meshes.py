@@ -1,11 +1,17 @@
-"""Files of meshes as triangles, in the unit of the URDF that names them."""
+"""Files of meshes as coloured triangles, in metres, as RViz reads them."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rbxcompose.body.extra import need
 from rbxcompose.body.mesh_files import FORMATS, LARGEST, mesh_problem
@@ -13,13 +19,35 @@ from rbxcompose.printable import plain
 from rbxcompose.regular_files import read_regular
 
 Trimesh = Any  # of an extra, which may be missing
+Array = NDArray[np.float64]
+GREY = (0.6, 0.62, 0.65)
 _COLLADA = ".dae"
+_MATERIALS = ("bind_material", "library_materials", "library_effects", "library_images")
 
 
-def read_mesh(path: Path, name: str, most: int = LARGEST) -> Trimesh:
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """Triangles: `vertices` [m], three of them for each of `faces`, and `colours`: red, green, blue from 0 to 1."""
+
+    vertices: Array
+    faces: NDArray[np.int64]
+    colours: Array
+
+
+def joined(solids: Sequence[Solid]) -> Solid:
+    """Return several solids as one."""
+    starts = np.cumsum([0, *(len(one.vertices) for one in solids[:-1])])
+    return Solid(
+        np.concatenate([one.vertices for one in solids]),
+        np.concatenate([one.faces + start for one, start in zip(solids, starts, strict=True)]),
+        np.concatenate([one.colours for one in solids]),
+    )
+
+
+def read_mesh(path: Path, name: str, most: int = LARGEST) -> Solid:
     """Return the triangles of a file of at most `most` bytes; `name` is that in messages.
 
-    Lengths are those of the file, but a Collada file has a unit, and is read in metres, as viewers do.
+    Lengths are those of the file, but in metres if it tells its unit. Its upward axis is ignored.
 
     Raises:
         MissingLibraryError: if a library for this format is missing.
@@ -31,24 +59,46 @@ def read_mesh(path: Path, name: str, most: int = LARGEST) -> Trimesh:
         raise ValueError(f"the mesh '{plain(name)}' is none of {', '.join(FORMATS)}")
     if ending == _COLLADA:
         need("Collada files", "collada")
-    from trimesh import load_scene, units
-
     try:
-        data = io.BytesIO(read_regular(path, most))  # without its path, a mesh cannot name further files
-        scene = load_scene(data, file_type=ending.removeprefix("."))
-        mesh: Any = scene.to_mesh()
-        if ending == _COLLADA and scene.units:
-            mesh.apply_scale(units.unit_conversion(scene.units, "meters"))
-        is_empty = not len(mesh.faces)
+        data = read_regular(path, most)
+        pieces = list(_pieces(data, ending)) or (list(_without_materials(data)) if ending == _COLLADA else [])
     except Exception as error:  # readers of many formats raise anything
         raise ValueError(f"the mesh '{plain(name)}' cannot be read") from error
-    if is_empty:
+    if not pieces:
         raise ValueError(f"the mesh '{plain(name)}' has no triangles")
-    return mesh
+    return joined(pieces)
 
 
-def scaled(mesh: Trimesh, scale: Sequence[float]) -> Trimesh:
-    """Return a copy with each direction multiplied by its factor."""
-    copy = mesh.copy()
-    copy.apply_scale(scale)
-    return copy
+def _pieces(data: bytes, ending: str) -> Iterator[Solid]:
+    """Yield the pieces of a mesh file; without its path, it cannot name further files."""
+    from trimesh import load_scene
+    from trimesh.units import unit_conversion
+
+    scene: Any = load_scene(io.BytesIO(data), file_type=ending.removeprefix("."))
+    for node in scene.graph.nodes_geometry:
+        matrix, name = scene.graph[node]
+        geometry = scene.geometry[name]
+        if len(getattr(geometry, "faces", ())):
+            unit = unit_conversion(geometry.units, "meters") if geometry.units else 1.0
+            vertices = (np.array(geometry.vertices) @ matrix[:3, :3].T + matrix[:3, 3]) * unit
+            yield Solid(vertices, np.array(geometry.faces), _colours(geometry))
+
+
+def _colours(geometry: Trimesh) -> Array:
+    """Return the colour of each face. Of a texture only the colour below it counts."""
+    visual, count = geometry.visual, len(geometry.faces)
+    if not visual.defined:
+        return np.tile(GREY, (count, 1))
+    if hasattr(visual, "face_colors"):
+        return np.array(visual.face_colors)[:, :3] / 255
+    return np.tile(np.array(visual.material.main_color)[:3] / 255, (count, 1))
+
+
+def _without_materials(data: bytes) -> Iterator[Solid]:
+    """Yield the pieces of a COLLADA file whose materials are broken, which hides what they are on."""
+    root = ElementTree.fromstring(data)  # noqa: S314 (expat limits entities, and the file is limited, too)
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if re.sub("^{.*}", "", child.tag) in _MATERIALS:
+                parent.remove(child)
+    yield from _pieces(ElementTree.tostring(root), _COLLADA)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.body.extra import need
-from rbxcompose.body.meshes import Trimesh, read_mesh
-from rbxcompose.body.model import Body, Geometry, Shape
-from rbxcompose.geometry import Transform3
+from rbxcompose.body.meshes import Solid
+from rbxcompose.body.model import Body
+from rbxcompose.body.solids import solid_of
 
 SIZE = 800  # [pixels] of each side
 _FINER = 2  # rays per pixel and direction
-_GREY = (0.6, 0.62, 0.65, 1.0)
 _VIEW = (1.0, -1.3, 0.75)  # direction from which it is seen: from the right front, and above
 _LIGHT = (0.4, -0.75, 1.0)
 _AMBIENT = 0.35
 _FIELD = math.radians(30)  # of view
 _MARGIN = 1.08
-_ROUND = 48  # faces around a cylinder
+_FARTHEST = 1e6  # [m] from the root: more is no robot, and rays are computed with few digits
 _NEEDED = ("trimesh", "embreex", "PIL")
 
 Array = NDArray[np.float64]
@@ -38,75 +37,33 @@ def draw(body: Body, positions: Mapping[str, float], meshes: Mapping[str, Path])
         ValueError: if there is nothing to draw, or a mesh cannot be read.
     """
     need("pictures", *_NEEDED)
-    import trimesh
     from PIL import Image
 
-    solids = list(_solids(body, positions, meshes))
-    if not solids:
+    solid = solid_of(body, positions, meshes)
+    if solid is None:
         raise ValueError("the body has no shapes")
-    colours = np.concatenate([np.tile(colour[:3], (len(solid.faces), 1)) for solid, colour in solids])
-    whole: Any = trimesh.util.concatenate([solid for solid, _ in solids])
-    pixels = _rendered(whole, colours, SIZE * _FINER)
+    if not np.abs(solid.vertices).max() <= _FARTHEST:  # also if it is not a number
+        raise ValueError(f"a part of the body is further than {_FARTHEST:g} m away")
+    pixels = _rendered(solid, SIZE * _FINER)
     picture = Image.fromarray((pixels * 255).round().astype(np.uint8)).resize((SIZE, SIZE), Image.Resampling.BOX)
     out = io.BytesIO()
     picture.save(out, "PNG")
     return out.getvalue()
 
 
-def _solids(
-    body: Body, positions: Mapping[str, float], meshes: Mapping[str, Path]
-) -> Iterator[tuple[Trimesh, tuple[float, ...]]]:
-    """Yield each visible shape in the frame of the root, with its colour."""
-    poses = body.poses(positions)
-    for name, link in body.links.items():
-        for shape in link.visuals or link.collisions:
-            solid = _solid(shape.geometry, meshes)
-            if solid is not None:
-                yield _placed(solid, shape, poses[name]), shape.colour or _GREY
-
-
-def _placed(solid: Trimesh, shape: Shape, link: Transform3) -> Trimesh:
-    at = link.compose(shape.origin)
-    columns = [at.apply(axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
-    matrix = np.eye(4)
-    matrix[:3, 3] = at.translation
-    matrix[:3, :3] = np.subtract(columns, at.translation).T
-    solid.apply_transform(matrix)
-    return solid
-
-
-def _solid(geometry: Geometry, meshes: Mapping[str, Path]) -> Any:
-    """Return the triangles of a geometry; None for a mesh that is not there."""
-    from trimesh import creation
-
-    match geometry.kind:
-        case "box":
-            return creation.box(extents=geometry.size)
-        case "sphere":
-            return creation.icosphere(subdivisions=4, radius=geometry.size[0])
-        case "cylinder":
-            return creation.cylinder(radius=geometry.size[0], height=geometry.size[1], sections=_ROUND)
-        case "capsule":
-            return creation.capsule(radius=geometry.size[0], height=geometry.size[1])
-    path = meshes.get(geometry.file)
-    if path is None:
-        return None
-    mesh = read_mesh(path, geometry.file)
-    mesh.apply_scale(geometry.size)
-    return mesh
-
-
-def _rendered(whole: Trimesh, colours: Array, side: int) -> Array:
+def _rendered(solid: Solid, side: int) -> Array:
     """Return red, green and blue from 0 to 1, shape (side, side, 3), seen from `_VIEW`."""
+    from trimesh import Trimesh
     from trimesh.ray.ray_pyembree import RayMeshIntersector
 
+    whole: Any = Trimesh(solid.vertices, solid.faces, process=False)
     eye, rays = _camera(np.asarray(whole.bounds), side)
     faces = RayMeshIntersector(whole).intersects_first(np.broadcast_to(eye, rays.shape), rays)
     light = np.array(_LIGHT) / np.linalg.norm(_LIGHT)
     normals = np.asarray(whole.face_normals)
     towards = np.where((normals * (eye - np.asarray(whole.triangles_center))).sum(1)[:, None] < 0, -normals, normals)
     brightness = _AMBIENT + (1 - _AMBIENT) * np.clip(towards @ light, 0, 1)
-    shaded = colours * brightness[:, None]
+    shaded = solid.colours * brightness[:, None]
     picture = np.ones((len(rays), 3))
     hit = faces >= 0
     picture[hit] = shaded[faces[hit]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.body.extra import need
-from rbxcompose.body.meshes import Trimesh, read_mesh, scaled
+from rbxcompose.body.meshes import Solid, Trimesh, read_mesh
 from rbxcompose.printable import plain
 
 LARGEST_FILE = 512_000_000  # [bytes]
@@ -66,13 +66,14 @@ def simplify(
     return SimplifiedMesh(data, (before, len(simple.faces)), sizes, largest, mean, wanted)
 
 
-def _closed(mesh: Trimesh, name: str) -> Trimesh:
+def _closed(solid: Solid, name: str) -> Trimesh:
     """Return a mesh whose triangles share their corners: where a texture or a normal ends there are several."""
     import trimesh
 
-    if not np.isfinite(mesh.vertices).all() or not mesh.area > 0:
+    mesh = trimesh.Trimesh(solid.vertices, solid.faces) if np.isfinite(solid.vertices).all() else None
+    if mesh is None or not mesh.area > 0:
         raise ValueError(f"the mesh '{plain(name)}' has no surface")
-    return trimesh.Trimesh(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    return mesh
 
 
 def _decimated(mesh: Trimesh, faces: int, name: str) -> Trimesh:
@@ -131,3 +132,10 @@ def _distances(triangles: Array, points: Array) -> Array:
     along = np.linalg.norm(closest(edges / sizes[:, None, None], offsets) - offsets, axis=1)
     corners = np.linalg.norm(offsets, axis=1)
     return np.asarray(np.fmin(along, corners) * sizes)  # a triangle without area gives no number
+
+
+def scaled(mesh: Trimesh, scale: Sequence[float]) -> Trimesh:
+    """Return a copy with each direction multiplied by its factor."""
+    copy = mesh.copy()
+    copy.apply_scale(scale)
+    return copy

@@ -11,8 +11,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.meshes import scaled
-from rbxcompose.body.simplification import distance, faces_for, nearest, simplify
+from rbxcompose.body.simplification import distance, faces_for, nearest, scaled, simplify
 from rbxcompose.cli.bodies.mesh_names import file_names
 
 ONE = (1.0, 1.0, 1.0)
