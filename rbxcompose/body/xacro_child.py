@@ -154,6 +154,9 @@ def _begun(request: dict[str, Any], start: float) -> tuple[int, int]:
     file = os.memfd_create("answer")  # a file, since its size can be limited
     process = os.fork()
     if process == 0:
+        os.closerange(3, file)  # those of other requests
+        for standard in (0, 1, 2):
+            os.dup2(os.open(os.devnull, os.O_RDWR), standard)
         used: set[str] = set()
         fence(request["roots"], used, start)
         found = to_data(replace(expand(request), used=tuple(sorted(used))))

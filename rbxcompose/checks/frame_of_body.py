@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from rbxcompose.body.model import Body
 from rbxcompose.check_runner import check
-from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.findings import Finding, Related, Severity, suggest
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.sdk.capabilities import Drives, WritesFrame
 from rbxcompose.sdk.ports import Looks
@@ -22,13 +21,15 @@ def frame_of_body(robot: Robot) -> Iterator[Finding]:
 
     Bad:
     ```yaml
-    include:
-      drive: rbx:parts/box_base.yaml
+    body:
+      pieces:
+        cart:
+          urdf: robot.urdf
     ```
     Good:
     ```yaml
-    include:
-      base: rbx:parts/box_base.yaml
+    body:
+      urdf: robot.urdf
     ```
     """
     description = robot.manifest.body
@@ -50,5 +51,6 @@ def frame_of_body(robot: Robot) -> Iterator[Finding]:
 
 def _finding(robot: Robot, body: Body, component: RobotComponent, frame: str, message: str) -> Finding:
     root = body.links[body.root]
-    finding = frame_of_body.misspelt(robot.entry_span(component.name), message, frame, body.links, "links")
-    return replace(finding, related=(*finding.related, Related(root.span, f"the root of the body is '{root.name}'")))
+    root_is = [Related(root.span, f"the root of the body is '{root.name}'")]
+    help_text = suggest(frame, body.links, "its links")
+    return frame_of_body.at(robot.entry_span(component.name), message, help=help_text, related=root_is)

@@ -96,14 +96,37 @@ def test_a_mistake_is_a_finding_at_its_place_and_nothing_is_executed(name: str, 
     assert {path.name for path in tmp_path.iterdir()} == {"r.xacro", "wheel.xacro"}
 
 
-def test_within_one_compile_the_same_file_is_expanded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "r.xacro").write_text(HEAD + "</robot>")
-    run = Mock(wraps=subprocess.run)
-    monkeypatch.setattr(subprocess, "run", run)
+def test_a_file_is_expanded_again_only_when_something_that_it_used_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started = Mock(wraps=subprocess.Popen)
+    monkeypatch.setattr(subprocess, "Popen", started)
+    (tmp_path / "r.xacro").write_text(HEAD + '<xacro:include filename="parts/*.xacro"/></robot>')
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts/a.xacro").write_text('<robot><link name="a"/></robot>')
+
+    def links(height: str) -> int:
+        found, _ = expand(tmp_path / "r.xacro", {"height": height}, {}, [tmp_path], HERE)
+        assert isinstance(found, Expanded)
+        return found.text.count("<link")
+
+    assert [links(height) for height in ("1", "1", "2")] == [1, 1, 1]
+    assert started.call_count == 2
+    (tmp_path / "parts/a.xacro").write_text('<robot><link name="a"/><link name="b"/></robot>')
+    assert (links("1"), links("1"), started.call_count) == (2, 2, 3)
+    (tmp_path / "parts/b.xacro").write_text('<robot><link name="c"/></robot>')
+    assert (links("1"), links("1"), started.call_count) == (3, 3, 4)
+
+
+def test_what_does_not_end_is_tried_once_in_a_compile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    started = Mock(wraps=subprocess.Popen)
+    monkeypatch.setattr(subprocess, "Popen", started)
+    (tmp_path / "r.xacro").write_text(HEAD + "${[x for x in range(10**12)]}</robot>")
     with one_compile():
-        for height in ("1", "1", "2"):
-            expand(tmp_path / "r.xacro", {"height": height}, {}, [tmp_path], HERE)
-    assert run.call_count == 2
+        for _ in range(2):
+            found, _ = expand(tmp_path / "r.xacro", {}, {}, [tmp_path], HERE)
+            assert isinstance(found, Finding)
+    assert started.call_count == 1
 
 
 def test_what_is_no_xml_is_a_finding_at_its_line(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from rbxcompose.cli.main import main
 from tests.conftest import ROOT
 
-XACRO = str(ROOT / "robots/box_robot/box_robot.urdf.xacro")
+XACRO = str(ROOT / "parts/body/torso.urdf.xacro")
 LINK = '<robot name="{name}"><link name="a"><visual><geometry>{shape}</geometry></visual></link></robot>'
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 
@@ -26,16 +26,18 @@ def urdf(file: Path, mesh: str, name: str = "r") -> str:
     return str(file)
 
 
-def test_a_file_is_shown_as_the_robot_that_names_it(capsys: pytest.CaptureFixture[str]) -> None:
-    robot = str(ROOT / "robots/box_robot")
+def test_a_file_is_shown_as_the_robot_that_names_it(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(
+        "rbx: 1\nkind: Robot\nname: post\nbody:\n  xacro: rbx:parts/body/torso.urdf.xacro\n  with: {height: 60 cm}\n"
+    )
     for action in ("show", "tree"):
-        assert told(capsys, action, XACRO, "--with", "torso_height=0.6") == told(capsys, action, robot)
+        assert told(capsys, action, XACRO, "--with", "height=0.6") == told(capsys, action, str(tmp_path))
 
 
 def test_arguments_reach_the_xacro_in_si_units(capsys: pytest.CaptureFixture[str]) -> None:
     for written, read in (("0.9", "0.9"), ("90 cm", "0.9"), ("1", "1"), ("1.50", "1.5")):
-        text = told(capsys, "expand", XACRO, "--with", f"torso_height={written}")
-        assert f'size="0.025 0.025 {read}"' in text
+        text = told(capsys, "expand", XACRO, "--with", f"height={written}")
+        assert f'size="0.0254 0.0254 {read}"' in text
 
 
 def test_packages_are_found_where_they_are_said_to_be(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -14,7 +14,12 @@ ROBOT = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
 PATROL = (ROOT / "missions/patrol.yaml").read_text(encoding="utf-8")
 HEADER = "rbx: 1\nkind: Mission\nname: example\n"
 EXAMPLE = f"{HEADER}do: recharge\n"
-URDF = '<robot name="example"><link name="base_link"/></robot>\n'
+URDF = """<robot name="example">
+  <link name="base_footprint"/>
+  <link name="base_link"/>
+  <joint name="base_joint" type="fixed"><parent link="base_footprint"/><child link="base_link"/></joint>
+</robot>
+"""
 
 WALKED_THROUGH = ("tutorial.md", "missions.md", "sdk.md")  # their manifests need each other, or a package
 

@@ -48,7 +48,7 @@ ABOVE = {
     "body": "",
     "bus": "sdk.bound",
     "check_runner": "missions.analysis model.robot",
-    "checks": "check_runner composition diagnostics.core missions model sdk sections",
+    "checks": "body.model check_runner composition diagnostics.core missions model sdk sections",
     "cli": "body bus compiler composition doctor executive.requests finding_pages inspection lsp.server "
     "mission_tests missions model params plan recording rendering replay runtime scaffold schema.documents sdk "
     "sections",
