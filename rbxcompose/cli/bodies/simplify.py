@@ -11,9 +11,9 @@ from rbxcompose.body.description import Description
 from rbxcompose.body.extra import MissingLibraryError
 from rbxcompose.body.mesh_files import FORMATS
 from rbxcompose.body.simplification import LEAST_FACES, Scale, SimplifiedMesh, simplify
-from rbxcompose.cli.bodies.actions import UNKNOWN, Actions, add_reader, read, used
+from rbxcompose.cli.bodies.actions import UNKNOWN, Actions, read, used
 from rbxcompose.cli.bodies.mesh_names import UNSCALED, file_names, scales_of
-from rbxcompose.cli.bodies.source import given_options
+from rbxcompose.cli.bodies.source import add_source_options, given_options
 from rbxcompose.cli.bus.entities import table
 from rbxcompose.cli.output.console import misused, refuse, tell
 from rbxcompose.findings import Finding, kind
@@ -32,20 +32,17 @@ Good: `rbxcompose body simplify arm.stl --out simple`
 """,
 )
 _HEAD = ("mesh", "triangles", "bytes", "largest error", "mean error", "file")
-_ABOUT = """write meshes with fewer triangles, as binary STL files, and tell how far they are from the originals
-
-The error is the distance from points of the original surface to the nearest point of the simplified one: 10,000 points,
-spread evenly with a fixed seed, for the mean, and also up to 10,000 of its corners for the largest. It is in
-millimetres by the scale in the URDF; lengths of a bare STL or OBJ file count as metres."""
+_ABOUT = "write meshes with fewer triangles, as binary STL files, and tell how far they are from the originals"
+_MORE = """The error is the distance from points of the original surface to the nearest point of the simplified one:
+10,000 points, spread evenly with a fixed seed, for the mean, and also up to 10,000 of its corners for the largest. It
+is in millimetres by the scale in the URDF; lengths of a bare STL or OBJ file count as metres."""
 _RATIO = 0.2
 
 
 def add(actions: Actions) -> None:
     """Declare the action."""
-    parser = add_reader(actions, "simplify", _ABOUT.partition("\n")[0], lambda arguments, found: 0)
-    path = next(one for one in parser._actions if one.dest == "path")
-    path.help = f"{path.help}; or a mesh: .stl, .obj or .dae"
-    parser.description = _ABOUT[:1].upper() + _ABOUT[1:].replace("originals\n", "originals.\n", 1)
+    parser = actions.add_parser("simplify", help=_ABOUT, description=f"{_ABOUT[:1].upper()}{_ABOUT[1:]}.\n\n{_MORE}")
+    add_source_options(parser, "; or a mesh: .stl, .obj or .dae")
     amount = parser.add_mutually_exclusive_group()
     words = f"how many of the triangles are left, at most 1 (default: {_RATIO}); each mesh keeps at least {LEAST_FACES}"
     amount.add_argument("--ratio", type=_ratio, default=_RATIO, metavar="R", help=words)

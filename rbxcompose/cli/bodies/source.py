@@ -36,10 +36,10 @@ class MisuseError(Exception):
     """Raised with what is wrong in the words of a command."""
 
 
-def add_source_options(parser: argparse.ArgumentParser) -> None:
-    """Declare PATH and the options that belong to it."""
+def add_source_options(parser: argparse.ArgumentParser, also: str = "") -> None:
+    """Declare PATH, which may name something else, `also`, and the options that belong to it."""
     words = "the robot's file, its folder, or rbx:robots/NAME; or a .urdf or .xacro file without a robot"
-    parser.add_argument("path", metavar="PATH", help=words)
+    parser.add_argument("path", metavar="PATH", help=f"{words}{also}")
     add_layer_options(parser)
     parser.add_argument(
         "--with", action="append", default=[], dest="with_", metavar="NAME=VALUE", help="an argument of the xacro file"
