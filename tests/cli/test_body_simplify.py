@@ -8,6 +8,8 @@ import pytest
 import trimesh
 
 from rbxcompose.body import extra
+from rbxcompose.body.simplification import SimplifiedMesh
+from rbxcompose.cli.bodies.simplify import counted
 from rbxcompose.cli.main import main
 from rbxcompose.testing.golden import Golden
 
@@ -53,6 +55,13 @@ def test_one_mesh_is_chosen_by_its_name(capsys: pytest.CaptureFixture[str], home
 def test_a_mesh_needs_no_body(capsys: pytest.CaptureFixture[str], home: Path) -> None:
     assert "1280 -> 128 " in told(capsys, "meshes/ball.stl", "--ratio", "0.1", "--out", "simple")
     assert (home / "simple/ball.stl").stat().st_size == 84 + 50 * 128
+
+
+@pytest.mark.parametrize(
+    ("left", "wanted", "words"), [(20, 20, "100 -> 20"), (60, 20, "100 -> 60, not 20"), (100, 200, "100, copied")]
+)
+def test_a_mesh_that_keeps_more_than_wanted_is_told(left: int, wanted: int, words: str) -> None:
+    assert counted(SimplifiedMesh(b"", (100, left), (0, 0), 0.0, 0.0, wanted)) == words
 
 
 def test_no_file_is_replaced_unless_that_is_wanted(capsys: pytest.CaptureFixture[str], home: Path) -> None:
