@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rbxcompose.body.prefixes import missing_prefixes
 from rbxcompose.body.xacro_answer import Answer
-from rbxcompose.body.xacro_answers import Request, answers
+from rbxcompose.body.xacro_answers import XacroRequest, answers
 from rbxcompose.body.xml_reader import PLACE, span_of_place
 from rbxcompose.findings import Finding, Span, kind
 from rbxcompose.manifest.files import shown_name
@@ -72,12 +72,12 @@ class XacroFile:
     span: Span
 
     @property
-    def request(self) -> Request:
+    def request(self) -> XacroRequest:
         """Return what the fenced process is asked."""
         packages = {name: str(folder) for name, folder in self.packages.items()}
         roots = tuple(str(root) for root in (*self.roots, *self.packages.values()))
         request = {"file": str(self.path), "arguments": dict(self.arguments), "packages": packages, "roots": roots}
-        return Request(json.dumps(request), roots)
+        return XacroRequest(json.dumps(request), roots)
 
 
 def expand_all(xacros: Sequence[XacroFile]) -> list[tuple[Expanded | Finding, Sequence[Path]]]:

@@ -47,7 +47,7 @@ def _in_one_file(manifest: RobotManifest) -> MappingNode:
     """Return the tree with all file paths as the robot's own file would write them."""
 
     def named(kind: str, node: TreeNode) -> TreeNode:
-        if kind != FILE or not isinstance(node, ScalarNode):
+        if kind != FILE or not isinstance(node, ScalarNode) or str(to_plain(node)).startswith(PREFIX):
             return node
         writer = manifest.contents.documents.writer(node.span, manifest.path)
         file = resolve(str(to_plain(node)), writer, node.span)

@@ -47,7 +47,7 @@ class Tape:
         self, clock: Clock, declare: Callable[[RecordedTopic], None], write: Callable[[Recorded], None]
     ) -> None:
         self._clock, self._declare, self._write = clock, declare, write
-        self._instant = 0.0  # [s], the last instant
+        self._instant, self._stamp = 0.0, 0  # [s] and [ns], the last instant
         self._topics: dict[bytes, RecordedTopic] = {}  # by the GID of the publisher
 
     def around(self, transport: Transport) -> Transport:
@@ -89,8 +89,9 @@ class Tape:
     def _keep(self, topic: RecordedTopic, sequence: int, payload: bytes) -> None:
         now, stamp = self._clock.now(), self._clock.stamp()
         if now != self._instant:
-            self._instant = now
-            if now != stamp / NANOSECONDS:
+            is_next_to_last = stamp == self._stamp  # two instants may have one stamp
+            self._instant, self._stamp = now, stamp
+            if is_next_to_last or now != stamp / NANOSECONDS:
                 self._say(INSTANTS, Float64(data=now))
         self._write(Recorded(topic, stamp, stamp, sequence, payload))
 

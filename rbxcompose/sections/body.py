@@ -19,7 +19,7 @@ from rbxcompose.manifest.files import project_of, resolve
 from rbxcompose.manifest.reader import UNREADABLE
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, TreeNode, key_span, value_span
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.printable import plain
 from rbxcompose.references import JOINT, LINK
@@ -80,7 +80,8 @@ class BodyModel(BodyFileModel):
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     """Yield the component that publishes the description."""
     if found := contents.of(body):
-        yield WantedComponent(DESCRIPTION, DESCRIPTION, {"urdf": found.text}, (body.name,))
+        keys = [key for key in ("urdf", "xacro") if at(contents.root, (body.name, key)) is not None]
+        yield WantedComponent(DESCRIPTION, DESCRIPTION, {"urdf": found.text}, (body.name, *keys))
 
 
 def _brought(instance: str, own: TreeNode | None, entry: TreeNode) -> TreeNode | None:
@@ -105,7 +106,7 @@ def _names(read: Description | None) -> Mapping[str, Mapping[str, object]]:
 @section(
     "body",
     BodyModel,
-    order=30,
+    order=60,
     names=PIECE,
     at=(PIECES,),
     entry="piece",

@@ -134,9 +134,9 @@ def test_fix_cures_what_is_certain_and_leaves_the_rest_of_the_text_alone(
     told = output(capsys, "--fix", str(ROBOT), code=0)
     assert (project / ROBOT).read_bytes().decode() == ("\ufeff" + right).replace("\n", "\r\n")
     fixed = [line for line in told.splitlines() if line.startswith("fixed ")]
-    assert f"fixed {ROBOT}:39:11: 'chargr' -> 'charger'" in fixed
+    assert f"fixed {ROBOT}:42:11: 'chargr' -> 'charger'" in fixed
     assert len(fixed) == len(SLIPS)
-    assert told.endswith("turtlebot is fine: 8 components in 3 processes\n")
+    assert told.endswith("turtlebot is fine: 9 components in 3 processes\n")
 
 
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -254,7 +254,7 @@ def test_what_was_fixed_does_not_stand_in_output_for_programs(
     assert command.main(["check", "--fix", "--format", "json", str(ROBOT)]) == 0
     told = capsys.readouterr()
     assert json.loads(told.out) == []
-    assert told.err == f"fixed {ROBOT}:39:11: 'chargr' -> 'charger'\n"
+    assert told.err == f"fixed {ROBOT}:42:11: 'chargr' -> 'charger'\n"
 
 
 def test_a_file_is_replaced_whole_with_its_mode_and_nothing_is_left_beside_it(tmp_path: Path) -> None:

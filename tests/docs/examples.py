@@ -10,7 +10,8 @@ from pathlib import Path
 from rbxcompose.testing.manifests import Checked, check_text
 
 ROOT = Path(__file__).parents[2]
-ROBOT = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
+WITH_BODY = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
+ROBOT = re.sub(r"^body:\n(  .*\n)+\n", "", WITH_BODY, flags=re.MULTILINE)  # an example may bring another body
 PATROL = (ROOT / "missions/patrol.yaml").read_text(encoding="utf-8")
 HEADER = "rbx: 1\nkind: Mission\nname: example\n"
 EXAMPLE = f"{HEADER}do: recharge\n"

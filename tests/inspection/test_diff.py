@@ -89,7 +89,7 @@ def test_what_one_way_adds_the_other_way_removes() -> None:
     assert {name: {(one.key, one.before, one.after) for one in changes} for name, changes in there.changed.items()} == {
         name: {(one.key, one.after, one.before) for one in changes} for name, changes in back.changed.items()
     }
-    assert there.data()["removed"] == ["battery", "base", "go_to", "charger"]
+    assert there.data()["removed"] == ["battery", "base", "go_to", "charger", "robot_description"]
 
 
 def test_a_mission_whose_lines_have_moved_is_the_same_and_one_with_another_step_is_not(tmp_path: Path) -> None:

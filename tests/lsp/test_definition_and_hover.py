@@ -64,7 +64,7 @@ def test_what_names_nothing_leads_nowhere(editor: Editor) -> None:
             ROBOT,
             "runtime: 45 s",
             2,
-            ["Time from full to empty.", "Takes a time.", "`45 s` from robots/turtlebot/robot.yaml:27"],
+            ["Time from full to empty.", "Takes a time.", "`45 s` from robots/turtlebot/robot.yaml:30"],
         ),
         (
             ROBOT,
