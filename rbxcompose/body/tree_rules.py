@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.body.model import Body, BodyJoint
-from rbxcompose.findings import Finding, Related, kind
+from rbxcompose.findings import Finding, Related, Span, kind
 from rbxcompose.printable import plain
 
 NO_LINK = kind(
@@ -60,10 +60,14 @@ Good:
 _SHOWN = 60
 
 
-def tree_mistakes(body: Body) -> Iterator[Finding]:
+def tree_mistakes(body: Body, whole: Span) -> Iterator[Finding]:
     """Yield what keeps a body from being one tree; unknown names come first, since the rest would follow from them."""
-    unknown = [*_unknown_links(body), *_wrong_mimics(body)]
-    yield from unknown or _shape_mistakes(body)
+    if unknown := [*_unknown_links(body), *_wrong_mimics(body)]:
+        yield from unknown
+    elif not body.links:
+        yield NO_TREE.at(whole, "this robot has no links", help="was its xacro expanded without calling its macros?")
+    else:
+        yield from _shape_mistakes(body)
 
 
 def _unknown_links(body: Body) -> Iterator[Finding]:
@@ -98,8 +102,6 @@ def _shape_mistakes(body: Body) -> Iterator[Finding]:
             yield NO_TREE.at(joint.span, message, related=[Related(above[joint.child].span, "the first")])
         above.setdefault(joint.child, joint)
     roots = [link for name, link in body.links.items() if name not in above]
-    if not body.links:
-        return
     if not roots:
         first = next(iter(body.joints.values()))
         yield NO_TREE.at(first.span, "each link is the child of a joint: the joints form a circle")

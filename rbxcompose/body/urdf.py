@@ -75,7 +75,7 @@ def read_body(root: XmlElement) -> tuple[Body, list[Finding]]:
     """Return the body that a URDF describes, and what is wrong with it; with findings, the body may not be a tree."""
     reader = _BodyReader()
     body = reader.body(root)
-    return body, reader.findings or list(tree_mistakes(body))
+    return body, reader.findings or list(tree_mistakes(body, root.span))
 
 
 class _MistakeError(Exception):

@@ -158,6 +158,11 @@ def test_each_mistake_is_a_finding_at_its_element(name: str) -> None:
     assert any(words in one.message for one in findings), findings
 
 
+def test_a_robot_without_links_is_told() -> None:
+    _, findings = read('<robot name="r"/>')
+    assert [(one.code, one.message) for one in findings] == [("RBX2006", "this robot has no links")]
+
+
 @settings(deadline=None)
 @given(st.recursive(st.just(""), lambda inner: st.lists(inner, max_size=3).map("".join).map("<link>{}</link>".format)))
 def test_whatever_elements_there_are_reading_ends_in_findings(inside: str) -> None:

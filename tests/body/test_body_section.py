@@ -19,6 +19,7 @@ from rbxcompose.testing.manifests import Checked, check_text
 HEAD = "rbx: 1\nkind: Robot\nname: cart\n"
 ROBOT = f"{HEAD}body:\n  urdf: cart.urdf\n"
 CART = '<?xml version="1.0"?>\n<robot name="cart">\n  <link name="base"/>\n</robot>\n'
+OTHER = '<robot name="other"><link name="base"/></robot>'
 PART = "rbx: 1\nkind: Part\nname: shell\nbody:\n  urdf: cart.urdf\n"
 MISTAKES = {
     "not closed": '<robot name="cart">\n  <link name="base">\n</robot>\n',
@@ -160,9 +161,9 @@ def test_the_file_of_a_part_lies_beside_the_part(tmp_path: Path) -> None:
 
 
 def test_a_value_of_the_command_line_is_relative_to_the_robot(tmp_path: Path) -> None:
-    files = {"cart.urdf": CART, "other.urdf": "<robot/>"}
+    files = {"cart.urdf": CART, "other.urdf": OTHER}
     checked = check_text(ROBOT, tmp_path, others=files, sets=["body.urdf=other.urdf"])
-    assert urdf_of(checked) == "<robot/>"
+    assert urdf_of(checked) == OTHER
 
 
 def test_a_plan_holds_the_text_as_it_was_checked(tmp_path: Path) -> None:

@@ -139,7 +139,7 @@ def test_a_namespace_is_named_as_the_reason_of_a_topic(tmp_path: Path) -> None:
 
 def test_what_a_section_runs_stands_where_the_section_does(tmp_path: Path) -> None:
     text = "rbx: 1\nkind: Robot\nname: one\nbody:\n  urdf: one.urdf\n"
-    made = check_text(text, tmp_path, others={"one.urdf": "<robot/>"}).compilation.robot
+    made = check_text(text, tmp_path, others={"one.urdf": '<robot><link name="base"/></robot>'}).compilation.robot
     assert made is not None
     told = why(made, "robot_description")
     assert isinstance(told, PathAnswer)

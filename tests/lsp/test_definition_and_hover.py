@@ -47,7 +47,7 @@ def test_a_name_leads_to_where_it_is_written(
 
 def test_the_file_of_a_body_is_led_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "cart.urdf").write_text("<robot/>", encoding="utf-8")
+    (tmp_path / "cart.urdf").write_text('<robot><link name="base"/></robot>', encoding="utf-8")
     document = Document(tmp_path / "robot.yaml", "rbx: 1\nkind: Robot\nname: cart\nbody:\n  urdf: cart.urdf\n")
     assert str(define(document, 4, 10)) == "cart.urdf:1:1"
 
