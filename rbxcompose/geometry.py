@@ -126,15 +126,11 @@ def conjugate(rotation: Quaternion) -> Quaternion:
 
 def rotate(rotation: Quaternion, vector: Vector3) -> Vector3:
     """Return `vector` turned by a unit quaternion."""
-    qx, qy, qz, qw = rotation
+    x, y, z, w = rotation
     vx, vy, vz = vector
-    ax, ay, az = qw * vx + qy * vz - qz * vy, qw * vy - qx * vz + qz * vx, qw * vz + qx * vy - qy * vx
-    aw = qx * vx + qy * vy + qz * vz
-    return (
-        aw * qx + ax * qw - ay * qz + az * qy,
-        aw * qy + ax * qz + ay * qw - az * qx,
-        aw * qz - ax * qy + ay * qx + az * qw,
-    )
+    # v + w t + u x t, where t = 2 u x v: half of the products of two quaternions
+    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+    return (vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx)
 
 
 def lerp(a: Vector3, b: Vector3, fraction: float) -> Vector3:

@@ -6,7 +6,7 @@ share it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -138,7 +138,12 @@ class Body:
             found[joint.parent].append(joint)
         return found
 
-    @property
+    @cached_property
+    def joints_downwards(self) -> Sequence[BodyJoint]:
+        """Return the joints, each before those below it."""
+        return [joint for link, _ in self.walk() for joint in self.joints_below[link]]
+
+    @cached_property
     def root(self) -> str:
         """Return the link that no joint places."""
         return next(name for name in self.links if name not in self.joint_above)
@@ -166,7 +171,7 @@ class Body:
     def poses(self, positions: Mapping[str, float]) -> dict[str, Transform3]:
         """Return the frame of every link in that of the root."""
         found = {self.root: Transform3()}
-        for link, _ in self.walk():
-            for joint in self.joints_below[link]:
-                found[joint.child] = found[link].compose(joint.at(self.position(joint, positions)))
+        for joint in self.joints_downwards:
+            at = joint.at(self.position(joint, positions)) if joint.moves else joint.origin
+            found[joint.child] = found[joint.parent].compose(at)
         return found
