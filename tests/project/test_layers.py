@@ -55,6 +55,7 @@ ABOVE = {
     "compiler": "check_runner composition model plan",
     "components": "body diagnostics executive missions mux.core navigation.go_to sdk sim",
     "composition": "body.description sections",
+    "control": "",
     "diagnostics": "",
     "doctor": "bus.graph composition model.robot runtime.folder runtime.processes sdk sections",
     "executive": "missions sdk",
@@ -81,7 +82,8 @@ ABOVE = {
     "testing": "bus compiler components model.wires params plan.model recording.message rendering.text "
     "runtime.process_group runtime.records sdk",
 }
-CORES = {"body", "diagnostics", "missions", "mux", "navigation", "params", "sim"}  # pure: no bus, thread or clock
+# Pure: no bus, thread or clock.
+CORES = {"body", "control", "diagnostics", "missions", "mux", "navigation", "params", "sim"}
 TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},

@@ -1,0 +1,1 @@
+"""Pure cores of what moves: joints and their limits, trajectories, grippers, bases on wheels."""
