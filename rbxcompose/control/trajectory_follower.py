@@ -1,0 +1,219 @@
+"""Follows joint trajectories, and judges whether the joints do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from rbxcompose.control.curves import Curve, JointSample, braking
+from rbxcompose.control.trajectory import (
+    JointTolerance,
+    TrajectoryCode,
+    TrajectoryGoal,
+    TrajectoryPolicy,
+    TrajectoryRefusal,
+)
+from rbxcompose.control.trajectory_plan import JointRules, TrajectoryPlan, begin_of, plan_trajectory
+from rbxcompose.geometry import wrap_angle
+
+Samples = Mapping[str, JointSample]
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectoryOutcome:
+    """How a trajectory ended."""
+
+    code: TrajectoryCode
+    message: str
+    joint: str = ""
+    """The joint that decided; empty if none did."""
+    error: float = 0.0
+    """Its error [rad, m, rad/s or m/s]."""
+    tolerance: float = 0.0
+    """What it exceeded."""
+    time: float = 0.0
+    """[s] since the trajectory began."""
+    is_canceled: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FollowStep:
+    """What a cycle asks for."""
+
+    desired: Mapping[str, JointSample] = field(default_factory=dict)
+    """Of joints that are led now; any other holds."""
+    outcome: TrajectoryOutcome | None = None
+    """In the cycle in which the trajectory ends."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """A curve on its way."""
+
+    begin: float
+    curve: Curve
+
+    def at(self, now: float) -> JointSample:
+        return self.curve.sample(now - self.begin)
+
+    def is_over(self, now: float) -> bool:
+        return now - self.begin >= self.curve.duration
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """A goal that was accepted."""
+
+    goal: TrajectoryGoal
+    plan: TrajectoryPlan
+
+
+class TrajectoryFollower:
+    """Leads joints along one trajectory at a time.
+
+    However a trajectory ends before its time, its joints decelerate within their limits and hold. All times are robot
+    time [s].
+    """
+
+    def __init__(self, joints: Mapping[str, JointRules], policy: TrajectoryPolicy) -> None:
+        self.joints = dict(joints)
+        self.policy = policy
+        self._motions: dict[str, _Motion] = {}  # of joints that are led
+        self._run: _Run | None = None
+        self._next: _Run | None = None  # replaces the other at its beginning
+
+    @property
+    def is_following(self) -> bool:
+        """Return whether a trajectory runs, or waits for its start."""
+        return self._run is not None or self._next is not None
+
+    @property
+    def is_moving(self) -> bool:
+        """Return whether joints are led: along a trajectory, or to rest."""
+        return bool(self._motions)
+
+    def accept(
+        self, goal: TrajectoryGoal, now: float, measured: Samples, commanded: Samples
+    ) -> TrajectoryPlan | TrajectoryRefusal:
+        """Take over a goal, from now on or from its start on; return its plan, or why it is refused.
+
+        It replaces what runs, whose joints it continues with position, velocity and acceleration; outcomes are its own
+        from now on. Joints which it leaves out come to rest when it begins. A refusal changes nothing.
+        """
+        begin = begin_of(goal, now)
+        idle = commanded if self.policy.start_from == "commanded" else measured
+        names = [name for name in goal.joints if name in self.joints]
+        lost = next((name for name in names if name not in self._motions and not idle[name].is_finite), None)
+        if lost is not None:
+            return TrajectoryRefusal(TrajectoryCode.INVALID_GOAL, f"it is not known where joint '{lost}' is", lost)
+        waiting = {name: self._motions.get(name) or self._resting(name, idle[name], now) for name in names}
+        is_led = {name: name in self._motions or begin > now for name in names}
+        start = {name: waiting[name].at(begin) if is_led[name] else idle[name] for name in names}
+        plan = plan_trajectory(goal, now, start, self.joints, self.policy)
+        if isinstance(plan, TrajectoryPlan):
+            self._motions |= waiting
+            self._next = _Run(goal, plan)
+            self._switch(now)
+        return plan
+
+    def step(self, now: float, measured: Samples, commanded: Samples) -> FollowStep:
+        """Return what is desired at `now`. `measured` and `commanded` have all joints of the trajectory."""
+        self._switch(now)
+        desired = {name: motion.at(now) for name, motion in self._motions.items()}
+        outcome = self._judged(now, desired, measured, commanded) if self._run is not None else None
+        if outcome is not None:
+            self._end(now)
+        elif not self.is_following:
+            self._motions = {name: one for name, one in self._motions.items() if not one.is_over(now)}
+        return FollowStep(desired, outcome)
+
+    def cancel(self, now: float) -> TrajectoryOutcome | None:
+        """Bring the joints to rest on demand; return the outcome, None if no trajectory runs."""
+        return self._stop(now, TrajectoryOutcome(TrajectoryCode.SUCCESSFUL, "canceled", is_canceled=True))
+
+    def abort(self, now: float, reason: str, joint: str = "") -> TrajectoryOutcome | None:
+        """Bring the joints to rest since one, or something else, has failed; return the outcome as `cancel` does."""
+        return self._stop(now, TrajectoryOutcome(TrajectoryCode.PATH_TOLERANCE_VIOLATED, reason, joint))
+
+    def release(self, joint: str) -> None:
+        """Stop leading a joint at once: it has no torque any more."""
+        self._motions.pop(joint, None)
+
+    def _stop(self, now: float, outcome: TrajectoryOutcome) -> TrajectoryOutcome | None:
+        run = self._next or self._run
+        if run is None:
+            return None
+        self._end(now)
+        return replace(outcome, time=max(0.0, now - run.plan.begin))
+
+    def _end(self, now: float) -> None:
+        self._run = self._next = None
+        self._motions = {name: self._brake(name, now) for name in self._motions}
+
+    def _switch(self, now: float) -> None:
+        """Let the waiting trajectory begin when its time has come."""
+        run = self._next
+        if run is None or now < run.plan.begin:
+            return
+        begin, curves = run.plan.begin, run.plan.curves
+        left = {name: self._brake(name, begin) for name in self._motions if name not in curves}
+        self._motions = left | {name: _Motion(begin, curve) for name, curve in curves.items()}
+        self._run, self._next = run, None
+
+    def _brake(self, name: str, now: float) -> _Motion:
+        return self._resting(name, self._motions[name].at(now), now)
+
+    def _resting(self, name: str, sample: JointSample, now: float) -> _Motion:
+        limits = self.joints[name].limits
+        return _Motion(now, braking(sample, limits.acceleration, limits.least, limits.greatest))
+
+    def _judged(self, now: float, desired: Samples, measured: Samples, commanded: Samples) -> TrajectoryOutcome | None:
+        run = self._run
+        if run is None:
+            return None
+        time = now - run.plan.begin
+        if now < run.plan.end or self._next is not None:
+            return self._path_violation(run, time, desired, measured)
+        open_ = self._not_arrived(run, time, desired, measured, commanded)
+        allowed = self.policy.goal_time if run.goal.goal_time is None else run.goal.goal_time
+        if open_ is None:
+            return TrajectoryOutcome(TrajectoryCode.SUCCESSFUL, "arrived", time=time)
+        return open_ if now > run.plan.end + allowed else None
+
+    def _path_violation(self, run: _Run, time: float, desired: Samples, measured: Samples) -> TrajectoryOutcome | None:
+        for name in run.plan.curves:
+            tolerance = self._tolerance(run, name).path
+            error = self._error(name, desired[name], measured[name])
+            if tolerance is not None and not abs(error) <= tolerance:
+                message = f"joint '{name}' is {abs(error):.3g} from its path, more than {tolerance:.3g}"
+                return TrajectoryOutcome(
+                    TrajectoryCode.PATH_TOLERANCE_VIOLATED, message, name, abs(error), tolerance, time
+                )
+        return None
+
+    def _not_arrived(
+        self, run: _Run, time: float, desired: Samples, measured: Samples, commanded: Samples
+    ) -> TrajectoryOutcome | None:
+        """Return how it fails if it ends now; None if all joints have arrived."""
+        for name in run.plan.curves:
+            tolerance = self._tolerance(run, name)
+            checks = (
+                ("from its goal", self._error(name, desired[name], measured[name]), tolerance.goal),
+                ("from its goal by its command", self._error(name, desired[name], commanded[name]), tolerance.goal),
+                ("per second fast at its goal", measured[name].velocity, tolerance.velocity),
+            )
+            for words, error, limit in checks:
+                if limit is not None and not abs(error) <= limit:
+                    message = f"joint '{name}' is {abs(error):.3g} {words}, more than {limit:.3g}"
+                    return TrajectoryOutcome(
+                        TrajectoryCode.GOAL_TOLERANCE_VIOLATED, message, name, abs(error), limit, time
+                    )
+        return None
+
+    def _tolerance(self, run: _Run, joint: str) -> JointTolerance:
+        return run.goal.tolerances.get(joint, self.policy.tolerances.get(joint, self.policy.tolerance))
+
+    def _error(self, joint: str, desired: JointSample, actual: JointSample) -> float:
+        error = desired.position - actual.position
+        return wrap_angle(error) if self.joints[joint].is_continuous and math.isfinite(error) else error
