@@ -89,18 +89,17 @@ def test_the_derivatives_are_those_of_the_position(knots: Knots) -> None:
             assert now.acceleration == pytest.approx((after.velocity - before.velocity) / (2 * h), abs=1e-1)
 
 
-@given(KNOTS, st.lists(st.floats(0.0, 1.0), max_size=20))
-def test_extent_and_speed_bound_every_sample_and_are_reached(knots: Knots, shares: list[float]) -> None:
+@given(KNOTS)
+def test_extent_and_speed_bound_every_sample_and_are_reached(knots: Knots) -> None:
+    shares = [index / 20 for index in range(20)] + [1 - 1e-12]
     for curve in curves(knots):
         low, high = curve.extent
-        times = [share * curve.duration * (1 - 1e-12) for share in shares] + [
-            curve.duration * i / 100 for i in range(100)
-        ]
-        samples = [curve.sample(time) for time in times]
-        assert all(low - 1e-6 <= one.position <= high + 1e-6 for one in samples)
-        assert all(abs(one.velocity) <= curve.speed + 1e-6 for one in samples)
-        assert max(abs(one.velocity) for one in samples) >= 0.8 * curve.speed - 0.3
-        assert max(one.position for one in samples) >= high - 0.2
+        pieces = itertools.pairwise(curve.times)
+        samples = [curve.sample(start + share * (end - start)) for start, end in pieces for share in shares]
+        fastest, highest = max(abs(one.velocity) for one in samples), max(one.position for one in samples)
+        assert fastest - 1e-6 <= curve.speed <= 1.1 * fastest + 1e-6
+        assert low - 1e-6 <= min(one.position for one in samples)
+        assert highest - 1e-6 <= high <= highest + 0.1 * (high - low) + 1e-6
 
 
 @given(KNOTS)
