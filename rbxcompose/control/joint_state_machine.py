@@ -46,11 +46,14 @@ class _Cycle:
     """One step: the state as it changes, and the actions so far."""
 
     def __init__(self, state: JointCondition, inputs: JointInputs, now: float, policy: JointPolicy) -> None:
-        self.state, self.inputs, self.now, self.policy = state, inputs, now, policy
+        self.inputs, self.now, self.policy = inputs, now, policy
         self.actions: list[JointAction] = []
-        self.position = _finite(inputs.position)
+        if _finite(inputs.position) is not None:
+            state = replace(state, position=inputs.position, measured_at=inputs.measured_at)
+        self.state = state
+        self.position = state.position
         self.temperature = _finite(inputs.temperature)
-        self.age = math.inf if self.position is None else now - inputs.measured_at
+        self.age = now - state.measured_at
         self.is_stale = self.age > policy.cycle * policy.hold_after
 
     def observe(self) -> None:
@@ -174,7 +177,7 @@ class _Cycle:
         if state.hardware_error:
             return f"the servo reported {state.hardware_error}; enable the joint when that is mended"
         if state.is_lost:
-            return f"nothing has been measured for {self.age:.2f} s" if self.position is not None else _UNMEASURED
+            return f"nothing has been measured for {self.age:.2f} s"
         if state.rest_until is None:
             return ""
         resume, left = self.policy.thermal.resume, max(0.0, state.rest_until - self.now)
@@ -183,11 +186,8 @@ class _Cycle:
 
     def _age_reason(self) -> str:
         if self.position is None:
-            return _UNMEASURED
+            return "its position is not known"
         return f"its measured position is {self.age:.3f} s old" if self.is_stale else ""
-
-
-_UNMEASURED = "its position is not known"
 
 
 def _finite(value: float | None) -> float | None:

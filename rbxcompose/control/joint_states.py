@@ -95,7 +95,7 @@ class JointInputs:
     """What is known of a joint in a cycle, and what is asked of it, in this order."""
 
     position: float | None = None
-    """Last measured position [rad or m]; None if there is none yet."""
+    """Last measured position [rad or m]; None, or no finite number, if there is none."""
     measured_at: float = -math.inf
     """When it was measured [s]."""
     temperature: float | None = None
@@ -158,6 +158,10 @@ class JointCondition:
     """A fault because measurements are missing; it ends when there are new ones."""
     rest_until: float | None = None
     """When the thermal rest may end [s]; None if the joint does not rest."""
+    position: float | None = None
+    """Last measured position that was a number [rad or m]."""
+    measured_at: float = -math.inf
+    """When it was measured [s]."""
     note: str = ""
     """Why it is as it is; empty if there is nothing to say."""
 

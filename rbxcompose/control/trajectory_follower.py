@@ -99,7 +99,8 @@ class TrajectoryFollower:
         """Take over a goal, from now on or from its start on; return its plan, or why it is refused.
 
         It replaces what runs, whose joints it continues with position, velocity and acceleration; outcomes are its own
-        from now on. Joints which it leaves out come to rest when it begins. A refusal changes nothing.
+        from now on. Joints which it leaves out come to rest when it begins. A refusal changes nothing. `measured` and
+        `commanded` have all joints of the goal that are known.
         """
         begin = begin_of(goal, now)
         idle = commanded if self.policy.start_from == "commanded" else measured
@@ -136,9 +137,12 @@ class TrajectoryFollower:
         """Bring the joints to rest since one, or something else, has failed; return the outcome as `cancel` does."""
         return self._stop(now, TrajectoryOutcome(TrajectoryCode.PATH_TOLERANCE_VIOLATED, reason, joint))
 
-    def release(self, joint: str) -> None:
-        """Stop leading a joint at once: it has no torque any more."""
+    def lose(self, joint: str, now: float, reason: str) -> TrajectoryOutcome | None:
+        """Stop leading a joint at once, for it has no torque any more; return the outcome if that ends a trajectory."""
+        runs = [run for run in (self._run, self._next) if run is not None and joint in run.plan.curves]
+        outcome = self.abort(now, reason, joint) if runs else None
         self._motions.pop(joint, None)
+        return outcome
 
     def _stop(self, now: float, outcome: TrajectoryOutcome) -> TrajectoryOutcome | None:
         run = self._next or self._run

@@ -78,7 +78,11 @@ def plan_trajectory(
     joints: Mapping[str, JointRules],
     policy: TrajectoryPolicy,
 ) -> TrajectoryPlan | TrajectoryRefusal:
-    """Return the curves from `start`, the state of the joints at `begin_of(goal, now)`, or why there are none."""
+    """Return the curves from `start`, the state of the joints at `begin_of(goal, now)`, or why there are none.
+
+    They keep the limits of position and velocity. Accelerations that a goal demands are left to the limiter of each
+    joint, and to the tolerance of its path.
+    """
     mistake = mistake_in(goal, joints, policy)
     if mistake is not None:
         return mistake

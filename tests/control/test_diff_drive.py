@@ -58,20 +58,20 @@ def test_the_curvature_is_kept_from_rest_to_a_velocity_and_back(
         assert now.linear * target.angular == pytest.approx(now.angular * target.linear, abs=1e-9)
 
 
-@given(st.sampled_from(EVEN), VELOCITIES, VELOCITIES, st.floats(0.005, 0.2))
+@given(st.sampled_from(EVEN), VELOCITIES, VELOCITIES, st.floats(0.02, 0.2))
 def test_it_reaches_what_is_within_the_limits(
     limits: BaseLimits, first: Velocity2, second: Velocity2, dt: float
 ) -> None:
     limiter = TwistLimiter(limits)
     for wanted in (first, second):
         now = AT_REST
-        for _ in range(int(4.0 / dt) + 3):
+        for _ in range(int(2.0 / dt) + 3):
             now = limiter.step(wanted, dt)
         expected = limiter.within(wanted)
         assert (now.linear, now.angular) == pytest.approx((expected.linear, expected.angular), abs=1e-9)
 
 
-@given(st.sampled_from(EVEN), VELOCITIES, st.floats(0.005, 0.3))
+@given(st.sampled_from(EVEN), VELOCITIES, st.floats(0.02, 0.3))
 def test_without_commands_it_brakes_within_the_limits_to_an_exact_rest(
     limits: BaseLimits, velocity: Velocity2, dt: float
 ) -> None:

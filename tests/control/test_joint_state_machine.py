@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pytest
 from hypothesis import settings
@@ -67,7 +67,7 @@ class Bench:
             case WriteGoal(position=position):
                 self.goal = position
             case TorqueOn():
-                assert self.goal == self.position, "it snaps to an old goal"
+                assert self.goal == self.state.position, "it snaps to an old goal"
                 self.torque = True
             case TorqueOff():
                 self.torque, self.goal = False, None
@@ -105,7 +105,13 @@ class AnyJoint(RuleBasedStateMachine):
         dt=st.sampled_from([0.01, 0.05, 0.6, 70.0]),
     )
     def cycle(self, requests: list[JointRequest], dt: float) -> None:
-        self.bench.step(*requests, dt=dt)
+        self.bench.step(dt=dt)
+        was_blocked = self.bench.state.is_blocked
+        actions = self.bench.step(*requests, dt=0.0)
+        if was_blocked and Enable(True) not in requests:
+            assert not [one for one in actions if isinstance(one, WriteGoal | TorqueOn | Pursue)]
+            refused = [one.request for one in actions if isinstance(one, Refuse)]
+            assert len(refused) == sum(isinstance(one, Hold | MoveTo) for one in requests)
 
     @rule(position=st.sampled_from([None, 0.1, 0.2, math.nan]), is_silent=st.booleans())
     def measure(self, position: float | None, is_silent: bool) -> None:
@@ -265,7 +271,16 @@ def test_a_command_that_is_no_number_is_refused_and_changes_nothing(position: fl
     bench = active()
     before = bench.state
     assert "finite" in bench.refusal(MoveTo(position))
-    assert bench.state == before
+    assert replace(bench.state, measured_at=before.measured_at) == before
+
+
+def test_a_reading_that_is_no_number_counts_as_none_and_not_as_a_fault() -> None:
+    bench = active()
+    bench.position = math.nan
+    assert bench.step() == ()
+    assert bench.mode() == JointMode.ACTIVE
+    bench.step(dt=0.6)
+    assert bench.state.note == "nothing has been measured for 0.61 s"
 
 
 def test_policies_that_contradict_themselves_are_refused() -> None:

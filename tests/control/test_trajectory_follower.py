@@ -233,10 +233,23 @@ def test_a_trajectory_of_the_future_waits_at_rest() -> None:
     assert arm.now == pytest.approx(2.0, abs=0.03)
 
 
-def test_a_joint_without_torque_is_not_led_any_more() -> None:
+def test_a_joint_that_loses_its_torque_ends_the_trajectory_of_all_and_is_not_led_any_more() -> None:
     arm = Arm()
     arm.send(goal((1.0, (0.5, 0.5))))
     arm.run(0.3)
-    arm.follower.abort(arm.now, "pan was relaxed", "pan")
-    arm.follower.release("pan")
+    outcome = arm.follower.lose("pan", arm.now, "pan was relaxed")
+    assert outcome is not None
+    assert (outcome.joint, outcome.message) == ("pan", "pan was relaxed")
     assert arm.step().desired.keys() == {"tilt"}
+    assert arm.follower.lose("tilt", arm.now, "so was tilt") is None
+    assert arm.step() == FollowStep()
+
+
+def test_a_joint_that_holds_may_lose_its_torque_while_others_go_on() -> None:
+    arm = Arm()
+    arm.send(TrajectoryGoal(("pan",), points((1.0, (0.5,)))))
+    arm.run(0.3)
+    assert arm.follower.lose("tilt", arm.now, "tilt was relaxed") is None
+    outcome = arm.run(2.0)
+    assert outcome is not None
+    assert outcome.code == TrajectoryCode.SUCCESSFUL
