@@ -115,7 +115,8 @@ class Limiter:
     """Leads the command of a joint from the LAST COMMAND towards a wanted position within its limits.
 
     It stops in time at the limits and, without overshoot, at the wanted position. A joint that was put outside of its
-    range moves inwards only.
+    range moves inwards only. `limits` may be replaced: another velocity at any time, another range or acceleration at
+    rest, since a joint that moves may no longer be able to stop in time.
     """
 
     def __init__(self, limits: MotionLimits, position: float) -> None:

@@ -138,6 +138,18 @@ def test_after_a_measurement_it_starts_at_rest_from_there() -> None:
     assert limiter.step(0.1).position == 0.5
 
 
+def test_a_lower_limit_of_velocity_is_reached_by_braking() -> None:
+    limiter = Limiter(MotionLimits(velocity=1.5, acceleration=3.0), 0.0)
+    limiter.want(100.0)
+    for _ in range(100):
+        limiter.step(0.01)
+    limiter.limits = MotionLimits(velocity=0.5, acceleration=3.0)
+    for _ in range(100):
+        before = limiter.velocity
+        assert before - limiter.step(0.01).velocity <= 0.03 + 1e-9
+    assert limiter.velocity == 0.5
+
+
 @pytest.mark.parametrize("dt", [0.0, -0.1, math.nan, math.inf])
 def test_a_step_takes_time(dt: float) -> None:
     with pytest.raises(ValueError, match="no step"):
