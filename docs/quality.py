@@ -22,6 +22,9 @@ examples), `make soak` the numbers in the table. A failure becomes a file that e
   terminal. Each must be refused with a place, within 2 s (times 3 for slow machines) and 200 MB.
 - **Poses of links** (`tests/body`): where every link of a body is at random positions of its joints, by our model, by
   Pinocchio and by yourdfpy. No entry of a matrix may differ by more than 1e-9.
+- **Published robots** (`tests/body`): reads, checks, places and draws the [robots of a public
+  package](robots_tried.md), each in a process of its own. Each must be read as Pinocchio reads it and be drawn, or be
+  refused with a finding.
 - **Storms over simulated robots** (`tests/simulated_faults`): runs the patrol robot with its real conductor and
   processes, in virtual time, over a network that delays, loses, duplicates and reorders. Processes are killed and
   hang, links break, components raise, commands make no sense, people stop, release and set parameters, all from one

@@ -6,6 +6,8 @@ import importlib.util
 import json
 from pathlib import Path
 
+import pytest
+
 from benchmarks.run import PAGE, RESULTS, page, subjects
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -20,10 +22,11 @@ def test_every_subject_has_been_measured() -> None:
     assert {row["subject"] for row in results["rows"]} == set(subjects())
 
 
-def test_the_page_of_quality_shows_what_the_soak_has_found() -> None:
-    spec = importlib.util.spec_from_file_location("quality", DOCS / "quality.py")
+@pytest.mark.parametrize("name", ["quality", "robots_tried"])
+def test_the_page_of_figures_shows_what_the_soak_has_found(name: str) -> None:
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
     assert spec
     assert spec.loader
-    quality = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(quality)
-    assert (DOCS / "quality.md").read_text(encoding="utf-8") == quality.page()
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    assert (DOCS / f"{name}.md").read_text(encoding="utf-8") == script.page()
