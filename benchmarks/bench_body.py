@@ -43,7 +43,7 @@ def _arm() -> Description:
     root = read_urdf(text, "arm.urdf")
     if not isinstance(root, XmlElement):
         raise ValueError(root.message)
-    return Description(Path("arm.urdf"), text, read_body(root)[0])
+    return Description(text, read_body(root)[0])
 
 
 def _kinematics(name: str, description: Description) -> list[Row]:
