@@ -45,11 +45,12 @@ GROUND = {
 # What the others import beside the ground and themselves. A row may be that of a package, a module or what lies deeper.
 ABOVE = {
     "__main__": "cli.main",
+    "actuation": "",
     "body": "",
     "bus": "sdk.bound",
     "check_runner": "missions.analysis model.robot",
     "checks": "body.model check_runner composition diagnostics.core missions model sdk sections",
-    "cli": "body bus compiler composition doctor executive.requests finding_pages inspection lsp.server "
+    "cli": "actuation body bus compiler composition doctor executive.requests finding_pages inspection lsp.server "
     "mission_tests missions model params plan recording rendering replay runtime scaffold schema.documents sdk "
     "sections",
     "compiler": "check_runner composition model plan",
@@ -79,7 +80,7 @@ ABOVE = {
     "sections": "body sdk",
     "sim": "",
     "skills": "sdk",
-    "testing": "bus compiler components model.wires params plan.model recording.message rendering.text "
+    "testing": "actuation bus compiler components model.wires params plan.model recording.message rendering.text "
     "runtime.process_group runtime.records sdk",
 }
 # Pure: no bus, thread or clock.
