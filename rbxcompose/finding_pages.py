@@ -18,6 +18,7 @@ FAMILIES = {
     "12": "filling in",
     "13": "files and composition",
     "20": "body",
+    "22": "servos",
     "30": "wiring",
     "31": "muxes",
     "35": "rates and units",
