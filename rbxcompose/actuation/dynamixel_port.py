@@ -55,9 +55,10 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         super().__init__(path)
         self.is_open: bool = False
         self.timeout, self.has_echo = timeout, False
+        self.reply_delay = 0.0  # [s] for which servos pause before a reply
         self._clock = clock
         self._buffer, self._own = bytearray(), bytearray()  # received; sent and not echoed yet
-        self._sent = 0  # [B] of the last packet
+        self._sent = 0.0  # [s], when the last packet will have left the wire
         self._deadline, self._has_looked = 0.0, True
         self.setBaudRate(baud)
 
@@ -146,15 +147,15 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
                 sent += os.write(self._descriptor, data[sent:])
             except (OSError, ValueError) as error:
                 raise self._lost() from error
-        self._sent = sent
+        self._sent = max(self._sent, self._clock()) + BITS * sent / self.baudrate
         if self.has_echo:
             self._own += data[:sent]
         return sent
 
-    def wait_for(self, length: int, delays: float = 0.0) -> None:
-        """Set the deadline of replies of `length` bytes to what was sent last, whose senders pause for `delays` [s]."""
-        wire = BITS * (self._sent + length) / self.baudrate
-        self._wait(wire + delays + self.timeout)
+    def wait_for(self, length: int, replies: int = 1) -> None:
+        """Set the deadline of `replies` with together `length` bytes, which follow what was sent last."""
+        sent = max(self._sent, self._clock())
+        self._wait_until(sent + BITS * length / self.baudrate + replies * self.reply_delay + self.timeout)
 
     def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
         """Set the deadline of a packet of this length [B]."""
@@ -162,10 +163,10 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     def setPacketTimeoutMillis(self, msec: float) -> None:  # noqa: N802
         """Set the deadline to this long from now [ms]."""
-        self._wait(msec / 1000)
+        self._wait_until(self._clock() + msec / 1000)
 
-    def _wait(self, duration: float) -> None:
-        self._deadline, self._has_looked = self._clock() + duration, False
+    def _wait_until(self, deadline: float) -> None:
+        self._deadline, self._has_looked = deadline, False
 
     def isPacketTimeout(self) -> bool:  # noqa: N802
         """Tell whether the deadline has passed."""

@@ -97,8 +97,10 @@ def test_a_deadline_is_the_time_on_the_wire_and_the_timeout() -> None:
     far, near = os.openpty()
     port = BlockingPort(os.ttyname(near), 9600, timeout=0.003, clock=lambda: now[0])
     port.writePort([0] * 8)
-    port.wait_for(10, delays=0.001)
-    due = 18 * 10 / 9600 + 0.001 + 0.003
+    port.writePort([0] * 2)
+    port.reply_delay = 0.0005
+    port.wait_for(10, replies=2)
+    due = 20 * 10 / 9600 + 0.001 + 0.003
     port._has_looked = True
     for elapsed, is_over in ((due - 1e-6, False), (due + 1e-6, True)):
         now[0] = 5.0 + elapsed
