@@ -1,0 +1,47 @@
+"""An adapter that is unplugged, and plugged in again as another terminal."""
+
+from __future__ import annotations
+
+import pytest
+
+from rbxcompose.actuation.dynamixel_bus import DynamixelBus
+from rbxcompose.actuation.port_errors import LostPortError, NoPortError
+from rbxcompose.actuation.servo_models import servo_models
+from rbxcompose.testing.servo_fake import FakeServo
+from tests.actuation.conftest import Plugged
+
+MODELS = {1: servo_models()["AX-12"], 2: servo_models()["XL430-W250"], 3: servo_models()["XL430-W250"]}
+
+
+def test_a_bus_recovers_with_a_new_port_relaxed_and_verified(plugged: Plugged) -> None:
+    port = plugged(FakeServo("AX-12", 1), FakeServo("XL430-W250", 2), FakeServo("XM430-W350", 3))
+    with DynamixelBus(str(port.path), MODELS, timeout=0.2) as bus:
+        bus.write({one: {"torque_enable": 1} for one in MODELS}, is_confirmed=True)
+        assert port.line[2].get("torque_enable") == 1
+        port.unplug()
+        for _ in range(3):
+            with pytest.raises(LostPortError):
+                bus.read([1, 2], ["present_position"])
+        assert not bus.is_open
+        with pytest.raises(NoPortError):
+            bus.reopen()
+        port.replug()
+        found = bus.reopen()
+        assert [one and one.name for one in found.values()] == ["AX-12", "XL430-W250", "XM430-W350"]
+        assert [port.line[one].get("torque_enable") for one in MODELS] == [0, 0, 0]
+        assert bus.read([1, 2], ["present_position"]).keys() == {1, 2}
+
+
+def test_a_bus_may_be_opened_again_without_letting_go(plugged: Plugged) -> None:
+    port = plugged(FakeServo("XL430-W250", 2))
+    with DynamixelBus(str(port.path), {2: MODELS[2]}, timeout=0.2) as bus:
+        bus.write({2: {"torque_enable": 1}}, is_confirmed=True)
+        bus.reopen(is_relaxed=False)
+        assert port.line[2].get("torque_enable") == 1
+
+
+def test_servos_at_another_baud_rate_are_silent(plugged: Plugged) -> None:
+    port = plugged(FakeServo("AX-12", 1, baud=57_600), FakeServo("XL430-W250", 2, baud=4_500_000))
+    for baud, known in ((1_000_000, []), (57_600, [1]), (4_500_000, [2])):
+        with DynamixelBus(str(port.path), baud=baud, timeout=0.05) as bus:
+            assert [one.id for one in bus.scan((1, 2))] == known
