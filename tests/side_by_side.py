@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 REAL_TIME = (
+    "tests/actuation/test_dynamixel_bus",
+    "tests/actuation/test_recovery",
+    "tests/cli/test_servo",
     "tests/exposure/",
     "tests/faults/",
     "tests/net/",

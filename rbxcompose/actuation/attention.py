@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable
 
 from rbxcompose.actuation.bus import ServoStatistics
@@ -15,25 +16,32 @@ class Attention:
 
     def __init__(self, patience: int = 3, period: float = 0.5) -> None:
         self.patience, self.period = patience, period
-        self.statistics: dict[int, ServoStatistics] = {}
+        self.statistics: defaultdict[int, ServoStatistics] = defaultdict(ServoStatistics)
         self._probed: dict[int, float] = {}
 
     def of(self, id: int) -> ServoStatistics:
         """Return the statistics of a servo."""
-        return self.statistics.setdefault(id, ServoStatistics())
+        return self.statistics[id]
 
     def is_silent(self, id: int) -> bool:
         """Tell whether a servo is skipped."""
-        return self.of(id).misses >= self.patience
+        return self.statistics[id].misses >= self.patience
 
     def due(self, ids: Iterable[int], now: float) -> list[int]:
         """Return whom to ask: those that answer in their order, then doubtful ones, then at most one probe.
 
         Those that may be silent are last, because some servos that follow a silent one keep waiting for it.
         """
-        wanted = list(ids)
-        asked = sorted((one for one in wanted if not self.is_silent(one)), key=lambda one: self.of(one).misses)
-        return [*asked, *self._probe([one for one in wanted if self.is_silent(one)], now)]
+        asked: list[int] = []
+        doubtful: list[tuple[int, int]] = []
+        for one in ids:
+            misses = self.statistics[one].misses
+            if misses:
+                doubtful.append((misses, one))
+            else:
+                asked.append(one)
+        asked += [one for misses, one in sorted(doubtful) if misses < self.patience]
+        return asked + self._probe([one for misses, one in doubtful if misses >= self.patience], now)
 
     def _probe(self, silent: list[int], now: float) -> list[int]:
         waiting = [one for one in silent if now - self._probed[one] >= self.period]
@@ -44,13 +52,13 @@ class Attention:
 
     def answered(self, id: int, now: float) -> None:
         """Note a reply."""
-        known = self.of(id)
+        known = self.statistics[id]
         known.reads += 1
         known.misses, known.last_seen = 0, now
 
     def missed(self, id: int, now: float, *, is_corrupt: bool) -> None:
         """Note that a read has failed in all of its attempts."""
-        known = self.of(id)
+        known = self.statistics[id]
         known.misses += 1
         if is_corrupt:
             known.errors += 1

@@ -72,11 +72,14 @@ class ControlItem:
         Raises:
             ValueError: if they cannot hold it.
         """
-        if not self.least <= raw <= self.most:
-            raise ValueError(f"{self.name} must be {self.least} to {self.most}, not {raw}")
-        if self.coding is Coding.DIRECTION:
-            raw = -raw | 1 << _DIRECTION if raw < 0 else raw
-        return raw.to_bytes(self.size, "little", signed=self.coding is Coding.SIGNED)
+        try:
+            if self.coding is not Coding.DIRECTION:
+                return raw.to_bytes(self.size, "little", signed=self.coding is Coding.SIGNED)
+            if self.least <= raw <= self.most:
+                return (-raw | 1 << _DIRECTION if raw < 0 else raw).to_bytes(self.size, "little")
+        except OverflowError:
+            pass  # told below, with the range
+        raise ValueError(f"{self.name} must be {self.least} to {self.most}, not {raw}")
 
     def to_si(self, raw: int) -> float:
         """Return the value of a raw value, in `unit`."""

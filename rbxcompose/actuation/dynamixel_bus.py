@@ -17,7 +17,7 @@ from rbxcompose.actuation.dynamixel_port import BlockingPort, latency_of
 from rbxcompose.actuation.dynamixel_reads import GroupRead, ServoReader, in_other_order
 from rbxcompose.actuation.port_errors import LostPortError
 from rbxcompose.actuation.servo_models import ServoModel
-from rbxcompose.actuation.transfers import ReadPlan, Stretch, read_plan, written
+from rbxcompose.actuation.transfers import ReadPlan, Stretch, WritePlan, read_plan, write_plans
 
 IDS = range(253)
 _SLACK = 0.001  # [s] beyond the latency timer of an adapter
@@ -59,6 +59,7 @@ class DynamixelBus:
         self._packets = packets_by_protocol()
         self._reader = ServoReader(self._packets, clock)
         self._plans: dict[tuple[str, tuple[str, ...]], ReadPlan] = {}
+        self._writes: dict[tuple[str, tuple[str, ...]], tuple[WritePlan, ...]] = {}
         self._port: BlockingPort | None = self._opened()
 
     def _opened(self) -> BlockingPort:
@@ -154,10 +155,10 @@ class DynamixelBus:
             if self.is_fast:
                 sure = [one for one in read.plans if not self.attention.of(one).misses]
                 self._reader.attempt(port, read, self._models(sure), is_fast=True)
-            asked = [one for one in read.plans if not read.is_whole(one)]
+            asked = list(read.open)
             for _ in range(self.retries + 1):
                 self._reader.attempt(port, read, self._models(asked))
-                failed = [one for one in asked if not read.is_whole(one) and not self.attention.of(one).misses]
+                failed = [one for one in asked if one in read.open and not self.attention.of(one).misses]
                 if not failed or (budget is not None and self._clock() - began + self._timeout > budget):
                     break
                 asked = in_other_order(failed)
@@ -167,11 +168,11 @@ class DynamixelBus:
         now = self._clock()
         found: dict[int, ServoReading] = {}
         for servo in read.plans:
-            if read.is_whole(servo):
+            if servo in read.open:
+                self.attention.missed(servo, now, is_corrupt=servo in read.corrupt)
+            else:
                 found[servo] = read.reading(servo)
                 self.attention.answered(servo, found[servo].stamp)
-            else:
-                self.attention.missed(servo, now, is_corrupt=servo in read.corrupt)
         return found
 
     def _models(self, ids: Iterable[int]) -> dict[int, ServoModel]:
@@ -184,6 +185,13 @@ class DynamixelBus:
             self._plans[key] = read_plan(model, names)
         return self._plans[key]
 
+    def _write_plans(self, id: int, names: tuple[str, ...]) -> tuple[WritePlan, ...]:
+        model = self.servos[id]
+        key = (model.name, names)
+        if key not in self._writes:
+            self._writes[key] = write_plans(model, names)
+        return self._writes[key]
+
     def write(self, values: Mapping[int, Mapping[str, int]], *, is_confirmed: bool = False) -> set[int]:
         """Write raw values, by id and item; return the ids that failed.
 
@@ -191,18 +199,18 @@ class DynamixelBus:
 
         Raises:
             KeyError: if a servo is not known, or has no such item.
-            ValueError: if a value does not fit into its item; then nothing is written.
+            ValueError: if a value does not fit into its item, or two are the same memory; then nothing is written.
             PortError: if the port has gone.
         """
         groups: dict[tuple[int, Stretch], dict[int, bytes]] = defaultdict(dict)
         for servo, raws in values.items():
-            model = self.servos[servo]
-            for at, data in written(model, raws):
-                groups[model.protocol, at][servo] = data
+            protocol = self.servos[servo].protocol
+            for plan in self._write_plans(servo, tuple(raws)):
+                groups[protocol, plan.stretch][servo] = plan.data(raws)
         failed = set() if is_confirmed else {one for one in values if self.attention.is_silent(one)}
         write = self._write_each if is_confirmed else self._write_group
-        for (protocol, at), parts in groups.items():
-            failed |= write(protocol, at, parts)
+        for (number, at), parts in groups.items():
+            failed |= write(number, at, parts)
         return failed
 
     def _write_group(self, protocol: int, at: Stretch, data: Mapping[int, bytes]) -> set[int]:

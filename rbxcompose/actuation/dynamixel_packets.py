@@ -138,7 +138,10 @@ def _no_answer(port: BlockingPort, raw: Sequence[int], result: int, head: bytes)
 
 def _replaced(packet: list[int], old: bytes, new: bytes) -> list[int]:
     """Replace bytes between instruction and checksum of a packet, in place, and correct its length."""
-    body = bytes(packet[7:-2]).replace(old, new)
+    body = bytes(packet[7:-2])
+    if old not in body:
+        return packet
+    body = body.replace(old, new)
     packet[7:-2] = body
     packet[5:7] = _word(len(body) + 2)
     return packet

@@ -28,6 +28,7 @@ from rbxcompose.actuation.port_errors import (
 
 BITS = 10  # of a byte on the wire: start bit, eight of data, stop bit
 _CHUNK = 4096  # [B] of one read
+_EARLY = 0.0005  # [s] before the last byte of long replies at which it is worth looking
 _STUCK = 0.5  # [s] after which a port that takes no bytes has failed to send
 _ERRORS: dict[int | None, tuple[type[PortError], str]] = {
     errno.ENOENT: (NoPortError, "does not exist"),
@@ -60,6 +61,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self._buffer, self._own = bytearray(), bytearray()  # received; sent and not echoed yet
         self._sent = 0.0  # [s], when the last packet will have left the wire
         self._deadline, self._has_looked = 0.0, True
+        self._nap = 0.0  # [s] before it is worth looking
         self.setBaudRate(baud)
 
     def setBaudRate(self, baudrate: int) -> bool:  # noqa: N802
@@ -108,6 +110,10 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     def readPort(self, length: int) -> bytes:  # noqa: N802
         """Return just `length` bytes, or those that have come until the deadline."""
+        if self._nap > 0 and len(self._buffer) < length:
+            # The wire cannot be faster: one nap costs less than waking up for each piece of the replies.
+            time.sleep(self._nap)
+            self._nap = 0.0
         while len(self._buffer) < length:
             left = self._deadline - self._clock()
             # Once, what has come while this process had no processor still counts; a babbling bus must not hold it.
@@ -142,9 +148,10 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         data, sent = bytes(packet), 0
         while sent < len(data):
             try:
+                sent += os.write(self._descriptor, data[sent:])
+            except BlockingIOError:
                 if not select.select([], [self._descriptor], [], _STUCK)[1]:
                     break
-                sent += os.write(self._descriptor, data[sent:])
             except (OSError, ValueError) as error:
                 raise self._lost() from error
         self._sent = max(self._sent, self._clock()) + BITS * sent / self.baudrate
@@ -154,8 +161,10 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     def wait_for(self, length: int, replies: int = 1) -> None:
         """Set the deadline of `replies` with together `length` bytes, which follow what was sent last."""
-        sent = max(self._sent, self._clock())
-        self._wait_until(sent + BITS * length / self.baudrate + replies * self.reply_delay + self.timeout)
+        now = self._clock()
+        carried = max(self._sent, now) + BITS * length / self.baudrate
+        self._wait_until(carried + replies * self.reply_delay + self.timeout)
+        self._nap = carried - now - _EARLY
 
     def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
         """Set the deadline of a packet of this length [B]."""
@@ -166,7 +175,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self._wait_until(self._clock() + msec / 1000)
 
     def _wait_until(self, deadline: float) -> None:
-        self._deadline, self._has_looked = deadline, False
+        self._deadline, self._has_looked, self._nap = deadline, False, 0.0
 
     def isPacketTimeout(self) -> bool:  # noqa: N802
         """Tell whether the deadline has passed."""

@@ -22,24 +22,26 @@ class GroupRead:
 
     def __init__(self, plans: Mapping[int, ReadPlan]) -> None:
         self.plans = plans
+        self.open = {servo: plan.stretches[0] for servo, plan in plans.items()}
+        """The next stretch of each servo that is not whole."""
         self.corrupt: set[int] = set()
         """Those whose reply was corrupt, or may have been."""
         self._parts: dict[int, list[bytes]] = {servo: [] for servo in plans}
         self._last: dict[int, tuple[float, int]] = {}  # time [s] and error byte of the last reply
 
-    def is_whole(self, id: int) -> bool:
-        """Tell whether all of a servo's stretches have come."""
-        return len(self._parts[id]) == len(self.plans[id].stretches)
-
     def next_of(self, ids: Iterable[int]) -> dict[int, Stretch]:
-        """Return the next stretch of each servo that is not whole."""
-        open_ones = (servo for servo in ids if not self.is_whole(servo))
-        return {servo: self.plans[servo].stretches[len(self._parts[servo])] for servo in open_ones}
+        """Return the next stretch of each of these servos that is not whole."""
+        return {servo: self.open[servo] for servo in ids if servo in self.open}
 
     def take(self, answer: Answer, now: float) -> None:
         """Keep the next stretch of a servo."""
-        self._parts[answer.id].append(answer.data)
+        parts, stretches = self._parts[answer.id], self.plans[answer.id].stretches
+        parts.append(answer.data)
         self._last[answer.id] = now, answer.error
+        if len(parts) < len(stretches):
+            self.open[answer.id] = stretches[len(parts)]
+        else:
+            del self.open[answer.id]
 
     def reading(self, id: int) -> ServoReading:
         """Return what a servo told, once it is whole."""

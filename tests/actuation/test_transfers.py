@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.actuation.servo_models import ServoModel, servo_models
-from rbxcompose.actuation.transfers import Stretch, read_plan, written
+from rbxcompose.actuation.transfers import Stretch, read_plan, write_plans
 
 MODELS = list(servo_models().values())
 ASKED = st.sampled_from(MODELS).flatmap(
@@ -37,9 +37,10 @@ def test_what_is_written_covers_the_items_and_nothing_else(
     names -= {"goal_velocity"} if "goal_speed" in names else set()  # which may be the same bytes
     values = {name: data.draw(st.integers(model.items[name].least, model.items[name].most)) for name in sorted(names)}
     memory: dict[int, int] = {}
-    for at, part in written(model, values):
-        assert len(part) == at.length
-        memory |= dict(enumerate(part, at.address))
+    for plan in write_plans(model, values):
+        part = plan.data(values)
+        assert len(part) == plan.stretch.length
+        memory |= dict(enumerate(part, plan.stretch.address))
     assert len(memory) == sum(model.items[name].size for name in names)
     for name, raw in values.items():
         item = model.items[name]
@@ -64,3 +65,8 @@ def test_faults_of_protocol_1_come_with_any_reply() -> None:
 def test_an_item_that_a_model_lacks_is_refused() -> None:
     with pytest.raises(KeyError, match="AX-12 has no item 'bus_watchdog'"):
         read_plan(servo_models()["AX-12"], ("bus_watchdog",))
+
+
+def test_two_meanings_of_one_memory_cannot_be_written_together() -> None:
+    with pytest.raises(ValueError, match="are the same memory"):
+        write_plans(servo_models()["AX-12"], ["goal_velocity", "led", "goal_speed"])
