@@ -29,9 +29,9 @@ _NOBODY = b"\xff\xff\xfe\x04\x83\x00\x01\x79"  # a group write to no servo, for 
 class DynamixelBus:
     """A bus on the serial port `path` at `baud` [bit/s], with models of servos by their ids.
 
-    A reply may be `timeout` [s] later than wire and pauses allow, and `return_delay` [s] is the longest pause of any
-    servo before its reply. `retries` is how often a read tries again. With `is_fast`, servos of protocol 2.0 answer
-    group reads in one packet, which old firmware cannot.
+    A reply may be `timeout` [s] later than wire and pauses allow (more if the adapter's latency timer is longer), and
+    `return_delay` [s] is the longest pause of any servo before its reply. `retries` is how often a read tries again.
+    With `is_fast`, servos of protocol 2.0 answer group reads in one packet, which old firmware cannot.
 
     Raises:
         PortError: if the port cannot be opened.
@@ -64,9 +64,13 @@ class DynamixelBus:
 
     def _opened(self) -> BlockingPort:
         port = BlockingPort(self.path, self.baud, timeout=self._timeout, clock=self._clock)
-        port.writePort(_NOBODY)
-        port.wait_for(len(_NOBODY))
-        port.has_echo = port.readPort(len(_NOBODY)) == _NOBODY
+        try:
+            port.writePort(_NOBODY)
+            port.wait_for(len(_NOBODY))
+            port.has_echo = port.readPort(len(_NOBODY)) == _NOBODY
+        except LostPortError:
+            port.closePort()
+            raise
         port.reply_delay = self.return_delay
         return port
 

@@ -86,7 +86,11 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             raise cause(str(self.port_name), words) from error
         self.is_open, self.is_using = True, False
         self.tx_time_per_byte = 1000.0 * BITS / self.baudrate
-        self.clearPort()
+        try:
+            self.clearPort()
+        except PortError:
+            self.closePort()
+            raise
 
     def closePort(self) -> None:  # noqa: N802
         """Close it; a port that is closed stays so."""

@@ -48,9 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_own(action: argparse.ArgumentParser, name: str) -> None:
     """Declare what only some actions have."""
-    if name == "scan":
-        action.add_argument("--last", type=servo_id, default=LAST_ID, metavar="ID", help="the last id to ask for")
-    elif name == "set-id":
+    if name in ("scan", *_GROUPS):
+        action.add_argument("--last", type=servo_id, default=LAST_ID, metavar="ID", help="the last id to look for")
+    if name == "set-id":
         action.add_argument("old", type=servo_id, metavar="OLD", help="its present id")
         action.add_argument("new", type=servo_id, metavar="NEW", help="its new id")
     elif name in _SEVERAL:
@@ -58,7 +58,7 @@ def _add_own(action: argparse.ArgumentParser, name: str) -> None:
     elif name in _GROUPS:
         action.add_argument("ids", type=servo_id, nargs="*", metavar="ID", help="ids of servos")
         action.add_argument("--all", action="store_true", help="all that answer")
-    else:
+    elif name != "scan":
         action.add_argument("id", type=servo_id, metavar="ID", help="the servo's id")
     if name == "read":
         action.add_argument("items", nargs="+", metavar="ITEM", help="such as present_position")

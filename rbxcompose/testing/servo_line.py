@@ -94,16 +94,16 @@ class FakeLine:
                 answer = self._single(packet, servo)
                 speaks = packet.id != wire.BROADCAST or packet.instruction == wire.PING
                 level = servo.get("status_return_level") if "status_return_level" in servo.model.items else 2
-                if answer is not None and speaks and level >= {wire.PING: 0, wire.READ: 1}.get(packet.instruction, 2):
+                if speaks and level >= {wire.PING: 0, wire.READ: 1}.get(packet.instruction, 2):
                     yield servo, answer
 
-    def _single(self, packet: ServoPacket, servo: FakeServo) -> bytes | None:
+    def _single(self, packet: ServoPacket, servo: FakeServo) -> bytes:
         given, protocol, own = packet.parameters, packet.protocol, servo.id
         wide = 2 if protocol == 2 else 1  # [B] of an address or a length
         match packet.instruction:
             case wire.PING:
-                told = servo.read(0, 2) or b"" if protocol == 2 else b""
-                return status(protocol, own, servo.alert, told + b"\x2d" if protocol == 2 else b"")
+                told = bytes(servo.memory[:2]) + b"\x2d" if protocol == 2 else b""  # model number and firmware
+                return status(protocol, own, servo.alert, told)
             case wire.READ if len(given) >= 2 * wide:
                 return self._read(servo, _number(given[:wide]), _number(given[wide : 2 * wide]))
             case wire.WRITE if len(given) > wide:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from typing import Any, Protocol
 
 import pytest
 
-from rbxcompose.actuation.bus import FoundServo
+from rbxcompose.actuation.bus import FoundServo, ServoBus
 from rbxcompose.actuation.dynamixel_bus import DynamixelBus
 from rbxcompose.actuation.servo_models import servo_models
 from rbxcompose.clock import SteppedClock
@@ -41,8 +41,8 @@ def connect(plugged: Plugged) -> Iterator[Connect]:
         yield made
 
 
-def positions(bus: DynamixelBus) -> dict[int, int]:
-    found = bus.read(sorted(bus.servos), STATE)
+def positions(bus: ServoBus, ids: Iterable[int]) -> dict[int, int]:
+    found = bus.read(sorted(ids), STATE)
     return {one: reading.values["present_position"] for one, reading in found.items()}
 
 
@@ -52,12 +52,12 @@ def test_servos_of_both_protocols_and_all_tables_are_read_and_written_together(
     bus, port = connect(MIXED)
     for one in MIXED:
         port.line[one].move_to(100 + one)
-    assert positions(bus) == {one: 100 + one for one in MIXED}
+    assert positions(bus, MIXED) == {one: 100 + one for one in MIXED}
     assert bus.write({one: {"torque_enable": 1} for one in MIXED}) == set()
     assert bus.write({one: {"goal_position": 200 + one} for one in MIXED}) == set()
     bus.read([1], STATE)  # a reply: what was sent before it has arrived
     clock.advance_to(5.0)
-    assert positions(bus) == {one: 200 + one for one in MIXED}
+    assert positions(bus, MIXED) == {one: 200 + one for one in MIXED}
     assert all(bus.statistics[one].reads >= 2 and not bus.statistics[one].errors for one in MIXED)
 
 
@@ -126,6 +126,17 @@ def test_a_spoilt_reply_costs_at_most_its_servo(connect: Connect, names: dict[in
     assert bool(bus.statistics[2].errors + bus.statistics[2].timeouts) == (2 not in found)
 
 
+def test_a_late_reply_costs_its_servo_and_spoils_nothing_after_it(connect: Connect) -> None:
+    bus, port = connect(SIX, timeout=BRISK, retries=0)
+    for one in SIX:
+        port.line[one].move_to(500 + one)
+    port.line[4].faults.delay = 1.5 * BRISK
+    for _ in range(5):
+        found = positions(bus, SIX)
+        assert found.keys() >= SIX.keys() - {4}
+        assert found == {one: 500 + one for one in found}
+
+
 def test_one_bad_reply_is_made_good_within_the_same_read(connect: Connect) -> None:
     bus, port = connect(SIX, timeout=BRISK)
 
@@ -171,7 +182,7 @@ def test_an_adapter_that_echoes_is_noticed_and_its_echo_dropped(connect: Connect
     assert bus.has_echo
     for one in MIXED:
         port.line[one].move_to(100 + one)
-    assert positions(bus) == {one: 100 + one for one in MIXED}
+    assert positions(bus, MIXED) == {one: 100 + one for one in MIXED}
     assert bus.ping(1) == FoundServo(1, 1, 12, 1_000_000)
 
 

@@ -168,7 +168,7 @@ def _torque(arguments: argparse.Namespace, raw: int) -> int:
     with _bus_at(arguments, arguments.baud[0]) as bus:
         ids = arguments.ids
         if arguments.all:
-            ids = [one.id for one in bus.scan(protocols=_protocols(arguments)) if one.model]
+            ids = [one.id for one in bus.scan(range(arguments.last + 1), _protocols(arguments)) if one.model]
         if not ids:
             return refuse(SILENT.at(None, "no servo is named and none answers", help="name ids, or use --all"))
         for one in ids:
