@@ -26,6 +26,11 @@ def is_below(path: str, roots: Iterable[str]) -> bool:
     return any(os.path.commonpath([path, root]) == root for root in roots)
 
 
+def processor_time() -> float:
+    """Return the processor time that this process has taken [s]."""
+    return time.process_time()
+
+
 def fence(roots: Iterable[str], used: set[str], start: float) -> None:
     """Limit what this process can use from now on, and refuse whatever Python reports that is not needed.
 

@@ -93,10 +93,18 @@ def lint(body: Body, meshes: Collection[str]) -> Iterator[Finding]:
     for link in body.links.values():
         yield from _shapes(link, meshes)
     for joint in body.joints.values():
-        if joint.limits is None or not joint.moves or not (stuck := list(_stuck(joint, joint.limits))):
-            continue
-        message = f"the {' and the '.join(stuck)} of joint '{plain(joint.name, _SHOWN)}' {_be(stuck)} zero"
-        yield NO_MOTION.at(joint.limits.span, message, help=_UNWRITTEN if stuck == ["range"] else _WRITE)
+        if joint.limits is not None and joint.moves:
+            yield from _limits(joint, joint.limits)
+
+
+def _limits(joint: BodyJoint, limits: JointLimits) -> Iterator[Finding]:
+    name = plain(joint.name, _SHOWN)
+    if missing := [one for one in ("effort", "velocity") if getattr(limits, one) is None]:
+        message = f"the limits of joint '{name}' lack the {' and the '.join(missing)}"
+        yield NO_MOTION.at(limits.span, message, help="write what the motor can do; ROS refuses a URDF without it")
+    elif stuck := list(_stuck(joint, limits)):
+        message = f"the {' and the '.join(stuck)} of joint '{name}' {_be(stuck)} zero"
+        yield NO_MOTION.at(limits.span, message, help=_UNWRITTEN if stuck == ["range"] else _WRITE)
 
 
 def _stuck(joint: BodyJoint, limits: JointLimits) -> Iterator[str]:

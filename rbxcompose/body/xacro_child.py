@@ -12,7 +12,6 @@ import json
 import os
 import re
 import sys
-import time
 import xml.dom.minidom
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -25,7 +24,7 @@ from xacro import substitution_args
 from rbxcompose.body.bare_tags import PLACE, BareTags
 from rbxcompose.body.located_xml import LocatedXml, RefusedXmlError
 from rbxcompose.body.xacro_answer import Answer
-from rbxcompose.fence import fence, is_below
+from rbxcompose.fence import fence, is_below, processor_time
 from rbxcompose.regular_files import read_regular
 from rbxcompose.typed_json import to_data
 
@@ -140,7 +139,7 @@ def _reason(error: BaseException) -> str:
 
 def main() -> None:
     """Answer requests, each in a process of its own: the length in 8 bytes and the answer, or 0 if there is none."""
-    start = time.process_time()
+    start = processor_time()
     answers = [_begun(request, start) for request in json.load(sys.stdin)]
     for process, file in answers:
         _, status = os.waitpid(process, 0)

@@ -66,7 +66,7 @@ def test_mistakes_are_told_at_their_line(capsys: pytest.CaptureFixture[str], tmp
     assert "r.urdf:2:" in told(capsys, "show", str(tmp_path / "r.urdf"), code=1)
     assert "RBX1301" in told(capsys, "show", str(tmp_path / "none.urdf"), code=1)
     (tmp_path / "r.urdf").write_text('<robot name="r"/>\n')
-    assert "RBX2008" in told(capsys, "show", str(tmp_path / "r.urdf"), code=1)
+    assert "RBX2006" in told(capsys, "show", str(tmp_path / "r.urdf"), code=1)
 
 
 @pytest.mark.parametrize(

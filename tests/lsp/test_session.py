@@ -130,6 +130,7 @@ def test_while_one_types_each_question_is_answered_and_at_rest_the_findings_are_
         while not any(one["range"]["start"] == wanted for one in client.diagnostics(path.as_uri())):
             pass  # a slow machine may have come to compile an older one
         assert client.ask("textDocument/hover", textDocument=document, position=place(typed, "name: turtle", 2))
-        assert [one for one in client.told if one["method"] == "textDocument/publishDiagnostics"] == []
+        told = [one["params"] for one in client.told if one["method"] == "textDocument/publishDiagnostics"]
+        assert [one for one in told if one["uri"] == path.as_uri()] == []
     assert client.process.returncode == 0
     assert client.errors == b""

@@ -52,7 +52,8 @@ class Project:
     def read_by(self, robot: str) -> set[str]:
         """Return the files that a robot is made of, itself included."""
         sources = compile_robot(str(self.folder / robot), environment={}).sources
-        return {str(Path(source).relative_to(self.folder)) for source in sources}
+        found = (Path(source) for source in sources)
+        return {str(path.relative_to(self.folder)) for path in found if path.is_relative_to(self.folder)}
 
     def judge(self, changed: dict[str, bytes]) -> list[Compilation]:
         """Compile every robot that the change may concern.

@@ -77,8 +77,9 @@ def robot(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
 
 LAMP = ("  charger:\n", "  lamp:\n    type: transforms\n    process: lights\n  charger:\n")
+LINK = '<link name="base_footprint"/>'
 AT_REST = ("start: patrol\n", "")
-BODY = ("muxes:\n", "body: {urdf: large.urdf}\nmuxes:\n")
+BODY = ("  urdf: rbx:robots/turtlebot/turtlebot.urdf\n", "  urdf: large.urdf\n")
 
 
 @pytest.mark.timeout(60)
@@ -91,14 +92,14 @@ def test_only_what_has_changed_restarts(robot: Changing) -> None:
     assert "give --yes" in robot.do("apply", "robots/turtlebot", code=2)
     assert robot.ps() == before
     shown = robot.do("apply", "robots/turtlebot", "--yes")
-    assert "speed: 0.3 m/s -> 0.4 m/s at robots/turtlebot/robot.yaml:37:12" in shown
+    assert "speed: 0.3 m/s -> 0.4 m/s at robots/turtlebot/robot.yaml:40:12" in shown
     after = robot.ps()
     assert {name: one["pid"] for name, one in after.items() if name in before} == {
         name: one["pid"] for name, one in before.items()
     }
     assert (after["lamp"]["state"], after["lamp"]["process"]) == ("active", "lights")
     assert "0.4" in robot.do("param", "get", "go_to", "speed")
-    assert robot.do("apply", "robots/turtlebot").startswith(f"{NAME}: 9 kept\n")  # so nothing is asked
+    assert robot.do("apply", "robots/turtlebot").startswith(f"{NAME}: 10 kept\n")  # so nothing is asked
     robot.edit(AT_REST)
     robot.do("apply", "robots/turtlebot", "--yes")
     assert robot.ps().keys() == before.keys()
@@ -108,12 +109,12 @@ def test_only_what_has_changed_restarts(robot: Changing) -> None:
 @pytest.mark.timeout(60)
 def test_what_is_longer_than_a_socket_holds_reaches_a_process_that_runs(robot: Changing) -> None:
     urdf = robot.file.parent / "large.urdf"
-    urdf.write_text(f"<robot>{'<!---->' * 150_000}</robot>", encoding="utf-8")
+    urdf.write_text(f"<robot>{LINK}{'<!---->' * 150_000}</robot>", encoding="utf-8")
     robot.edit(AT_REST, BODY)
     robot.do("up", "-d", "robots/turtlebot")
-    urdf.write_text(f"<robot>{'<thing/>' * 120_000}</robot>", encoding="utf-8")
+    urdf.write_text(f"<robot>{LINK}{'<thing/>' * 120_000}</robot>", encoding="utf-8")
     shown = robot.do("apply", "robots/turtlebot", "--yes")
-    assert "urdf: 1,050,015 characters, " in shown
+    assert "urdf: 1,050,044 characters, " in shown
     assert shown.endswith(f"{NAME} is changed: robot_description transforms restarted\n")
     assert robot.ps()["robot_description"]["state"] == "active"
 
