@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rbxcompose.body.prefixes import missing_prefixes
-from rbxcompose.body.xacro_answer import Answer
+from rbxcompose.body.xacro_answer import XacroAnswer
 from rbxcompose.body.xacro_answers import XacroRequest, answers
 from rbxcompose.body.xml_reader import PLACE, span_of_place
 from rbxcompose.findings import Finding, Span, kind
@@ -92,7 +92,7 @@ def expand(
     return expand_all([XacroFile(path, arguments, packages, roots, span)])[0]
 
 
-def _told(xacro: XacroFile, answer: Answer | None) -> tuple[Expanded | Finding, Sequence[Path]]:
+def _told(xacro: XacroFile, answer: XacroAnswer | None) -> tuple[Expanded | Finding, Sequence[Path]]:
     if answer is None:
         message = f"'{plain(shown_name(xacro.path))}' does not end within its limits of time and memory"
         return NOT_EXPANDED.at(xacro.span, message, help="does a macro call itself?"), ()

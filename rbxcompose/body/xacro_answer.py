@@ -32,7 +32,7 @@ class BareFile:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class XacroAnswer:
     """The files that were read, and either the expanded text or the error with its place."""
 
     files: tuple[str, ...] = ()
@@ -44,10 +44,10 @@ class Answer:
     """All files and folders that it tried to read: while they are the same, so is the answer."""
 
 
-def read_answer(data: bytes, roots: Sequence[str]) -> Answer | None:
+def read_answer(data: bytes, roots: Sequence[str]) -> XacroAnswer | None:
     """Return an answer as far as it is about files below the roots; None if it is none."""
     try:
-        answer: Answer = from_data(Answer, json.loads(data))
+        answer: XacroAnswer = from_data(XacroAnswer, json.loads(data))
     except (UnreadableError, ValueError, RecursionError):
         return None
     real = [Path(root).resolve() for root in roots]

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from xxhash import xxh3_128_hexdigest
 
 import rbxcompose
-from rbxcompose.body.xacro_answer import Answer, read_answer
+from rbxcompose.body.xacro_answer import XacroAnswer, read_answer
 from rbxcompose.per_compile import once
 from rbxcompose.regular_files import read_regular
 
@@ -30,10 +30,10 @@ DEADLINE = 12.0  # [s] of real time, on a busy machine; the processes limit thei
 KEPT = 64  # answers
 _LARGEST = 8_000_000  # [bytes] of a file that xacro reads
 _RUN = "import sys; sys.path.insert(0, sys.argv[1]); from rbxcompose.body.xacro_child import main; main()"
-_answers: OrderedDict[XacroRequest, tuple[Answer, dict[str, str]]] = OrderedDict()
+_answers: OrderedDict[XacroRequest, tuple[XacroAnswer, dict[str, str]]] = OrderedDict()
 
 
-def answers(requests: Sequence[XacroRequest]) -> list[Answer | None]:
+def answers(requests: Sequence[XacroRequest]) -> list[XacroAnswer | None]:
     """Return the answer to each request; None where the process did not end within its limits."""
     failed = _failed()
     known = {one: _kept(one) for one in requests}
@@ -55,7 +55,7 @@ def _failed() -> set[XacroRequest]:
     return set()
 
 
-def _kept(request: XacroRequest) -> Answer | None:
+def _kept(request: XacroRequest) -> XacroAnswer | None:
     answer, used = _answers.get(request, (None, {}))
     if answer is None or any(_digest(path) != digest for path, digest in used.items()):
         return None
@@ -73,7 +73,7 @@ def _digest(path: str) -> str:
         return ""
 
 
-def _asked(requests: Sequence[XacroRequest]) -> list[Answer | None]:
+def _asked(requests: Sequence[XacroRequest]) -> list[XacroAnswer | None]:
     package = str(Path(rbxcompose.__file__).parents[1])
     with subprocess.Popen(
         [sys.executable, "-E", "-s", "-B", "-c", _RUN, package],

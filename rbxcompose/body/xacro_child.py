@@ -23,7 +23,7 @@ from xacro import substitution_args
 
 from rbxcompose.body.bare_tags import PLACE, BareTags
 from rbxcompose.body.located_xml import LocatedXml, RefusedXmlError
-from rbxcompose.body.xacro_answer import Answer
+from rbxcompose.body.xacro_answer import XacroAnswer
 from rbxcompose.fence import fence, is_below, processor_time
 from rbxcompose.regular_files import read_regular
 from rbxcompose.typed_json import to_data
@@ -106,7 +106,7 @@ class _Expansion:
         return self.place or next((place for place in places if place), "")
 
 
-def expand(request: dict[str, Any]) -> Answer:
+def expand(request: dict[str, Any]) -> XacroAnswer:
     """Return the expanded text, or the error with its place; and the files that were read."""
     expansion = _Expansion(request["packages"], request["roots"])
     xacro.parse = expansion.parse
@@ -119,10 +119,10 @@ def expand(request: dict[str, Any]) -> Answer:
         document = xacro.process_file(request["file"], mappings=dict(request["arguments"]))
         text = document.toxml()
     except BaseException as error:  # its expressions may raise anything
-        return Answer(tuple(expansion.files), error=_reason(error), place=expansion.where())
+        return XacroAnswer(tuple(expansion.files), error=_reason(error), place=expansion.where())
     if len(text.encode(errors="replace")) > OUTPUT:
-        return Answer(tuple(expansion.files), error=f"it expands to more than {OUTPUT:,} bytes")
-    return Answer(tuple(expansion.files), text, bare=expansion.bare.told())
+        return XacroAnswer(tuple(expansion.files), error=f"it expands to more than {OUTPUT:,} bytes")
+    return XacroAnswer(tuple(expansion.files), text, bare=expansion.bare.told())
 
 
 def _reason(error: BaseException) -> str:

@@ -41,7 +41,8 @@ def two_skills(robot: Robot) -> Iterator[Finding]:
     for end in robot.ends:
         if not isinstance(end.port, ServesAction | ServesTopic):
             continue
-        skill = end.topic.rpartition("/")[-1]
+        named = end.port.skill if isinstance(end.port, ServesAction) else ""
+        skill = named or end.topic.rpartition("/")[-1]
         other = first.setdefault(skill, end)
         if other.topic != end.topic:
             yield two_skills.at(

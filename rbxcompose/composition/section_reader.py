@@ -50,7 +50,7 @@ RESERVED = ("buses", "actuators", "joints", "controllers", "safety", "devices", 
 def read_sections(root: MappingNode, file: Path, sim: bool, documents: Documents) -> RobotManifest:
     """Return the robot that a composed and filled tree describes; entries with mistakes are left out."""
     documents.report.extend([*broken_sections(), *_taken_names(root), *_shown_secrets(root)])
-    contents = Contents(root, file, documents, sections())
+    contents = Contents(root, file, documents, sections(), is_simulated=sim)
     for section in sections(ROBOT):
         if section.is_composed:
             contents.of(section)

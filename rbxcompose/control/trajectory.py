@@ -34,7 +34,7 @@ class TrajectoryPoint:
 
 
 @dataclass(frozen=True, slots=True)
-class JointTolerance:
+class TrajectoryTolerance:
     """How far a joint may be from where it should be; None is not checked."""
 
     path: float | None = None
@@ -53,7 +53,7 @@ class TrajectoryGoal:
     points: tuple[TrajectoryPoint, ...]
     start: float = 0.0
     """When it starts; 0 is now. Then it replaces what runs."""
-    tolerances: Mapping[str, JointTolerance] = field(default_factory=dict)
+    tolerances: Mapping[str, TrajectoryTolerance] = field(default_factory=dict)
     """In place of those of the policy."""
     goal_time: float | None = None
     """In place of that of the policy [s]."""
@@ -75,8 +75,8 @@ class TrajectoryPolicy:
     """Whether the last point may be passed with a velocity."""
     start_from: Literal["commanded", "measured"] = "commanded"
     """Where a trajectory starts when none is running."""
-    tolerance: JointTolerance = JointTolerance()
-    tolerances: Mapping[str, JointTolerance] = field(default_factory=dict)
+    tolerance: TrajectoryTolerance = TrajectoryTolerance()
+    tolerances: Mapping[str, TrajectoryTolerance] = field(default_factory=dict)
     """Of single joints, in place of `tolerance`."""
     goal_time: float = 1.0
     """How long after its end the joints may take to arrive [s]; inf waits for ever."""

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 
 from rbxcompose.control.curves import Curve, JointSample, braking
 from rbxcompose.control.trajectory import (
-    JointTolerance,
     TrajectoryCode,
     TrajectoryGoal,
     TrajectoryPolicy,
     TrajectoryRefusal,
+    TrajectoryTolerance,
 )
 from rbxcompose.control.trajectory_plan import JointRules, TrajectoryPlan, begin_of, plan_trajectory
 from rbxcompose.geometry import wrap_angle
@@ -215,7 +215,7 @@ class TrajectoryFollower:
                     )
         return None
 
-    def _tolerance(self, run: _Run, joint: str) -> JointTolerance:
+    def _tolerance(self, run: _Run, joint: str) -> TrajectoryTolerance:
         return run.goal.tolerances.get(joint, self.policy.tolerances.get(joint, self.policy.tolerance))
 
     def _error(self, joint: str, desired: JointSample, actual: JointSample) -> float:

@@ -209,9 +209,15 @@ class Contents:
     """The contents of the sections of a filled tree: each is read when it is first requested."""
 
     def __init__(
-        self, root: MappingNode, file: Path, documents: Documents, sections: Iterable[Section[Any, Any]] = ()
+        self,
+        root: MappingNode,
+        file: Path,
+        documents: Documents,
+        sections: Iterable[Section[Any, Any]] = (),
+        *,
+        is_simulated: bool = True,
     ) -> None:
-        self.root, self.file, self.documents = root, file, documents
+        self.root, self.file, self.documents, self.is_simulated = root, file, documents, is_simulated
         self._sections = list(sections)
         self._read: dict[str, object] = {}
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel
 
 from rbxcompose.config import Dimensioned
-from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.references import Refers
 from rbxcompose.units import Dimension
 
@@ -64,11 +64,23 @@ def with_references(node: TreeNode, hint: Any, change: Callable[[str, TreeNode],
         node = change(kind, node)
     match node:
         case MappingNode(entries=entries):
-            values = {name: _changed_below(one.value, hint, name, change) for name, one in entries.items()}
-            return replace(node, entries={name: Entry(one.key, values[name]) for name, one in entries.items()})
+            changed = [
+                Entry(_changed_key(one.key, hint, change), _changed_below(one.value, hint, name, change))
+                for name, one in entries.items()
+            ]
+            return replace(node, entries={one.key.text: one for one in changed})
         case SequenceNode(items=items):
             return replace(node, items=tuple(_changed_below(one, hint, i, change) for i, one in enumerate(items)))
     return node
+
+
+def _changed_key(key: ScalarNode, hint: Any, change: Callable[[str, TreeNode], TreeNode]) -> ScalarNode:
+    """Return the key of a map with `change` applied, if keys of this map are names of a kind."""
+    kinds = {kind for one in alternatives(hint) if get_origin(one) is dict for kind in kinds_of(get_args(one)[0])}
+    for kind in kinds:
+        changed = change(kind, key)
+        key = changed if isinstance(changed, ScalarNode) else key
+    return key
 
 
 def _changed_below(node: TreeNode, hint: Any, key: str | int, change: Callable[[str, TreeNode], TreeNode]) -> TreeNode:

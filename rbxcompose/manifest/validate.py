@@ -275,8 +275,9 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
     value = at(node, loc)
     context = error.get("ctx", {})
     span = value_span(node, loc)
-    if error["loc"][-1:] == ("[key]",) or error["type"] == "string_pattern_mismatch":
-        place = key_span(node, loc) if error["loc"][-1:] == ("[key]",) else span
+    is_key = error["loc"][-1:] == ("[key]",)
+    place = key_span(node, loc) if is_key else span
+    if "valid" not in context and (is_key or error["type"] == "string_pattern_mismatch"):
         text = value.text if isinstance(value, ScalarNode) and place is span else name
         help_text = "lower-case letters, digits and underscores, starting with a letter"
         return BAD_NAME.at(place, f"'{text}' is not a valid name", help=help_text)
@@ -304,8 +305,8 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
         case kind_of_error if kind_of_error in _EXPECTED:
             return WRONG_TYPE.at(span, f"'{name}' must be {_EXPECTED[kind_of_error]}", label=label_of(value))
     if "valid" in context:  # a validator of ours that supplies the valid names
-        message = f"'{name}': {error['msg']}"
-        return NOT_A_CHOICE.misspelt(span, message, context["name"], context["valid"], context["what"])
+        message = error["msg"] if is_key else f"'{name}': {error['msg']}"
+        return NOT_A_CHOICE.misspelt(place, message, context["name"], context["valid"], context["what"])
     if "help" in context:  # or its own help
         return NOT_A_CHOICE.at(span, f"'{name}': {error['msg']}", help=str(context["help"]))
     return WRONG_TYPE.at(span, f"'{name}': {error['msg'][:1].lower()}{error['msg'][1:]}", label=label_of(value))

@@ -39,7 +39,7 @@ def _actions(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
     for end in _ends(components):
         port = end.port
         if isinstance(port, ServesAction) and port.interface is not None:
-            name = end.topic.rsplit("/", 1)[-1]
+            name = port.skill or end.topic.rsplit("/", 1)[-1]
             skill = skill_of(
                 port.interface,
                 name,

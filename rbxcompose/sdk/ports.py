@@ -179,7 +179,8 @@ class ServesAction(Port[ActionServer[G, R, F]]):
     `claims` names the parts of the robot that a goal needs exclusively (`base`, `arm`, `head`, `voice`). `outcomes` are
     ends besides success and failure, each with which of the two it counts as; the result names them in its text field
     `outcome`. A `pausable` one respects `current.is_paused`: the service `<topic>/pause` holds goals. The optional
-    method `accept_<port>` may refuse a goal by returning the reason.
+    method `accept_<port>` may refuse a goal by returning the reason. `skill` is its name in missions; without it, that
+    is the last word of the topic.
     """
 
     kind = "serves_action"
@@ -193,6 +194,7 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         restartable: bool = True,
         pausable: bool = False,
         outcomes: Mapping[str, str] = MappingProxyType({}),
+        skill: str = "",
     ) -> None:
         """Declare the port.
 
@@ -200,6 +202,7 @@ class ServesAction(Port[ActionServer[G, R, F]]):
             ValueError: if there are outcomes but the result has no field for them, or one counts as something else.
         """
         super().__init__(topic)
+        self.skill = skill
         _require_outcomes(outcomes, action.Result)
         self.interface, self.claims, self.restartable = action, claims, restartable
         self.pausable, self.outcomes = pausable, outcomes

@@ -5,5 +5,11 @@ from rbxcompose.testing.clocks import clock_uses
 from rbxcompose.testing.golden import Golden
 from rbxcompose.testing.manifests import Checked, check_file, check_text
 from rbxcompose.testing.robots import Ran, run_robot
+from rbxcompose.twins.servo_fake import FakeServo, ServoFaults
+from rbxcompose.twins.servo_line import FakeLine
+from rbxcompose.twins.servo_port import FakePort
 
-__all__ = ["Bench", "Checked", "Golden", "Ran", "check_file", "check_text", "clock_uses", "instance", "run_robot"]
+__all__ = [
+    "Bench", "Checked", "FakeLine", "FakePort", "FakeServo", "Golden", "Ran", "ServoFaults", "check_file", "check_text",
+    "clock_uses", "instance", "run_robot",
+]  # fmt: skip

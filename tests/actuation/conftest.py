@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.clock import SteppedClock
-from rbxcompose.testing.servo_fake import FakeServo
-from rbxcompose.testing.servo_line import FakeLine
-from rbxcompose.testing.servo_port import FakePort
+from rbxcompose.twins.servo_fake import FakeServo
+from rbxcompose.twins.servo_line import FakeLine
+from rbxcompose.twins.servo_port import FakePort
 
 Plugged = Callable[..., FakePort]
 

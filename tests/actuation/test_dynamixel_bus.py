@@ -12,9 +12,9 @@ from rbxcompose.actuation.bus import FoundServo, ServoBus
 from rbxcompose.actuation.dynamixel_bus import DynamixelBus
 from rbxcompose.actuation.servo_models import servo_models
 from rbxcompose.clock import SteppedClock
-from rbxcompose.testing.servo_fake import FakeServo
-from rbxcompose.testing.servo_packets import READ, SYNC_READ, SYNC_WRITE
-from rbxcompose.testing.servo_port import FakePort
+from rbxcompose.twins.servo_fake import FakeServo
+from rbxcompose.twins.servo_packets import READ, SYNC_READ, SYNC_WRITE
+from rbxcompose.twins.servo_port import FakePort
 from tests.actuation.conftest import Plugged
 
 STATE = ("present_position", "present_speed", "present_load")

@@ -7,7 +7,7 @@ import pytest
 from rbxcompose.actuation.dynamixel_bus import DynamixelBus
 from rbxcompose.actuation.port_errors import LostPortError, NoPortError
 from rbxcompose.actuation.servo_models import servo_models
-from rbxcompose.testing.servo_fake import FakeServo
+from rbxcompose.twins.servo_fake import FakeServo
 from tests.actuation.conftest import Plugged
 
 MODELS = {1: servo_models()["AX-12"], 2: servo_models()["XL430-W250"], 3: servo_models()["XL430-W250"]}

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from rbxcompose.actuation.servo_models import servo_models
 from rbxcompose.clock import SteppedClock
-from rbxcompose.testing.servo_fake import FASTEST, FakeServo
-from rbxcompose.testing.servo_line import FakeLine
-from rbxcompose.testing.servo_packets import packet_one, packet_two, packets
+from rbxcompose.twins.servo_fake import FASTEST, FakeServo
+from rbxcompose.twins.servo_line import FakeLine
+from rbxcompose.twins.servo_packets import packet_one, packet_two, packets
 
 MODELS = sorted(servo_models())
 ONE, TWO = ["AX-12", "MX-28"], ["XL430-W250", "XM430-W350", "PH54-200"]

@@ -12,7 +12,7 @@ from unittest.mock import Mock
 import pytest
 
 from rbxcompose.body.xacro import Expanded, expand
-from rbxcompose.body.xacro_answer import Answer, BareFile, BareTag, read_answer
+from rbxcompose.body.xacro_answer import BareFile, BareTag, XacroAnswer, read_answer
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.findings import Finding, Span
 from rbxcompose.per_compile import one_compile
@@ -155,8 +155,8 @@ def test_an_answer_of_another_shape_is_none(name: str) -> None:
 
 
 def test_an_answer_about_files_elsewhere_is_not_believed() -> None:
-    answer = Answer(("/a/r.xacro", "/b/r.xacro"), "", "no", "/b/r.xacro|1|1|1", {"/b/r.xacro": BareFile((TAG,))})
-    assert read_answer(json.dumps(to_data(answer)).encode(), ["/a"]) == Answer(("/a/r.xacro",), "", "no")
+    answer = XacroAnswer(("/a/r.xacro", "/b/r.xacro"), "", "no", "/b/r.xacro|1|1|1", {"/b/r.xacro": BareFile((TAG,))})
+    assert read_answer(json.dumps(to_data(answer)).encode(), ["/a"]) == XacroAnswer(("/a/r.xacro",), "", "no")
     there = replace(answer, place="/a/r.xacro|1|1|1", files=("/a/r.xacro",), bare={"/a/r.xacro": BareFile((TAG,))})
     assert read_answer(json.dumps(to_data(there)).encode(), ["/a"]) == there
     for place in ("/a/r.xacro|0|1|1", "/a/r.xacro", "/a/r.xacro|1|1|99999999999"):

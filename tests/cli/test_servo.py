@@ -11,9 +11,9 @@ import pytest
 
 from rbxcompose.cli.main import main
 from rbxcompose.clock import SteppedClock
-from rbxcompose.testing.servo_fake import FakeServo
-from rbxcompose.testing.servo_line import FakeLine
-from rbxcompose.testing.servo_port import FakePort
+from rbxcompose.twins.servo_fake import FakeServo
+from rbxcompose.twins.servo_line import FakeLine
+from rbxcompose.twins.servo_port import FakePort
 
 AX, XL, SLOW = "AX-12", "XL430-W250", 57_600
 

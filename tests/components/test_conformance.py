@@ -8,6 +8,7 @@ import sys
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -70,7 +71,7 @@ def test_it_has_a_handler_for_each_input_and_service(name: str, tmp_path: Path) 
     cls, config = component_type(name), instance_of(name, tmp_path).config
     for port, end in cls.ports(config).items():
         if isinstance(end, Serves):
-            assert hasattr(cls, f"on_{port}")
+            assert hasattr(cls(name, config, Mock()), f"on_{port}")
         if isinstance(end, In) and not hasattr(cls, f"on_{port}"):
             assert overrides_received(cls) or port in inspect.getsource(cls)
 

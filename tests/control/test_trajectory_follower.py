@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.limits import Limiter, MotionLimits
 from rbxcompose.control.trajectory import (
-    JointTolerance,
     TrajectoryCode,
     TrajectoryGoal,
     TrajectoryPolicy,
     TrajectoryRefusal,
+    TrajectoryTolerance,
 )
 from rbxcompose.control.trajectory_follower import FollowStep, TrajectoryFollower, TrajectoryOutcome
 from rbxcompose.control.trajectory_plan import TrajectoryPlan
@@ -140,7 +140,7 @@ def test_who_ends_a_trajectory_lets_its_joints_decelerate_and_hold(how: str) -> 
 
 
 def test_a_blocked_joint_ends_the_trajectory_with_its_name_error_and_tolerance() -> None:
-    arm = Arm(TrajectoryPolicy(tolerance=JointTolerance(path=0.1)))
+    arm = Arm(TrajectoryPolicy(tolerance=TrajectoryTolerance(path=0.1)))
     arm.blocked = {"tilt"}
     arm.send(goal((2.0, (1.0, 1.0))))
     outcome = arm.run(3.0)
@@ -168,7 +168,7 @@ def test_who_never_arrives_fails_after_the_goal_time_which_is_finite() -> None:
 def test_tolerances_of_the_goal_take_the_place_of_those_of_the_policy() -> None:
     arm = Arm()
     arm.blocked = {"pan"}
-    lenient = {"pan": JointTolerance(goal=0.6)}
+    lenient = {"pan": TrajectoryTolerance(goal=0.6)}
     arm.send(replace(goal((1.0, (0.5, 0.5))), tolerances=lenient, goal_time=math.inf))
     outcome = arm.run(3.0)
     assert outcome is not None
@@ -187,7 +187,7 @@ def test_a_joint_that_is_not_at_rest_has_not_arrived() -> None:
 
 
 def test_a_measurement_that_is_no_number_violates_any_tolerance() -> None:
-    arm = Arm(TrajectoryPolicy(tolerance=JointTolerance(path=10.0)))
+    arm = Arm(TrajectoryPolicy(tolerance=TrajectoryTolerance(path=10.0)))
     arm.send(goal((1.0, (0.5, 0.5))))
     arm.measured["pan"] = JointSample(math.nan)
     step = arm.follower.step(0.1, arm.measured, arm.commanded)

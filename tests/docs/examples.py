@@ -19,6 +19,10 @@ URDF = """<robot name="example">
   <link name="base_footprint"/>
   <link name="base_link"/>
   <joint name="base_joint" type="fixed"><parent link="base_footprint"/><child link="base_link"/></joint>
+  <link name="head"/>
+  <joint name="pan_joint" type="revolute">
+    <parent link="base_link"/><child link="head"/><limit lower="-2" upper="2" effort="1" velocity="2"/>
+  </joint>
 </robot>
 """
 

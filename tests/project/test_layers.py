@@ -45,7 +45,7 @@ GROUND = {
 # What the others import beside the ground and themselves. A row may be that of a package, a module or what lies deeper.
 ABOVE = {
     "__main__": "cli.main",
-    "actuation": "",
+    "actuation": "control",
     "body": "",
     "bus": "sdk.bound",
     "check_runner": "missions.analysis model.robot",
@@ -54,7 +54,7 @@ ABOVE = {
     "mission_tests missions model params plan recording rendering replay runtime scaffold schema.documents sdk "
     "sections",
     "compiler": "check_runner composition model plan",
-    "components": "body diagnostics executive missions mux.core navigation.go_to sdk sim",
+    "components": "actuation body control diagnostics executive missions mux.core navigation.go_to sdk sim twins",
     "composition": "body.description sections",
     "control": "",
     "diagnostics": "",
@@ -77,10 +77,11 @@ ABOVE = {
     "scaffold": "composition missions sdk",
     "schema": "missions sdk sections",
     "sdk": "",
-    "sections": "body sdk",
+    "sections": "actuation.servo_models body sdk",
     "sim": "",
     "skills": "sdk",
-    "testing": "actuation bus compiler components model.wires params plan.model recording.message rendering.text "
+    "twins": "actuation",
+    "testing": "twins bus compiler components model.wires params plan.model recording.message rendering.text "
     "runtime.process_group runtime.records sdk",
 }
 # Pure: no bus, thread or clock.
@@ -89,7 +90,7 @@ TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
 }
-TYPE_CHECKING_BLOCKS = 10
+TYPE_CHECKING_BLOCKS = 11
 
 
 def imports(path: Path) -> set[str]:

@@ -6,9 +6,9 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from rbxcompose.testing import servo_packets as wire
-from rbxcompose.testing.servo_fake import FakeServo
-from rbxcompose.testing.servo_packets import ServoPacket, crc_of, packet_two, packets, status
+from rbxcompose.twins import servo_packets as wire
+from rbxcompose.twins.servo_fake import FakeServo
+from rbxcompose.twins.servo_packets import ServoPacket, crc_of, packet_two, packets, status
 
 _BITS = 10  # of a byte on the wire
 _TOLERANCE = 0.03  # of a UART

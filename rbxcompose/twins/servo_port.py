@@ -14,7 +14,7 @@ import tty
 from pathlib import Path
 from typing import Self
 
-from rbxcompose.testing.servo_line import FakeLine
+from rbxcompose.twins.servo_line import FakeLine
 
 _TCGETS2 = 0x802C542A  # Linux: the settings of a terminal with its rate as a number
 _TERMIOS2 = "4IB19B2I"

@@ -1,0 +1,142 @@
+"""The section `actuators`: the servos, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated
+
+from pydantic import Field
+
+from rbxcompose.actuation.servo_models import model_named, servo_models
+from rbxcompose.config import Config, Name
+from rbxcompose.findings import Finding, Related, Span, kind
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.section import Reading
+from rbxcompose.manifest.tree import key_span, value_span
+from rbxcompose.references import ACTUATOR, SERVO_BUS, Refers
+
+NO_MODEL = kind(
+    "RBX2213",
+    """A servo of an unknown model
+
+The model decides the control table, the protocol and what a tick is.
+
+Bad:
+```yaml
+buses:
+  servos:
+    type: dynamixel
+actuators:
+  pan:
+    bus: servos
+    model: AX-21
+    id: 1
+```
+Good:
+```yaml
+buses:
+  servos:
+    type: dynamixel
+actuators:
+  pan:
+    bus: servos
+    model: AX-12
+    id: 1
+```
+""",
+    is_fixable=True,
+)
+ONE_ID = kind(
+    "RBX2214",
+    """Two servos of one bus have the same id
+
+Both would answer at once, and none could be understood. `rbxcompose servo set-id` changes the id of a servo.
+
+Bad:
+```yaml
+buses:
+  servos:
+    type: dynamixel
+actuators:
+  pan:
+    bus: servos
+    model: AX-12
+    id: 1
+  tilt:
+    bus: servos
+    model: AX-12
+    id: 1
+```
+Good:
+```yaml
+buses:
+  servos:
+    type: dynamixel
+actuators:
+  pan:
+    bus: servos
+    model: AX-12
+    id: 1
+  tilt:
+    bus: servos
+    model: AX-12
+    id: 2
+```
+""",
+)
+
+
+class ActuatorModel(Config):
+    """A servo on a bus."""
+
+    bus: Annotated[Name, Refers(SERVO_BUS)]
+    """The bus that it is on."""
+    model: str
+    """Its model, such as `AX-12`, `MX-28(2.0)` or `XL430-W250`."""
+    id: int = Field(ge=0, le=252)
+    """Its id on the bus."""
+    neutral: int | None = None
+    """The tick at which its joint is at 0; without it the middle of its range."""
+    invert: bool = False
+    """Whether it turns the other way round than its joint."""
+
+
+def _details(read: Mapping[str, ActuatorModel]) -> dict[str, str]:
+    return {name: f"{one.model}, id {one.id} on {one.bus}" for name, one in read.items()}
+
+
+@section("actuators", ActuatorModel, order=32, names=ACTUATOR, entry="actuator", details=_details)
+def actuators(reading: Reading[ActuatorModel]) -> dict[str, ActuatorModel]:
+    """The servos by name: on which bus, of which model, with which id.
+
+    Example:
+        buses:
+          servos:
+            type: dynamixel
+        actuators:
+          pan_servo:
+            bus: servos
+            model: AX-12
+            id: 1
+            neutral: 512                  # the tick at which the joint is at 0
+    """
+    found = reading.entries()
+    reading.report.extend([*_models(reading, found), *_ids(reading, found)])
+    return {name: one for name, one in found.items() if model_named(one.model) is not None}
+
+
+def _models(reading: Reading[ActuatorModel], found: Mapping[str, ActuatorModel]) -> Iterator[Finding]:
+    for name, one in found.items():
+        if model_named(one.model) is None:
+            span = value_span(reading.contents.root, ("actuators", name, "model"))
+            yield NO_MODEL.misspelt(span, f"no servo is called '{one.model}'", one.model, servo_models(), "models")
+
+
+def _ids(reading: Reading[ActuatorModel], found: Mapping[str, ActuatorModel]) -> Iterator[Finding]:
+    first: dict[tuple[str, int], Span] = {}
+    for name, one in found.items():
+        span = key_span(reading.contents.root, ("actuators", name))
+        other = first.setdefault((one.bus, one.id), span)
+        if other is not span:
+            message = f"two servos of the bus '{one.bus}' have the id {one.id}"
+            yield ONE_ID.at(span, message, related=[Related(other, "the other one")])

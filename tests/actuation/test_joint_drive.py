@@ -1,0 +1,139 @@
+"""A joint and its servo: ticks and angles, limits that hold whatever is asked, and torque only behind a goal."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rbxcompose.actuation.dynamixel_bus import DynamixelBus
+from rbxcompose.actuation.joint_drive import JointDrive, ServoJoint
+from rbxcompose.actuation.servo_cycle import ServoCycle
+from rbxcompose.actuation.servo_models import model_named, servo_models
+from rbxcompose.control.joint_states import Enable, JointMode, JointPolicy, MoveTo, Relax
+from rbxcompose.control.limits import MotionLimits
+from rbxcompose.twins.pseudo_terminal import pseudo_terminal
+from rbxcompose.twins.servo_fake import FakeServo
+from rbxcompose.twins.servo_twin import TwinBus
+
+PERIOD = 0.01
+LIMITS = MotionLimits(-1.0, 1.5, 2.0, 10.0)
+positions = st.floats(-10, 10) | st.sampled_from([math.nan, math.inf, -math.inf])
+requests = positions.map(MoveTo) | st.just(Relax()) | st.booleans().map(Enable)
+
+
+def joint(model: str = "AX-12", *, is_inverted: bool = False, neutral: int | None = None) -> ServoJoint:
+    found = model_named(model)
+    assert found
+    middle = found.family.centre if neutral is None else neutral
+    return ServoJoint("pan", 1, found, LIMITS, middle, is_inverted)
+
+
+class Driven:
+    """One joint on a simulated bus, cycle by cycle."""
+
+    def __init__(self, model: str = "AX-12") -> None:
+        self.now = 0.0
+        self.drive = JointDrive(joint(model), JointPolicy(cycle=PERIOD))
+        self.bus = TwinBus([FakeServo(model, 1)], lambda: self.now)
+        self.cycle = ServoCycle(self.bus, {"pan": self.drive})
+
+    @property
+    def servo(self) -> FakeServo:
+        return self.bus.line[1]
+
+    def run(self, cycles: int = 1) -> None:
+        for _ in range(cycles):
+            self.cycle.run(self.now, PERIOD)
+            self.now += PERIOD
+
+
+@pytest.mark.parametrize("name", [name for name, one in servo_models().items() if one.family.table != "P"])
+@pytest.mark.parametrize("is_inverted", [False, True])
+def test_each_tick_is_the_tick_of_its_angle(name: str, is_inverted: bool) -> None:
+    one = joint(name, is_inverted=is_inverted, neutral=100)
+    assert all(one.raw(one.position(tick)) == tick for tick in range(one.model.family.ticks))
+    assert (one.position(101) < 0) == is_inverted
+    assert one.position(100) == 0.0
+
+
+def test_a_joint_starts_without_torque_and_moves_from_where_it_is() -> None:
+    driven = Driven()
+    driven.servo.move_to(600)
+    driven.run(5)
+    assert driven.servo.get("torque_enable") == 0
+    start = driven.drive.measured.position
+    driven.drive.ask(MoveTo(start + 0.5))
+    driven.run(2)
+    assert driven.servo.get("torque_enable") == 1
+    assert abs(driven.servo.get("goal_position") - 600) < 5  # not where an old goal was
+    driven.run(200)
+    assert driven.drive.measured.position == pytest.approx(start + 0.5, abs=driven.drive.joint.model.per_tick)
+
+
+@settings(max_examples=60)
+@given(asked=st.lists(st.lists(requests, max_size=2), min_size=1, max_size=40), start=st.integers(320, 760))
+def test_whatever_is_asked_the_goal_keeps_to_the_limits(asked: list[list[MoveTo | Relax | Enable]], start: int) -> None:
+    driven = Driven()
+    driven.servo.move_to(start)
+    tick = driven.drive.joint.model.per_tick
+    goals: list[float] = []
+    for each in asked:
+        for request in each:
+            driven.drive.ask(request)
+        driven.run()
+        has_torque = driven.drive.mode in (JointMode.HOLDING, JointMode.ACTIVE)
+        goals = [*goals, driven.drive.joint.position(driven.servo.get("goal_position"))] if has_torque else []
+        if not driven.drive.condition.is_enabled:
+            assert driven.servo.get("torque_enable") == 0
+        if len(goals) > 1:
+            assert abs(goals[-1] - goals[-2]) <= 2.0 * PERIOD + tick
+            outside = (LIMITS.least - tick <= one <= LIMITS.greatest + tick for one in goals[-2:])
+            assert all(outside) or abs(goals[-1]) <= abs(goals[-2]) + tick  # it was put outside, and moves inwards
+
+
+def test_the_same_cycle_drives_servos_by_bytes() -> None:
+    one = joint()
+    with pseudo_terminal({1: "AX-12"}) as path, DynamixelBus(path, {1: one.model}) as bus:
+        drive = JointDrive(one, JointPolicy(cycle=PERIOD))
+        cycle = ServoCycle(bus, {"pan": drive})
+        begin = time.monotonic()
+        while drive.mode is not JointMode.RELAXED and time.monotonic() < begin + 5:
+            cycle.run(time.monotonic(), PERIOD)
+        drive.ask(MoveTo(0.2))
+        while abs(drive.measured.position - 0.2) > one.model.per_tick and time.monotonic() < begin + 10:
+            cycle.run(time.monotonic(), PERIOD)
+        assert drive.measured.position == pytest.approx(0.2, abs=one.model.per_tick)
+        cycle.relax(time.monotonic(), PERIOD)
+        assert bus.read([1], ["torque_enable"])[1].values["torque_enable"] == 0
+
+
+def test_a_servo_that_is_mute_is_a_fault_and_comes_back_relaxed() -> None:
+    driven = Driven()
+    driven.run(3)
+    driven.drive.ask(MoveTo(1.0))
+    driven.run(20)
+    driven.bus.line.servos[0].faults.is_mute = True
+    driven.run(60)
+    assert driven.drive.mode is JointMode.FAULT
+    driven.bus.line.servos[0].faults.is_mute = False
+    driven.run(3)
+    assert driven.drive.mode is JointMode.RELAXED
+    assert driven.servo.get("torque_enable") == 0
+
+
+def test_a_hot_joint_rests_without_torque_until_it_has_cooled_down() -> None:
+    driven = Driven()
+    driven.run(3)
+    driven.drive.ask(MoveTo(0.5))
+    driven.run(3)
+    driven.servo.heat_to(61)
+    driven.run(3)
+    assert driven.drive.mode is JointMode.RESTING
+    assert driven.servo.get("torque_enable") == 0
+    driven.servo.heat_to(40)
+    driven.run(round(60 / PERIOD) + 10)
+    assert driven.drive.mode is JointMode.RELAXED
