@@ -28,12 +28,15 @@ class BodyFile:
     is_xacro: bool = False
     arguments: Mapping[str, str] = field(default_factory=dict)
     packages: Mapping[str, Path] = field(default_factory=dict)
+    spans: Mapping[str, Span] = field(default_factory=dict)
+    """Places of the arguments."""
 
     @property
     def as_xacro(self) -> XacroFile:
         """Return what is to be expanded."""
         packages = {LIBRARY: library_root(), **self.packages}
-        return XacroFile(self.path, self.arguments, packages, [project_of(self.path), library_root()], self.span)
+        roots = [project_of(self.path), library_root()]
+        return XacroFile(self.path, self.arguments, packages, roots, self.span, self.spans)
 
     def meshes(self, root: XmlElement) -> dict[str, Path]:
         """Return the mesh files that exist, by their names in the URDF; they lie in the project or in a package."""

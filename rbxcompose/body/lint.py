@@ -128,7 +128,7 @@ def _shapes(link: BodyLink, meshes: Collection[str]) -> Iterator[Finding]:
             yield NO_MESH.at(shape.span, f"the mesh '{plain(geometry.file)}' does not exist")
         if largest := _extent(shape):
             message = f"a {geometry.kind} of link '{plain(link.name, _SHOWN)}' is {largest:g} m long"
-            yield MILLIMETRES.at(shape.span, message, help="are these millimetres?")
+            yield MILLIMETRES.at(shape.span, message, help="are these millimetres, or does a size lack its unit?")
 
 
 def _extent(shape: Shape) -> float:

@@ -6,6 +6,7 @@ share it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -115,6 +116,17 @@ class BodyJoint:
         if self.moves:
             return self.origin.compose(Transform3(rotation=quaternion_about(self.axis, position)))
         return self.origin
+
+    def position_of(self, child: Transform3) -> float:
+        """Return the position [rad or m] at which the child's frame is there in the parent's; 0 if it does not move."""
+        moved = self.origin.inverse().compose(child)
+        (x, y, z), (ax, ay, az) = moved.translation, self.axis
+        if self.kind == "prismatic":
+            return ax * x + ay * y + az * z
+        if not self.moves:
+            return 0.0
+        qx, qy, qz, qw = moved.rotation
+        return math.remainder(2.0 * math.atan2(ax * qx + ay * qy + az * qz, qw), math.tau)
 
 
 @dataclass(frozen=True)

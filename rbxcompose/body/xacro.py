@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rbxcompose.body.prefixes import missing_prefixes
 from rbxcompose.body.xacro_answer import XacroAnswer
 from rbxcompose.body.xacro_answers import XacroRequest, answers
 from rbxcompose.body.xml_reader import PLACE, span_of_place
-from rbxcompose.findings import Finding, Span, kind
+from rbxcompose.findings import Finding, Severity, Span, kind
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.printable import plain
 
@@ -45,6 +45,20 @@ Good:
 _PLACES = re.compile(rf' {PLACE}="[^"]*"')
 
 
+NO_ARGUMENT = kind(
+    "RBX2020",
+    """A xacro file does not declare an argument that it is given
+
+The value would have no effect. A xacro file declares its arguments by `<xacro:arg name="..." default="..."/>`.
+
+Bad: `with: {heigth: 1 m}` for a file with `<xacro:arg name="height" default="0.5"/>`.
+Good: `with: {height: 1 m}`.
+""",
+    Severity.WARNING,
+    is_fixable=True,
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Expanded:
     """URDF text whose elements say where they were written; `notes` are what to say about the xacro files."""
@@ -70,6 +84,8 @@ class XacroFile:
     packages: Mapping[str, Path]
     roots: Sequence[Path]
     span: Span
+    spans: Mapping[str, Span] = field(default_factory=dict)
+    """Places of the arguments."""
 
     @property
     def request(self) -> XacroRequest:
@@ -100,4 +116,13 @@ def _told(xacro: XacroFile, answer: XacroAnswer | None) -> tuple[Expanded | Find
     if answer.error:
         place = span_of_place(answer.place) if answer.place else xacro.span
         return NOT_EXPANDED.at(place, plain(" ".join(answer.error.split()), 300)), files
-    return Expanded(answer.text, tuple(missing_prefixes(answer.bare))), files
+    return Expanded(answer.text, (*missing_prefixes(answer.bare), *_unused(xacro, answer))), files
+
+
+def _unused(xacro: XacroFile, answer: XacroAnswer) -> Iterator[Finding]:
+    """Yield the arguments that are given and that no file declares: they would have no effect."""
+    for name in xacro.arguments:
+        if name not in answer.arguments:
+            message = f"'{plain(shown_name(xacro.path))}' has no argument '{plain(name, 60)}'"
+            span = xacro.spans.get(name, xacro.span)
+            yield NO_ARGUMENT.misspelt(span, message, name, answer.arguments, "its arguments", taken=xacro.arguments)

@@ -40,6 +40,8 @@ class XacroAnswer:
     error: str = ""
     place: str = ""
     bare: Mapping[str, BareFile] = field(default_factory=dict)
+    arguments: tuple[str, ...] = ()
+    """Names of the arguments that the files declare."""
     used: tuple[str, ...] = ()
     """All files and folders that it tried to read: while they are the same, so is the answer."""
 

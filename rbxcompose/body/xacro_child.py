@@ -44,6 +44,7 @@ class _Expansion:
         self.evaluated: list[xml.dom.minidom.Element] = []
         self.place = ""
         self.bare = BareTags()
+        self.arguments: set[str] = set()
 
     def parse(self, inp: object, filename: str | None = None) -> xml.dom.minidom.Document:
         """Read a file in the place of `xacro.parse`: only one below the roots; each element keeps its place."""
@@ -69,6 +70,7 @@ class _Expansion:
             self.place = f"{path}|{getattr(error, 'lineno', 1)}|{getattr(error, 'offset', 0) + 1}|1"
             raise xacro.XacroException(f"this is not XML: {error}") from None
         self.bare.give_prefixes(document, path)
+        self.arguments |= {one.getAttribute("name") for one in document.getElementsByTagName("xacro:arg")}
         return document
 
     def included(self, written: str, symbols: Any) -> Iterator[str]:
@@ -122,7 +124,9 @@ def expand(request: dict[str, Any]) -> XacroAnswer:
         return XacroAnswer(tuple(expansion.files), error=_reason(error), place=expansion.where())
     if len(text.encode(errors="replace")) > OUTPUT:
         return XacroAnswer(tuple(expansion.files), error=f"it expands to more than {OUTPUT:,} bytes")
-    return XacroAnswer(tuple(expansion.files), text, bare=expansion.bare.told())
+    return XacroAnswer(
+        tuple(expansion.files), text, bare=expansion.bare.told(), arguments=tuple(sorted(expansion.arguments))
+    )
 
 
 def _reason(error: BaseException) -> str:

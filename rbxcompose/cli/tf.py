@@ -45,7 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     echo = actions.add_parser("echo", help="print where FRAME is in PARENT")
     echo.add_argument("parent", metavar="PARENT", help="the frame to look from, such as map")
     echo.add_argument("frame", metavar="FRAME", help="the frame to find, such as base_link")
-    words = "where it was at that time, counted from the newest one that is known (default: newest of each frame)"
+    words = (
+        "where it was so long before the newest known time; it collects that long first (default: newest of each frame)"
+    )
     echo.add_argument("--at", type=_past, metavar="-0.5s", help=words)
     echo.add_argument("--rate", type=hertz, default=1.0, metavar="1Hz", help="how often (default: 1 Hz)")
     add_count_options(echo)

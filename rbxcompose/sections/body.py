@@ -46,6 +46,8 @@ class BodyFileModel(Config):
     def _one_file(self) -> BodyFileModel:
         if self.urdf is not None and self.xacro is not None:
             raise ValueError("a body has either 'urdf' or 'xacro'")
+        if self.with_ and self.xacro is None:
+            raise ValueError("'with' is for a xacro: a URDF has no arguments")
         if self.urdf is None and self.xacro is None and (missing := self.lacks_file()):
             raise ValueError(missing)
         return self
@@ -161,7 +163,8 @@ def _part(
     arguments = {name: as_xacro_text(value) for name, value in read.with_.items()}
     to = value_span(node, (*path, "attach", "to"))
     place = key_span(node, path) if path else span
-    return BodyPart(name, BodyFile(file, span, key == "xacro", arguments, packages), attach, place, to)
+    spans = {argument: key_span(node, (*path, "with", argument)) for argument in arguments}
+    return BodyPart(name, BodyFile(file, span, key == "xacro", arguments, packages, spans), attach, place, to)
 
 
 def _writer(reading: Reading[BodyModel], span: Span) -> Path:

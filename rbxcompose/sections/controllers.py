@@ -64,6 +64,8 @@ def controllers(reading: Reading[ControllerModel]) -> dict[str, ControllerModel]
 
 def _undriven(reading: Reading[ControllerModel], name: str, one: ControllerModel) -> Finding | None:
     driven, servos = reading.contents.of(joints), reading.contents.of(actuators)
+    if not driven and "joints" in reading.contents.root:
+        return None  # they have mistakes, which are told
     buses: Mapping[str, int] = {}
     for index, joint in enumerate(one.joints):
         span = value_span(reading.contents.root, ("controllers", name, "joints", index))

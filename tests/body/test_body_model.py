@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Body
+from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.body.text import joints_of, links_of, tree_of
 from rbxcompose.body.urdf import read_body
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
-from rbxcompose.findings import Finding
-from rbxcompose.geometry import Transform3, quaternion_from_rpy, rotate
+from rbxcompose.findings import Finding, Span
+from rbxcompose.geometry import Transform3, quaternion_about, quaternion_from_rpy, rotate
 
 ARM = """<robot name="arm">
   <material name="red"><color rgba="1 0 0 1"/></material>
@@ -172,3 +172,11 @@ def test_whatever_elements_there_are_reading_ends_in_findings(inside: str) -> No
 def test_a_transform_of_a_fixed_joint_is_its_origin(arm: Body) -> None:
     assert arm.joints["slide"].at(0.0) == arm.joints["slide"].origin
     assert arm.poses({})["base"] == Transform3()
+
+
+@given(position=st.floats(-3.1, 3.1), turn=st.floats(-3, 3), kind=st.sampled_from(["revolute", "prismatic"]))
+def test_a_position_is_read_from_the_frame_that_it_leads_to(position: float, turn: float, kind: str) -> None:
+    origin = Transform3((0.1, 0.2, 0.3), quaternion_about((0.6, 0.0, 0.8), turn))
+    here = Span("", 1, 1, 1, 1)
+    joint = BodyJoint("a", kind, "b", "c", origin, (0.0, 0.8, 0.6), here)
+    assert joint.position_of(joint.at(position)) == pytest.approx(position, abs=1e-9)

@@ -162,3 +162,15 @@ def test_an_answer_about_files_elsewhere_is_not_believed() -> None:
     for place in ("/a/r.xacro|0|1|1", "/a/r.xacro", "/a/r.xacro|1|1|99999999999"):
         found = read_answer(json.dumps(to_data(replace(there, place=place))).encode(), ["/a"])
         assert found == replace(there, place="")
+
+
+def test_an_argument_that_no_file_declares_is_told_with_the_nearest(tmp_path: Path) -> None:
+    declared = '<xacro:arg name="height" default="1"/>'
+    (tmp_path / "r.xacro").write_text(f"{HEAD}{declared}</robot>")
+    found, _ = expand(tmp_path / "r.xacro", {"heigth": "2"}, {}, [tmp_path], HERE)
+    assert isinstance(found, Expanded)
+    [note] = found.notes
+    assert (note.code, note.help) == ("RBX2020", "did you mean 'height'?")
+    fine, _ = expand(tmp_path / "r.xacro", {"height": "2"}, {}, [tmp_path], HERE)
+    assert isinstance(fine, Expanded)
+    assert fine.notes == ()

@@ -72,7 +72,7 @@ def test_wrong_input_is_told(
 ) -> None:
     assert "RBX2008" in told(capsys, "show", str(ROOT / "robots/house"), code=1)
     assert "no moving joint 'neck': base_l" in told(capsys, "picture", ROBOT, "--joint", "neck=1", code=2)
-    assert "must be a number" in told(capsys, "picture", ROBOT, "--joint", "head_pan_joint=up", code=2)
+    assert "not a number with a unit" in told(capsys, "picture", ROBOT, "--joint", "head_pan_joint=up", code=2)
     assert "cannot be written" in told(capsys, "expand", ROBOT, "--out", str(tmp_path / "no/file"), code=2)
     monkeypatch.setattr(extra, "find_spec", lambda name: None)
     assert "RBX9042" in told(capsys, "picture", ROBOT, "--out", str(tmp_path / "c.png"), code=1)

@@ -104,13 +104,16 @@ def sliding(robot: Robot, early: str = "") -> Keyboard:
 
 
 def test_keys_move_joints(robot: Robot, guest: Guest, heard: Heard) -> None:
+    robot.do("body", "pose", "--joint", "pan=0.1", "--joint", "lift=10 cm")
+    assert guest.run(lambda: bool(heard), PATIENCE)
+    heard.clear()
     keyboard = sliding(robot, early="\x1b[C")
     assert "> pan" in keyboard.until(keyboard.ready)
     assert guest.run(lambda: len(heard) > 1, PATIENCE)
-    assert heard[0] == heard[1] == {"pan": 0.0, "lift": 0.0}
+    assert heard[0] == heard[1] == pytest.approx({"pan": 0.1, "lift": 0.1})  # nothing moves yet
     keyboard.press("\x1b[1;2C\x1b[B\x1b[C")
-    assert guest.run(lambda: heard[-1] == pytest.approx({"pan": math.radians(10), "lift": 0.01}), PATIENCE)
-    assert "> lift" in keyboard.until("1 cm")
+    assert guest.run(lambda: heard[-1] == pytest.approx({"pan": 0.1 + math.radians(10), "lift": 0.11}), PATIENCE)
+    assert "> lift" in keyboard.until("11 cm")
     keyboard.press("Zq")
     assert keyboard.end() == 0
     assert guest.run(lambda: heard[-1] == {"pan": 0.0, "lift": 0.0}, PATIENCE)

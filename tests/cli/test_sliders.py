@@ -141,3 +141,8 @@ def test_a_position_is_read_with_its_unit(text: str, position: float) -> None:
 def test_a_wrong_position_is_told(text: str, why: str) -> None:
     with pytest.raises(ValueError, match=why):
         sliders()[0].read(text)
+
+
+def test_sliders_begin_where_the_joints_are_as_far_as_that_is_known() -> None:
+    there = SliderPanel(sliders(), min, {sliders()[0].name: 0.2, "another": 3.0}).positions
+    assert there == {one.name: one.within(0.2) if index == 0 else one.rest for index, one in enumerate(sliders())}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rbxcompose.components.servo_bus import ServoBusConfig
@@ -50,7 +51,7 @@ class Head:
         self.ended = None
         made = [
             JointTrajectoryPoint(
-                positions=list(at), time_from_start=Duration(sec=int(time), nanosec=round(time % 1 * 1e9))
+                positions=np.array(at), time_from_start=Duration(sec=int(time), nanosec=round(time % 1 * 1e9))
             )
             for *at, time in points
         ]

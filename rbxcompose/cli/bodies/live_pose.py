@@ -21,6 +21,7 @@ from rbxcompose.cli.bodies.actions import NO_BODY, UNKNOWN
 from rbxcompose.cli.bodies.sliders import PERIOD, Slider, SliderPanel, is_end, sliders_of, split_keys
 from rbxcompose.cli.bus.entities import NO_NAME, NOBODY, visit
 from rbxcompose.cli.bus.guest import NAME, Guest, HeardMessage
+from rbxcompose.cli.bus.heard_frames import HeardFrames
 from rbxcompose.cli.bus.topic_echo import EchoReader
 from rbxcompose.cli.output.console import misused, refuse, tell
 from rbxcompose.cli.output.terminal import NO_TERMINAL, full_screen, raw, show
@@ -32,6 +33,7 @@ from rbxcompose.msgs.std_msgs import Header, String
 from rbxcompose.printable import plain
 from rbxcompose.qos import Qos
 
+HEARD = 1.5  # [s] in which transforms of all joints should come
 _DESCRIPTION, _JOINTS = "robot_description", "joint_states"
 _MOST_READ = 4096  # bytes of keys per read
 
@@ -49,7 +51,8 @@ def pose(arguments: argparse.Namespace) -> int:
 
 def _posed(guest: Guest, arguments: argparse.Namespace) -> int:
     topic = _described(guest, arguments.topic)
-    sliders = sliders_of(_body(guest, topic, arguments.timeout))
+    body = _body(guest, topic, arguments.timeout)
+    sliders = sliders_of(body)
     if not sliders:
         return refuse(UNKNOWN.at(None, "the body has no joint that moves"))
     try:
@@ -60,7 +63,16 @@ def _posed(guest: Guest, arguments: argparse.Namespace) -> int:
     publisher = _publisher(guest, name, arguments.timeout)
     if positions:
         return _send(guest, publisher, positions, name, arguments.duration)
-    return _slide(guest, publisher, SliderPanel(sliders, random.SystemRandom().uniform), name)
+    panel = SliderPanel(sliders, random.SystemRandom().uniform, _start(guest, body))
+    return _slide(guest, publisher, panel, name)
+
+
+def _start(guest: Guest, body: Body) -> dict[str, float]:
+    """Return where the joints are now, as far as transforms tell: opening the sliders must not move anything."""
+    frames = HeardFrames(guest)
+    guest.run(lambda: all(frames.tree.parent_of(joint.child) for joint in body.moving), HEARD)
+    found = ((joint, frames.tree.lookup(joint.parent, joint.child)) for joint in body.moving)
+    return {joint.name: joint.position_of(pose) for joint, pose in found if pose is not None}
 
 
 def _described(guest: Guest, wanted: str | None) -> GraphName:

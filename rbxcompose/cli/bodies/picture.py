@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import math
 
 from rbxcompose.body.description import Description
 from rbxcompose.body.extra import MissingLibraryError
 from rbxcompose.body.model import Body
 from rbxcompose.body.picture import draw
 from rbxcompose.cli.bodies.actions import Actions, add_action, file_of, write
+from rbxcompose.cli.bodies.sliders import sliders_of
 from rbxcompose.cli.output.console import misused, refuse
 
 
@@ -18,7 +18,11 @@ def add(actions: Actions) -> None:
     parser = add_action(actions, "picture", "draw it as a PNG", _picture)
     parser.add_argument("--out", metavar="FILE", help="the picture (default: NAME.png)")
     parser.add_argument(
-        "--joint", action="append", default=[], metavar="NAME=POSITION", help="a joint's position [rad or m]"
+        "--joint",
+        action="append",
+        default=[],
+        metavar="NAME=POSITION",
+        help="a joint's position, such as '35 deg'; a bare number is in rad or m",
     )
 
 
@@ -36,12 +40,7 @@ def _picture(arguments: argparse.Namespace, description: Description) -> int:
 
 def _position(body: Body, written: str) -> tuple[str, float]:
     name, _, value = written.partition("=")
-    if name not in {joint.name for joint in body.moving}:
+    slider = next((one for one in sliders_of(body) if one.name == name), None)
+    if slider is None:
         raise ValueError(f"there is no moving joint '{name}': {', '.join(joint.name for joint in body.moving)}")
-    try:
-        position = float(value)
-    except ValueError:
-        position = math.nan
-    if not math.isfinite(position):
-        raise ValueError(f"the position of '{name}' must be a number [rad or m], not '{value}'")
-    return name, position
+    return name, slider.read(value)

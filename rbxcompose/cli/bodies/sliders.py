@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.printable import columns, fitted, plain
@@ -109,13 +110,18 @@ def is_end(key: str) -> bool:
 
 
 class SliderPanel:
-    """The positions of all sliders, of which one is selected; `draw` returns a random number between two others."""
+    """The positions of all sliders, of which one is selected; `draw` returns a random number between two others.
 
-    def __init__(self, sliders: Sequence[Slider], draw: Draw) -> None:
+    They begin at `start`, by joint; those that are not there, at rest.
+    """
+
+    def __init__(
+        self, sliders: Sequence[Slider], draw: Draw, start: Mapping[str, float] = MappingProxyType({})
+    ) -> None:
         self.sliders = sliders
         self._draw = draw
         self._selected = 0
-        self._positions = [slider.rest for slider in sliders]
+        self._positions = [slider.within(start.get(slider.name, slider.rest)) for slider in sliders]
 
     @property
     def positions(self) -> Mapping[str, float]:

@@ -1,0 +1,99 @@
+"""Buses, actuators, joints and controllers of a manifest: what they become, and what is wrong with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rbxcompose.testing.golden import Golden
+from rbxcompose.testing.manifests import Checked, check_text
+
+LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="2"/>'
+BODY = f"""<robot name="head">
+  <link name="base"/>
+  <link name="neck"/>
+  <link name="face"/>
+  <joint name="pan_joint" type="revolute"><parent link="base"/><child link="neck"/><axis xyz="0 0 1"/>{LIMIT}</joint>
+  <joint name="tilt_joint" type="revolute"><parent link="neck"/><child link="face"/><axis xyz="0 1 0"/>{LIMIT}</joint>
+</robot>
+"""
+HEAD = "rbx: 1\nkind: Robot\nname: head\nbody: {urdf: head.urdf}\n"
+SERVOS = """buses:
+  servos: {type: dynamixel, rate: 50 Hz}
+actuators:
+  pan: {bus: servos, model: AX-12, id: 1, neutral: 500}
+  tilt: {bus: servos, model: XL430-W250, id: 2, invert: true}
+joints:
+  pan_joint:
+    actuator: pan
+    limits: {position: [-90 deg, 30 deg], velocity: 60 deg/s}
+  tilt_joint: {actuator: tilt}
+controllers:
+  head: {type: joint_trajectory, joints: [pan_joint, tilt_joint]}
+"""
+PART = """rbx: 1
+kind: Part
+name: head
+args:
+  id: {type: count, default: 1}
+body: {urdf: head.urdf}
+actuators:
+  pan: {bus: servos, model: AX-12, id: "${args.id}"}
+joints:
+  pan_joint: {actuator: pan}
+controllers:
+  look: {type: joint_trajectory, joints: [pan_joint]}
+"""
+WRONG = {
+    "a misspelt joint of a controller": SERVOS.replace("[pan_joint, tilt_joint]", "[pan_jiont, tilt_joint]"),
+    "a misspelt joint": SERVOS.replace("  tilt_joint: {", "  tlit_joint: {"),
+    "a joint that no servo drives": SERVOS.replace("  tilt_joint: {actuator: tilt}\n", ""),
+    "an unknown model": SERVOS.replace("AX-12", "AX-21"),
+    "one id twice": SERVOS.replace("id: 2", "id: 1"),
+    "a bus that does not exist": SERVOS.replace("{bus: servos, model: AX", "{bus: servoes, model: AX"),
+    "two buses": SERVOS.replace("  servos: {", "  more: {type: dynamixel}\n  servos: {").replace(
+        "{bus: servos, model: XL", "{bus: more, model: XL"
+    ),
+}
+
+
+def check(folder: Path, text: str) -> Checked:
+    return check_text(HEAD + text, folder, others={"head.urdf": BODY})
+
+
+def driver_of(checked: Checked) -> Any:
+    [found] = [one.config for one in checked.plan.instances if one.type == "servo_bus"]
+    return found
+
+
+def test_a_bus_drives_its_joints_within_the_tighter_limits(tmp_path: Path) -> None:
+    checked = check(tmp_path, SERVOS)
+    assert checked.codes == []
+    config = driver_of(checked)
+    assert (config.rate, config.twin, list(config.controllers)) == (50.0, "servo", ["head"])
+    pan, tilt = config.joints["pan_joint"], config.joints["tilt_joint"]
+    assert (pan.lower, pan.upper, pan.velocity) == pytest.approx((-1.0, 0.5236, 1.0472), abs=1e-4)
+    assert (tilt.lower, tilt.upper, tilt.velocity, tilt.invert) == (-1.0, 1.0, 2.0, True)
+
+
+def test_two_instances_of_a_part_bring_their_joints_to_one_bus(tmp_path: Path) -> None:
+    robot = (
+        "rbx: 1\nkind: Robot\nname: two\nbuses: {servos: {type: dynamixel}}\ninclude:\n  left: part.yaml\n"
+        "  right: {part: part.yaml, with: {id: 2}, attach: {to: left_face}}\n"
+    )
+    checked = check_text(robot, tmp_path, others={"head.urdf": BODY, "part.yaml": PART})
+    assert checked.codes == []
+    config = driver_of(checked)
+    assert {name: one.id for name, one in config.joints.items()} == {"left_pan_joint": 1, "right_pan_joint": 2}
+    assert {name: one.joints for name, one in config.controllers.items()} == {
+        "left_look": ["left_pan_joint"],
+        "right_look": ["right_pan_joint"],
+    }
+
+
+def test_each_mistake_is_told_at_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, golden: Golden) -> None:
+    monkeypatch.chdir(tmp_path)
+    told = {name: check(tmp_path, text).text for name, text in WRONG.items()}
+    golden.check("servo_sections.txt", "\n".join(f"--- {name}\n{text}" for name, text in told.items()))
