@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
+import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +18,16 @@ from tests.side_by_side import scope_of
 from tests.soak import Soak
 
 ROOT = Path(__file__).parents[1]
+
+
+CACHES = "RBXCOMPOSE_TEST_CACHES"
+
+
+def pytest_configure() -> None:
+    """Give all workers of this run a folder of caches that goes with it."""
+    if CACHES not in os.environ:
+        os.environ[CACHES] = os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp()
+        atexit.register(shutil.rmtree, os.environ[CACHES], ignore_errors=True)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

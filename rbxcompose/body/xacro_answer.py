@@ -52,6 +52,11 @@ def read_answer(data: bytes, roots: Sequence[str]) -> XacroAnswer | None:
         answer: XacroAnswer = from_data(XacroAnswer, json.loads(data))
     except (UnreadableError, ValueError, RecursionError):
         return None
+    return limited(answer, roots)
+
+
+def limited(answer: XacroAnswer, roots: Sequence[str]) -> XacroAnswer:
+    """Return an answer as far as it is about files below the roots."""
     real = [Path(root).resolve() for root in roots]
     files, used = (
         tuple(one for one in told if any(Path(one).is_relative_to(root) for root in real))

@@ -1,4 +1,7 @@
-"""Answers of the fenced process that expands xacro files. They are kept as long as no file that it used changes."""
+"""Answers of the fenced process that expands xacro files. They are kept as long as no file that it used changes.
+
+They outlive this process in the user's folder of caches, so that the next command need not expand anything.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ from typing import NamedTuple
 from xxhash import xxh3_128_hexdigest
 
 import rbxcompose
+from rbxcompose.body.kept_answers import KeptAnswer, keep, read_kept
 from rbxcompose.body.xacro_answer import XacroAnswer, read_answer
 from rbxcompose.per_compile import once
 from rbxcompose.regular_files import read_regular
@@ -30,7 +34,7 @@ DEADLINE = 12.0  # [s] of real time, on a busy machine; the processes limit thei
 KEPT = 64  # answers
 _LARGEST = 8_000_000  # [bytes] of a file that xacro reads
 _RUN = "import sys; sys.path.insert(0, sys.argv[1]); from rbxcompose.body.xacro_child import main; main()"
-_answers: OrderedDict[XacroRequest, tuple[XacroAnswer, dict[str, str]]] = OrderedDict()
+_answers: OrderedDict[XacroRequest, KeptAnswer] = OrderedDict()
 
 
 def answers(requests: Sequence[XacroRequest]) -> list[XacroAnswer | None]:
@@ -43,9 +47,9 @@ def answers(requests: Sequence[XacroRequest]) -> list[XacroAnswer | None]:
         if answer is None:
             failed.add(request)
         else:
-            _answers[request] = answer, {path: _digest(path) for path in answer.used}
-            if len(_answers) > KEPT:
-                _answers.popitem(last=False)
+            kept = KeptAnswer(answer, {path: _digest(path) for path in answer.used})
+            _remember(request, kept)
+            keep(request.text, kept)
     return [known[one] for one in requests]
 
 
@@ -56,11 +60,18 @@ def _failed() -> set[XacroRequest]:
 
 
 def _kept(request: XacroRequest) -> XacroAnswer | None:
-    answer, used = _answers.get(request, (None, {}))
-    if answer is None or any(_digest(path) != digest for path, digest in used.items()):
+    kept = _answers.get(request) or read_kept(request.text, request.roots)
+    if kept is None or any(_digest(path) != digest for path, digest in kept.used.items()):
         return None
+    _remember(request, kept)
+    return kept.answer
+
+
+def _remember(request: XacroRequest, kept: KeptAnswer) -> None:
+    _answers[request] = kept
     _answers.move_to_end(request)
-    return answer
+    if len(_answers) > KEPT:
+        _answers.popitem(last=False)
 
 
 def _digest(path: str) -> str:

@@ -11,6 +11,7 @@ from unittest.mock import Mock
 
 import pytest
 
+from rbxcompose.body import xacro_answers
 from rbxcompose.body.xacro import Expanded, expand
 from rbxcompose.body.xacro_answer import BareFile, BareTag, XacroAnswer, read_answer
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
@@ -174,3 +175,38 @@ def test_an_argument_that_no_file_declares_is_told_with_the_nearest(tmp_path: Pa
     fine, _ = expand(tmp_path / "r.xacro", {"height": "2"}, {}, [tmp_path], HERE)
     assert isinstance(fine, Expanded)
     assert fine.notes == ()
+
+
+def test_what_was_expanded_is_kept_for_other_processes_but_not_from_other_users(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
+    started = Mock(wraps=subprocess.Popen)
+    monkeypatch.setattr(subprocess, "Popen", started)
+    (tmp_path / "r.xacro").write_text(HEAD + '<link name="a"/></robot>')
+
+    def links() -> int:
+        xacro_answers._answers.clear()  # as in a new process
+        found, _ = expand(tmp_path / "r.xacro", {}, {}, [tmp_path], HERE)
+        assert isinstance(found, Expanded)
+        return found.text.count("<link")
+
+    assert (links(), links(), started.call_count) == (1, 1, 1)
+    [kept] = (tmp_path / "caches").rglob("*.json")
+    assert kept.stat().st_mode & 0o777 == 0o600
+    kept.write_text("{")
+    assert (links(), started.call_count) == (1, 2)
+    kept.chmod(0o666)
+    assert (links(), started.call_count) == (1, 3)
+    (tmp_path / "r.xacro").write_text(HEAD + '<link name="a"/><link name="b"/></robot>')
+    assert (links(), started.call_count) == (2, 4)
+
+
+def test_a_folder_of_caches_that_cannot_be_written_costs_time_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    (tmp_path / "r.xacro").write_text(HEAD + '<link name="a"/></robot>')
+    found, _ = expand(tmp_path / "r.xacro", {}, {}, [tmp_path], HERE)
+    assert isinstance(found, Expanded)
