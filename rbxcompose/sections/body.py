@@ -19,7 +19,7 @@ from rbxcompose.manifest.files import project_of, resolve
 from rbxcompose.manifest.reader import UNREADABLE
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
+from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.printable import plain
 from rbxcompose.references import JOINT, LINK
@@ -129,6 +129,8 @@ def body(reading: Reading[BodyModel]) -> Description | None:
     read, report = reading.whole(), reading.report
     if read is None or reading.node is None:
         return None
+    if any(value is BROKEN for one in (read, *read.pieces.values()) for value in one.with_.values()):
+        return None  # what is wrong with an argument is told where it was given
     parts = [_part(reading, reading.node, (), "", read, None)] if read.urdf or read.xacro else []
     for name, piece in read.pieces.items():
         parts.append(_part(reading, reading.node, (PIECES, name), name, piece, piece.attach))

@@ -176,3 +176,10 @@ def test_what_is_written_reads_back(text: str) -> None:
     again = read_urdf(to_xml(root), "a")
     assert isinstance(again, XmlElement)
     assert (again.attributes["name"], again.children[0].attributes["a"], again.children[0].text) == (text, text, word)
+
+
+def test_an_argument_that_is_wrong_is_told_once_where_it_was_given(tmp_path: Path) -> None:
+    robot = f"{HEAD}include:\n  post: {{part: rbx:parts/torso.yaml, with: {{height: 60 kg}}}}\n"
+    checked = check(tmp_path, robot)
+    assert checked.codes == ["RBX1003"]
+    assert "robot.yaml:5:" in checked.text
