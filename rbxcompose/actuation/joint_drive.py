@@ -103,7 +103,8 @@ class JointDrive:
             self.temperature = joint.model.to_si("present_temperature", raw)
         if (raw := values.get("present_voltage")) is not None:
             self.voltage = joint.model.to_si("present_voltage", raw)
-        self._error = ", ".join(self._errors(reading))
+        if joint.model.protocol == 1 or "hardware_error" in values:  # in 2.0, not each reading tells of errors
+            self._error = ", ".join(self._errors(reading))
 
     def _errors(self, reading: ServoReading) -> Iterator[str]:
         bits = reading.alert & ONE_ERRORS if self.joint.model.protocol == 1 else reading.values.get("hardware_error", 0)

@@ -40,6 +40,7 @@ from rbxcompose.twins.servo_twin import TwinBus
 
 Follow = FollowJointTrajectory
 NANOSECONDS = 1_000_000_000
+GONE = "the bus of servos has gone"
 REOPEN = 0.5  # [s] between attempts to find a port that has gone
 REPORT = 1.0  # [s] between reports to diagnostics
 PUBLISHED = 50.0  # [Hz] of joint states, at most
@@ -184,6 +185,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
             if self.now - self.lost_at < REOPEN:
                 return
             self.cycle.bus.reopen()
+            for drive in self.cycle.drives.values():  # their servos have no torque now, and may be elsewhere
+                drive.ask(Relax())
             self.info(f"the port '{self.config.port}' is back")
             self.lost_at = -math.inf
         for name in self.goals:
@@ -221,8 +224,12 @@ class ServoBusDriver(Component[ServoBusConfig]):
             goal.aborted(outcome.message, result)
 
     def accept(self, goal: Follow.Goal) -> str:
-        """Refuse what moves while the robot is stopped."""
-        return "the robot is stopped" if self.is_stopped else ""
+        """Refuse what moves while the robot is stopped, or its bus has gone."""
+        return self.refusal()
+
+    def refusal(self) -> str:
+        """Return why nothing may move now, or nothing."""
+        return "the robot is stopped" if self.is_stopped else GONE if self.lost_at > -math.inf else ""
 
     def received(self, port: str, message: Any) -> None:
         """Move one joint, unless a controller leads it."""
@@ -230,8 +237,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
         leader = next(
             (one for one, each in self.cycle.followers.items() if name in each.joints and each.is_following), ""
         )
-        if leader or self.is_stopped:
-            self.cycle.drives[name].refused = f"controller '{leader}' leads it" if leader else "the robot is stopped"
+        reason = f"controller '{leader}' leads it" if leader else self.refusal()
+        if reason:
+            self.cycle.drives[name].refused = reason
             return
         self.cycle.drives[name].ask(MoveTo(message.data))
 
@@ -273,7 +281,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         if self.lost_at == -math.inf:
             self.warn(str(error))
         self.lost_at = self.now
-        self.halt("the bus of servos has gone")
+        self.halt(GONE)
 
     def halt(self, reason: str) -> None:
         """End all trajectories, and bring the joints to rest."""

@@ -11,6 +11,8 @@ from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.config import Config, Frequency
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, SetScope
+from rbxcompose.manifest.tree import key_span
+from rbxcompose.manifest.validate import MISSING_KEY
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.references import SERVO_BUS
 from rbxcompose.sections.actuators import ActuatorModel, actuators
@@ -101,4 +103,9 @@ def buses(reading: Reading[BusOfServosModel]) -> dict[str, BusOfServosModel]:
             port: /dev/ttyUSB0
             rate: 100 Hz
     """
-    return reading.entries()
+    found = reading.entries()
+    for name, one in found.items():
+        if not one.port and not reading.contents.is_simulated:
+            span = key_span(reading.contents.root, ("buses", name))
+            reading.report.add(MISSING_KEY.at(span, f"the bus '{name}' of real servos needs the key 'port'"))
+    return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -140,4 +141,26 @@ def test_a_hot_joint_rests_without_torque_until_it_has_cooled_down() -> None:
     assert driven.servo.get("torque_enable") == 0
     driven.servo.heat_to(40)
     driven.run(round(60 / PERIOD) + 10)
+    assert driven.mode == JointMode.RELAXED
+
+
+def test_a_joint_is_not_enabled_while_its_servo_still_reports_an_error() -> None:
+    driven = Driven("XL430-W250")
+    other = JointDrive(replace(driven.drive.joint, name="tilt", id=2), JointPolicy(cycle=PERIOD))
+    driven.bus = TwinBus([FakeServo("XL430-W250", id_) for id_ in (1, 2)], lambda: driven.now)
+    driven.cycle = ServoCycle(driven.bus, {"pan": driven.drive, "tilt": other})  # errors are read in turns
+    driven.run(3)
+    driven.servo.load = 2.0
+    driven.drive.ask(MoveTo(0.5))
+    driven.run(5)
+    assert driven.mode == JointMode.FAULT
+    driven.servo.load = 0.0
+    for _ in range(4):
+        driven.drive.ask(Enable(True))
+        driven.run()
+        assert driven.mode == JointMode.FAULT
+    driven.bus.reboot(1)
+    driven.run(3)
+    driven.drive.ask(Enable(True))
+    driven.run(3)
     assert driven.mode == JointMode.RELAXED

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rbxcompose.actuation.port_errors import LostPortError
 from rbxcompose.components.servo_bus import ServoBusConfig
 from rbxcompose.msgs.builtin_interfaces import Duration
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
@@ -164,6 +165,38 @@ def test_a_canceled_trajectory_comes_to_rest(head: Head) -> None:
     assert 0.1 < there["pan"] < 1.4
     head.robot.advance(1.0)
     assert head.at == there
+
+
+class Gone:
+    """A bus whose port is not there."""
+
+    def read(self, *_: Any, **__: Any) -> Any:
+        raise LostPortError("/dev/servos", "was unplugged")
+
+    reopen = write = read
+
+
+def test_after_a_port_was_gone_joints_are_relaxed_and_move_from_where_they_are(head: Head) -> None:
+    head.commands["pan"](Float64(data=1.0))
+    head.robot.advance(2.0)
+    driver: Any = head.robot.component("servos")
+    bus, driver.cycle.bus = driver.cycle.bus, Gone()
+    head.robot.advance(0.1)
+    for _ in range(20):
+        head.commands["pan"](Float64(data=-1.0))
+        head.robot.advance(0.05)
+    servo = bus.line[1]
+    servo.set("torque_enable", 0)
+    servo.move_to(400)  # by hand
+    driver.cycle.bus = bus
+    head.robot.advance(1.0)
+    assert servo.get("torque_enable") == 0  # what was commanded meanwhile is not done now
+    assert servo.get("present_position") == 400
+    head.commands["pan"](Float64(data=0.0))
+    head.robot.advance(0.03)
+    assert abs(servo.get("goal_position") - 400) < 5
+    head.robot.advance(2.0)
+    assert head.at["pan"] == pytest.approx(0.0, abs=TICK)
 
 
 def test_the_configuration_has_no_port_by_default() -> None:

@@ -97,3 +97,9 @@ def test_each_mistake_is_told_at_its_place(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.chdir(tmp_path)
     told = {name: check(tmp_path, text).text for name, text in WRONG.items()}
     golden.check("servo_sections.txt", "\n".join(f"--- {name}\n{text}" for name, text in told.items()))
+
+
+def test_real_servos_need_a_port(tmp_path: Path) -> None:
+    checked = check_text(HEAD + SERVOS, tmp_path, others={"head.urdf": BODY}, real=True)
+    assert checked.codes == ["RBX1002"]
+    assert "robot.yaml:6:3" in checked.text
