@@ -154,7 +154,7 @@ class _Draft:
         if max(gaps) <= ROUNDING and len(self.times) > 1:
             self._drop(1)
             return
-        needed = max(self._least_time(name) for name in self.joints)
+        needed = self._least_time()
         self.notes.append(f"the point at 0 s is reached as fast as the limits allow, after {needed:.3f} s")
         self.times = [time + needed for time in self.times]
 
@@ -218,24 +218,38 @@ class _Draft:
             for name, track in self.tracks.items()
         }
 
-    def _least_time(self, name: str) -> float:
-        limits, start, end = self.joints[name].limits, self.start[name], self.tracks[name][0]
-        if limits.velocity is None and limits.acceleration is None and end.position != start.position:
-            raise _Unfit(f"joint '{name}' has no limits that say how fast it can reach a point at 0 s", name)
+    def _least_time(self) -> float:
+        """Return a time in which all joints can reach their first points.
 
-        def is_possible(time: float) -> bool:
-            return _is_possible(start, end, time, limits, is_straight=self.kind == "straight")
-
+        What one joint can do in a time, it need not be able to do in a longer one: on the way to a near point, a joint
+        that moves has to brake harder if it has time to overshoot. So all joints are tried together.
+        """
+        for name, rules in self.joints.items():
+            is_there = self.tracks[name][0].position == self.start[name].position
+            if rules.limits.velocity is None and rules.limits.acceleration is None and not is_there:
+                raise _Unfit(f"joint '{name}' has no limits that say how fast it can reach a point at 0 s", name)
         upper = BRIEFEST
-        while not is_possible(upper):
+        while (late := self._too_slow(upper)) is not None:
             upper *= 2
             if upper > LONGEST:
-                raise _Unfit(f"joint '{name}' cannot reach the point at 0 s within its limits", name)
+                raise _Unfit(f"joint '{late}' cannot reach the point at 0 s within its limits", late)
         lower = upper / 2 if upper > BRIEFEST else upper
         for _ in range(30):
             middle = (lower + upper) / 2
-            lower, upper = (lower, middle) if is_possible(middle) else (middle, upper)
+            lower, upper = (lower, middle) if self._too_slow(middle) is None else (middle, upper)
         return upper
+
+    def _too_slow(self, time: float) -> str | None:
+        """Return a joint that cannot reach its first point in this time [s], None if all can."""
+        is_straight = self.kind == "straight"
+        return next(
+            (
+                name
+                for name, rules in self.joints.items()
+                if not _is_possible(self.start[name], self.tracks[name][0], time, rules.limits, is_straight=is_straight)
+            ),
+            None,
+        )
 
     def _refuse_unless_clamped(self, message: str, joint: str) -> None:
         if self.policy.outside == "refuse":
