@@ -50,6 +50,8 @@ Angle = Annotated[float, _reads(units.ANGLE), Dimensioned(units.ANGLE)]
 AngularSpeed = Annotated[float, _reads(units.ANGULAR_SPEED), Dimensioned(units.ANGULAR_SPEED)]
 AngularAcceleration = Annotated[float, _reads(units.ANGULAR_ACCELERATION), Dimensioned(units.ANGULAR_ACCELERATION)]
 Frequency = Annotated[float, _reads(units.FREQUENCY), Dimensioned(units.FREQUENCY)]
+Temperature = Annotated[float, _reads(units.TEMPERATURE), Dimensioned(units.TEMPERATURE)]
+BitRate = Annotated[float, _reads(units.BIT_RATE), Dimensioned(units.BIT_RATE)]
 Ratio = Annotated[float, _reads(units.RATIO), Dimensioned(units.RATIO)]
 
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", max_length=60)]

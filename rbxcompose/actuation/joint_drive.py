@@ -1,12 +1,14 @@
-"""A joint that a servo turns: what is measured, what is asked, and what is to be written, one cycle after the other."""
+"""A joint that servos drive: what is measured, what is asked, and what is to be written, one cycle after the other."""
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 from rbxcompose.actuation.bus import ServoReading
-from rbxcompose.actuation.servo_models import HARDWARE_ERRORS, ONE_ERRORS, ServoModel
+from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
+from rbxcompose.actuation.servo_models import HARDWARE_ERRORS, ONE_ERRORS
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.joint_state_machine import step_joint
 from rbxcompose.control.joint_states import (
@@ -17,63 +19,43 @@ from rbxcompose.control.joint_states import (
     JointMode,
     JointPolicy,
     JointRequest,
-    MoveTo,
     Pursue,
     Refuse,
+    Relax,
     TorqueOff,
     TorqueOn,
     WriteGoal,
 )
-from rbxcompose.control.limits import Limiter, MotionLimits
+from rbxcompose.control.limits import Limiter
+from rbxcompose.control.trajectory_plan import JointRules
 
 Raw = Mapping[str, int]
 """Raw values by item."""
+Writes = Mapping[int, Raw]
+"""Raw values by id of the servo."""
 
 
-@dataclass(frozen=True, slots=True)
-class ServoJoint:
-    """A joint of the body, and the servo that turns it: `neutral` is the tick at position 0."""
-
-    name: str
-    id: int
-    model: ServoModel
-    limits: MotionLimits
-    neutral: int
-    is_inverted: bool = False
-    is_continuous: bool = False
-
-    @property
-    def per_tick(self) -> float:
-        """Return the angle of one tick [rad], negative if the servo turns the other way round."""
-        return -self.model.per_tick if self.is_inverted else self.model.per_tick
-
-    def position(self, raw: int) -> float:
-        """Return the position of a tick [rad]."""
-        return (raw - self.neutral) * self.per_tick
-
-    def raw(self, position: float) -> int:
-        """Return the tick nearest to a position [rad], within those of the servo."""
-        last = self.model.family.ticks - 1
-        ticks = self.neutral + round(position / self.per_tick)
-        return ticks if self.is_continuous and self.model.protocol == 2 else max(0, min(last, ticks))
-
-
-class JointDrive:
+class JointDrive(ABC):
     """Carries out what is asked of one joint, within its limits and as its state permits."""
 
     def __init__(self, joint: ServoJoint, policy: JointPolicy) -> None:
         self.joint, self.policy = joint, policy
+        self.rules = JointRules(joint.limits, joint.is_continuous)
         self.condition = JointCondition()
-        self.limiter: Limiter | None = None  # from the first measured position on
-        self.measured = JointSample(float("nan"))
+        self.limiter: Limiter | None = None  # from the first torque on
+        self.measured = JointSample(math.nan)
+        self.effort = math.nan
+        """Load of its first servo, as a fraction of the most or as a current [A]."""
         self.temperature: float | None = None
         self.voltage: float | None = None
         self.refused = ""
         """Why the last command was refused; empty after one that was not."""
-        self._measured_at = float("-inf")
-        self._error = ""
+        self._positions: dict[int, float] = {}  # of each servo, as the joint counts
+        self._ticks: dict[int, int] = {}  # of wheels, without their jumps after each turn
+        self._stamps: dict[int, float] = {}
+        self._warmth: dict[int, float] = {}
+        self._errors: dict[int, str] = {}
         self._requests: list[JointRequest] = []
-        self._passing = 0.0  # [rad/s], the velocity of a path at its wanted position
 
     @property
     def commanded(self) -> JointSample:
@@ -87,68 +69,122 @@ class JointDrive:
         return self.condition.mode
 
     @property
+    def blocked(self) -> str:
+        """Return why it may not move; empty if it may."""
+        return self.condition.note or str(self.mode) if self.condition.is_blocked else ""
+
+    @property
+    def per_tick(self) -> float:
+        """Return how far it moves for one tick of its servo."""
+        return self.joint.per_tick
+
+    @property
+    def has_torque(self) -> bool:
+        """Return whether its servos hold or move it."""
+        return not self.condition.is_blocked and self.condition.base in WITH_TORQUE
+
+    @property
     def is_at_rest(self) -> bool:
         """Return whether its command does not move."""
         return self.limiter is None or self.limiter.is_at_rest
 
-    def take(self, reading: ServoReading) -> None:
-        """Take over what the servo told."""
-        joint, values = self.joint, reading.values
+    def take(self, id: int, reading: ServoReading) -> None:
+        """Take over what one of its servos told."""
+        servo = self.joint.servo(id)
+        model, values = servo.model, reading.values
         if (raw := values.get("present_position")) is not None:
-            speed = values.get("present_speed", 0)
-            turned = joint.model.to_si("present_speed", speed) * (-1.0 if joint.is_inverted else 1.0)
-            self.measured = JointSample(joint.position(raw), turned)
-            self._measured_at = reading.stamp
+            self._measure(servo, raw, values.get("present_speed", 0), reading.stamp)
+        if (raw := values.get("present_load")) is not None and servo is self.joint.servos[0]:
+            self.effort = model.to_si("present_load", raw) * (-1.0 if servo.is_inverted else 1.0)
         if (raw := values.get("present_temperature")) is not None:
-            self.temperature = joint.model.to_si("present_temperature", raw)
+            self._warmth[id] = model.to_si("present_temperature", raw)
+            self.temperature = max(self._warmth.values())
         if (raw := values.get("present_voltage")) is not None:
-            self.voltage = joint.model.to_si("present_voltage", raw)
-        if joint.model.protocol == 1 or "hardware_error" in values:  # in 2.0, not each reading tells of errors
-            self._error = ", ".join(self._errors(reading))
+            self.voltage = model.to_si("present_voltage", raw)
+        if model.protocol == 1 or "hardware_error" in values:  # in 2.0, not each reading tells of errors
+            self._errors[id] = ", ".join(_faults(servo, reading))
 
-    def _errors(self, reading: ServoReading) -> Iterator[str]:
-        bits = reading.alert & ONE_ERRORS if self.joint.model.protocol == 1 else reading.values.get("hardware_error", 0)
-        yield from (words for bit, words in HARDWARE_ERRORS.items() if bits & bit)
+    def _measure(self, servo: JointServo, raw: int, speed: int, stamp: float) -> None:
+        if self.joint.mode == "velocity":
+            raw = self._ticks[servo.id] = self._unrolled(servo, raw)
+        self._stamps[servo.id] = stamp
+        self._positions |= self.joint.positions({servo.id: raw})
+        if len(self._positions) < len(self.joint.servos):
+            return
+        position = sum(self._positions.values()) / len(self._positions)
+        turned = servo.model.to_si("present_speed", speed) * (-1.0 if servo.is_inverted else 1.0)
+        slope = self.joint.transmission.slope(servo.angle(raw))
+        self.measured = JointSample(position, turned * slope)
+
+    def _unrolled(self, servo: JointServo, raw: int) -> int:
+        """Return the tick of a wheel; in protocol 1.0 those of a servo start again at 0 after each turn."""
+        last, count = self._ticks.get(servo.id, raw), servo.model.family.ticks
+        if servo.model.protocol == 2:
+            return raw
+        return last + (raw - last + count // 2) % count - count // 2
+
+    def was_cut(self) -> None:
+        """Go on from where the joint is: a servo has stopped by itself, since the bus was silent for too long."""
+        if self.limiter is not None and math.isfinite(self.measured.position):
+            self.limiter.reseed(self.measured.position)
 
     def ask(self, request: JointRequest) -> None:
         """Take a request for the next cycle."""
         self._requests.append(request)
 
+    def relax(self) -> None:
+        """Switch torque off in the next cycle, until the next command."""
+        self.ask(Relax())
+
     def follow(self, sample: JointSample) -> None:
         """Be at a position at the end of the next cycle, and pass there with its velocity."""
-        self._passing = sample.velocity
-        self.ask(MoveTo(sample.position))
+        raise TypeError(f"joint '{self.joint.name}' takes velocities")
 
-    def step(self, now: float, dt: float) -> list[Raw]:
+    def turn(self, velocity: float) -> None:
+        """Move with a velocity [rad/s or m/s] up to the end of the next cycle, then brake unless it is repeated."""
+        raise TypeError(f"joint '{self.joint.name}' takes positions")
+
+    def step(self, now: float, dt: float) -> list[Writes]:
         """Return what is to be written in the cycle that ends `dt` [s] from `now`, one after the other."""
-        at = self.measured.position
-        inputs = JointInputs(at, self._measured_at, self.temperature, self._error, tuple(self._requests))
+        measured_at = min(self._stamps.values()) if len(self._stamps) == len(self.joint.servos) else -math.inf
+        error = ", ".join(words for words in self._errors.values() if words)
+        inputs = JointInputs(self.measured.position, measured_at, self.temperature, error, tuple(self._requests))
         self._requests.clear()
         self.condition, actions = step_joint(self.condition, inputs, now, self.policy)
-        writes: list[Raw] = []
+        writes: list[Writes] = []
         for action in actions:
             match action:
                 case WriteGoal(position=position):
                     self.limiter = Limiter(self.joint.limits, position)
-                    writes.append({"goal_position": self.joint.raw(position)})
+                    writes.append(self._goal(position))
                 case TorqueOn():
-                    writes.append({"torque_enable": 1})
+                    writes.append(self._same({"torque_enable": 1}))
                 case TorqueOff():
-                    writes.append({"torque_enable": 0})
-                case Pursue(position=position) if self.limiter is not None:
-                    self.refused = self.limiter.want(position, self._passing) or ""
+                    writes.append(self._same({"torque_enable": 0}))
+                case Pursue(request=request) if self.limiter is not None:
+                    self.refused = self._pursue(request, self.limiter, dt)
                 case BringToRest() if self.limiter is not None:
                     self.limiter.brake()
-                case Refuse(request=MoveTo(), reason=reason):
+                case Refuse(request=request, reason=reason) if not isinstance(request, Relax):
                     self.refused = reason
-        self._passing = 0.0
-        return [*writes, *self._moved(dt)]
+        return [*writes, *self._moved(dt)] if self.has_torque else writes
 
-    def _moved(self, dt: float) -> Iterator[Raw]:
-        """Yield the next goal, if the joint has torque and its command changes."""
-        if self.limiter is None or self.condition.is_blocked or self.condition.base not in WITH_TORQUE:
-            return
-        before = self.joint.raw(self.limiter.position)
-        goal = self.joint.raw(self.limiter.step(dt).position)
-        if goal != before:
-            yield {"goal_position": goal}
+    def _same(self, raw: Raw) -> Writes:
+        return dict.fromkeys(self.joint.ids, raw)
+
+    @abstractmethod
+    def _goal(self, position: float) -> Writes:
+        """Return what keeps it where it is when torque is switched on."""
+
+    @abstractmethod
+    def _pursue(self, request: JointRequest, limiter: Limiter, dt: float) -> str:
+        """Pass what is wanted on to the limiter; return why not, or nothing."""
+
+    @abstractmethod
+    def _moved(self, dt: float) -> Iterator[Writes]:
+        """Yield the next goal, if its command changes; the joint has torque."""
+
+
+def _faults(servo: JointServo, reading: ServoReading) -> Iterator[str]:
+    bits = reading.alert & ONE_ERRORS if servo.model.protocol == 1 else reading.values.get("hardware_error", 0)
+    yield from (words for bit, words in HARDWARE_ERRORS.items() if bits & bit)

@@ -1,56 +1,74 @@
-"""The cycle of a bus of servos: read, decide, follow trajectories, write. It uses no thread and no messages."""
+"""The cycle of a bus of servos: read, decide, lead, write. It uses no thread and no messages."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import zip_longest
+from typing import Protocol
 
 from rbxcompose.actuation.bus import ServoBus
-from rbxcompose.actuation.joint_drive import JointDrive
+from rbxcompose.actuation.joint_drive import JointDrive, Writes
+from rbxcompose.actuation.preparation import arm, has_fired
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.joint_states import Relax
-from rbxcompose.control.trajectory import TrajectoryGoal, TrajectoryRefusal
-from rbxcompose.control.trajectory_follower import TrajectoryFollower, TrajectoryOutcome
-from rbxcompose.control.trajectory_plan import TrajectoryPlan
 
-FAST = ("present_position", "present_speed")
+FAST = ("present_position", "present_speed", "present_load")
 SLOW = ("present_temperature", "present_voltage")
+RARE = ("hardware_error", "bus_watchdog")  # of models that have them
+
+
+class Leader(Protocol):
+    """What leads joints in each cycle: a controller."""
+
+    def cycle(self, now: float, dt: float) -> None:
+        """Ask joints for what they shall do up to `now + dt` [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointMimic:
+    """A joint that follows another one: at `multiplier` times its position plus `offset`."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
 
 
 @dataclass(slots=True)
 class ServoCycle:
-    """The joints of a bus by name, and the controllers that lead some of them, by name."""
+    """The joints of a bus by name, and those of them that mimic others."""
 
     bus: ServoBus
     drives: Mapping[str, JointDrive]
-    followers: Mapping[str, TrajectoryFollower] = field(default_factory=dict)
+    mimics: Mapping[str, JointMimic] = field(default_factory=dict)
+    watchdog: float = 0.0
+    """Silence after which servos stop by themselves, if they can [s]; 0 is never."""
+    shares_heat: bool = False
+    """Whether all joints rest when one is too hot."""
     _turn: int = 0  # whose slow items are read next
 
-    def run(self, now: float, dt: float) -> dict[str, TrajectoryOutcome]:
-        """Do what is due at `now` [s], `dt` [s] before the next cycle; return how trajectories ended, by controller.
+    @property
+    def ids(self) -> list[int]:
+        """Return the ids of all servos."""
+        return [id_ for drive in self.drives.values() for id_ in drive.joint.ids]
+
+    def run(self, now: float, dt: float, leaders: Sequence[Leader] = ()) -> None:
+        """Do what is due at `now` [s], `dt` [s] before the next cycle.
 
         Raises:
             PortError: if the bus has gone.
         """
         self._read()
-        outcomes = dict(self._lead(now))
-        stages = [drive.step(now, dt) for drive in self.drives.values()]
-        ids = [drive.joint.id for drive in self.drives.values()]
-        for stage in zip_longest(*stages):
-            if writes := {id_: raw for id_, raw in zip(ids, stage, strict=True) if raw}:
-                self.bus.write(writes)
-        return outcomes | dict(self._lost(now))
-
-    def accept(self, controller: str, goal: TrajectoryGoal, now: float) -> TrajectoryPlan | TrajectoryRefusal:
-        """Take over a trajectory, or return why not."""
-        follower = self.followers[controller]
-        return follower.accept(goal, now, *self._samples(follower))
-
-    def halt(self, now: float, reason: str) -> dict[str, TrajectoryOutcome]:
-        """Bring all trajectories to rest; return how they ended."""
-        ended = ((name, follower.abort(now, reason)) for name, follower in self.followers.items())
-        return {name: outcome for name, outcome in ended if outcome is not None}
+        for leader in leaders:
+            leader.cycle(now, dt)
+        self._mimic()
+        if self.shares_heat:
+            warmest = max(
+                (one.temperature for one in self.drives.values() if one.temperature is not None), default=None
+            )
+            for drive in self.drives.values():
+                drive.temperature = warmest
+        self._write([drive.step(now, dt) for drive in self.drives.values()])
 
     def relax(self, now: float, dt: float) -> None:
         """Switch all torque off, twice, since nobody confirms a group write."""
@@ -58,40 +76,32 @@ class ServoCycle:
             drive.ask(Relax())
             drive.step(now, dt)
         for _ in range(2):
-            self.bus.write({drive.joint.id: {"torque_enable": 0} for drive in self.drives.values()})
+            self.bus.write({id_: {"torque_enable": 0} for id_ in self.ids})
+
+    def _write(self, stages: list[list[Writes]]) -> None:
+        for stage in zip_longest(*stages):
+            if writes := {id_: raw for one in stage if one for id_, raw in one.items()}:
+                self.bus.write(writes)
 
     def _read(self) -> None:
-        drives = list(self.drives.values())
-        found = self.bus.read([drive.joint.id for drive in drives], FAST)
-        for drive in drives:
-            if (reading := found.get(drive.joint.id)) is not None:
-                drive.take(reading)
-        drive = drives[self._turn % len(drives)]
+        drives = {id_: drive for drive in self.drives.values() for id_ in drive.joint.ids}
+        for id_, reading in self.bus.read(list(drives), FAST).items():
+            drives[id_].take(id_, reading)
+        id_ = list(drives)[self._turn % len(drives)]
         self._turn += 1
-        items = [*SLOW, "hardware_error"] if drive.joint.model.protocol == 2 else SLOW
-        if (slow := self.bus.read([drive.joint.id], items).get(drive.joint.id)) is not None:
-            drive.take(slow)
+        items = [*SLOW, *(name for name in RARE if name in drives[id_].joint.servo(id_).model.items)]
+        if (slow := self.bus.read([id_], items).get(id_)) is not None:
+            drives[id_].take(id_, slow)
+            if has_fired(slow.values):
+                drives[id_].was_cut()
+                arm(self.bus, drives[id_].joint.servo(id_), self.watchdog)
 
-    def _lead(self, now: float) -> Iterator[tuple[str, TrajectoryOutcome]]:
-        for name, follower in self.followers.items():
-            step = follower.step(now, *self._samples(follower))
-            for joint, sample in step.desired.items():
-                self.drives[joint].follow(sample)
-            if step.outcome is not None:
-                yield name, step.outcome
-
-    def _lost(self, now: float) -> Iterator[tuple[str, TrajectoryOutcome]]:
-        """Yield the trajectories that end because one of their joints may not move."""
-        for name, follower in self.followers.items():
-            for joint in follower.joints:
-                drive = self.drives[joint]
-                if follower.is_moving and drive.condition.is_blocked:
-                    reason = f"joint '{joint}': {drive.condition.note or drive.mode}"
-                    if (outcome := follower.lose(joint, now, reason)) is not None:
-                        yield name, outcome
-
-    def _samples(self, follower: TrajectoryFollower) -> tuple[dict[str, JointSample], dict[str, JointSample]]:
-        """Return what is measured and what is commanded of the joints of a controller."""
-        drives = {name: self.drives[name] for name in follower.joints}
-        measured = {name: drive.measured for name, drive in drives.items()}
-        return measured, {name: drive.commanded for name, drive in drives.items()}
+    def _mimic(self) -> None:
+        """Let joints follow those which they mimic, with and without torque."""
+        for name, mimic in self.mimics.items():
+            drive, leader = self.drives[name], self.drives[mimic.joint]
+            if leader.has_torque:
+                at = leader.commanded
+                drive.follow(JointSample(mimic.multiplier * at.position + mimic.offset, mimic.multiplier * at.velocity))
+            elif drive.has_torque:
+                drive.relax()

@@ -3,106 +3,54 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from contextlib import ExitStack
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from rbxcompose.actuation.bus import ServoBus as Bus
-from rbxcompose.actuation.joint_drive import JointDrive, ServoJoint
 from rbxcompose.actuation.port_errors import PortError
+from rbxcompose.actuation.position_drive import PositionDrive
+from rbxcompose.actuation.preparation import prepare
 from rbxcompose.actuation.servo_cycle import ServoCycle
-from rbxcompose.actuation.servo_models import model_named
-from rbxcompose.control.joint_states import Enable, Hold, JointMode, JointPolicy, MoveTo, Relax
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.control.trajectory import (
-    TrajectoryGoal,
-    TrajectoryPoint,
-    TrajectoryPolicy,
-    TrajectoryRefusal,
-    TrajectoryTolerance,
-)
-from rbxcompose.control.trajectory_follower import TrajectoryFollower, TrajectoryOutcome
-from rbxcompose.control.trajectory_plan import JointRules
+from rbxcompose.actuation.servo_models import servo_models
+from rbxcompose.control.joint_states import Enable, Hold, JointMode, MoveTo
+from rbxcompose.controller_interface import LedJoint, controller_type
+from rbxcompose.controller_manager import ControllerManager
+from rbxcompose.controller_requests import ControllerState, ListControllers, SwitchControllers
 from rbxcompose.levels import Level
-from rbxcompose.msgs.builtin_interfaces import Duration
-from rbxcompose.msgs.control_msgs import FollowJointTrajectory
+from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.msgs.stamps import to_nanoseconds, to_time
+from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Float64, Header
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
-from rbxcompose.sdk import Component, Config, In, Out, Port, ServedGoal, Serves, ServesAction, component
+from rbxcompose.requests import Refused, answers
+from rbxcompose.sdk import Component, In, Out, Port, ServedGoal, Serves, ServesAction, component
+from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.component import Context
+from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, mimics_of
 from rbxcompose.twins.pseudo_terminal import pseudo_terminal
 from rbxcompose.twins.servo_fake import FakeServo
 from rbxcompose.twins.servo_twin import TwinBus
 
-Follow = FollowJointTrajectory
-NANOSECONDS = 1_000_000_000
 GONE = "the bus of servos has gone"
 REOPEN = 0.5  # [s] between attempts to find a port that has gone
 REPORT = 1.0  # [s] between reports to diagnostics
 PUBLISHED = 50.0  # [Hz] of joint states, at most
 
 
-class DrivenJointConfig(Config):
-    """A joint and its servo, in radians."""
-
-    id: int
-    """Id of the servo."""
-    model: str
-    """Model of the servo."""
-    neutral: int | None = None
-    """The tick at position 0; without it the middle of the range."""
-    invert: bool = False
-    """Whether it turns the other way round."""
-    lower: float | None = None
-    """Least position [rad]."""
-    upper: float | None = None
-    """Greatest position [rad]."""
-    velocity: float | None = None
-    """Largest speed [rad/s]."""
-    acceleration: float | None = None
-    """Largest acceleration [rad/s^2]."""
-
-
-class ControllerConfig(Config):
-    """A group of joints that follows trajectories."""
-
-    joints: list[str]
-    """Names of its joints."""
-
-
-class ServoBusConfig(Config):
-    """A bus of servos, its joints and its controllers."""
-
-    port: str = ""
-    """The serial port."""
-    baud: int = 1_000_000
-    """Bits per second."""
-    rate: float = 100.0
-    """Cycles per second."""
-    twin: Literal["", "servo", "pty"] = ""
-    """How its servos are simulated, if they are."""
-    on_shutdown: Literal["relax", "hold"] = "relax"
-    """What happens to torque at the end."""
-    joints: dict[str, DrivenJointConfig] = {}
-    """Joints by name."""
-    controllers: dict[str, ControllerConfig] = {}
-    """Controllers by name."""
-
-
 @component("servo_bus")
 class ServoBusDriver(Component[ServoBusConfig]):
-    """Reads and writes the servos of a bus, keeps their joints within limits, and follows trajectories.
+    """Reads and writes the servos of a bus, keeps their joints within limits, and runs controllers that lead them.
 
-    Each joint has a topic `JOINT/command` [rad], and the services `JOINT/relax` and `JOINT/enable`. A joint starts
-    relaxed; the first command switches its torque on, where it is. A controller serves the action
-    `NAME/follow_joint_trajectory`.
+    Each joint has a topic `JOINT/command` [rad], and the services `JOINT/relax`, `JOINT/enable` and `JOINT/set_speed`;
+    `BUS/relax_all` and `BUS/enable_all` are for all. A joint starts relaxed; the first command switches its torque on,
+    where it is.
 
     Example:
-        servos: {type: servo_bus, twin: servo, joints: {pan: {id: 1, model: AX-12}}}
+        servos: {type: servo_bus, twin: servo, joints: {pan: {servos: [{id: 1, model: AX-12}]}}}
     """
 
     made_by = "Each entry of `buses` runs one."
@@ -111,18 +59,26 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     @classmethod
     def ports(cls, config: ServoBusConfig) -> dict[str, Port[Any]]:
-        """Return the ports: for each joint, and for each controller."""
+        """Return the ports: for each joint, for all, and those of the controllers."""
         found = super().ports(config)
-        for name in config.joints:
-            found[f"{name}_command"] = In(Float64, f"{name}/command", qos="command", is_open=True).named(
-                f"{name}_command"
-            )
-            found[f"{name}_relax"] = Serves(Trigger, f"{name}/relax").named(f"{name}_relax")
-            found[f"{name}_enable"] = Serves(SetBool, f"{name}/enable").named(f"{name}_enable")
-        for name in config.controllers:
-            action = ServesAction(Follow, f"{name}/follow_joint_trajectory", claims=name, skill=name)
-            found[name] = action.named(name)
-        return found
+        found["relax_all"] = Serves(Trigger, f"{config.name}/relax_all")
+        found["enable_all"] = Serves(SetBool, f"{config.name}/enable_all")
+        for name, one in config.joints.items():
+            if one.mode == "position" and not one.mimic:
+                found[f"{name}_command"] = In(Float64, f"{name}/command", qos="command", is_open=True)
+                found[f"{name}_set_speed"] = Serves(SetSpeed, f"{name}/set_speed")
+            found[f"{name}_relax"] = Serves(Trigger, f"{name}/relax")
+            found[f"{name}_enable"] = Serves(SetBool, f"{name}/enable")
+        for name, setup in config.controllers.items():
+            ports = controller_type(setup.type).ports(name, setup.config)
+            found |= {f"{name}_{port}": one for port, one in ports.items()}
+        return {name: port.named(name) for name, port in found.items()}
+
+    @classmethod
+    def capabilities(cls, config: ServoBusConfig) -> tuple[Capability, ...]:
+        """Declare what its controllers can do."""
+        setups = config.controllers.items()
+        return tuple(one for name, each in setups for one in controller_type(each.type).capabilities(name, each.config))
 
     def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
         """Give the ports of joints and controllers their methods."""
@@ -130,39 +86,53 @@ class ServoBusDriver(Component[ServoBusConfig]):
         for joint in config.joints:
             setattr(self, f"on_{joint}_relax", partial(self.relax, joint))
             setattr(self, f"on_{joint}_enable", partial(self.enable, joint))
-        for controller in config.controllers:
-            setattr(self, f"accept_{controller}", self.accept)
+            setattr(self, f"on_{joint}_set_speed", partial(self.set_speed, joint))
+        self.owners: dict[str, tuple[str, str]] = {}  # the controller of a port, and the port's name there
+        for controller, setup in config.controllers.items():
+            for short, port in controller_type(setup.type).ports(controller, setup.config).items():
+                self.owners[f"{controller}_{short}"] = controller, short
+                if isinstance(port, ServesAction):
+                    setattr(self, f"accept_{controller}_{short}", partial(self.accept, controller, short))
+                elif isinstance(port, Serves):
+                    setattr(self, f"on_{controller}_{short}", partial(self.asked, controller, short))
 
     def configure(self) -> None:
         """Open the bus, real or simulated; nothing moves."""
         config, self.at_end = self.config, ExitStack()
-        joints = {name: servo_joint(name, one) for name, one in config.joints.items()}
         self.period = 1.0 / config.rate
-        policy = JointPolicy(cycle=self.period)
-        rules = {name: JointRules(one.limits, one.is_continuous) for name, one in joints.items()}
-        followers = {
-            name: TrajectoryFollower({joint: rules[joint] for joint in one.joints}, TrajectoryPolicy())
-            for name, one in config.controllers.items()
-        }
-        drives = {name: JointDrive(joint, policy) for name, joint in joints.items()}
-        self.cycle = ServoCycle(self.opened(list(joints.values())), drives, followers)
-        self.goals: dict[str, Any] = dict.fromkeys(config.controllers)
-        self.is_stopped, self.lost_at = False, -math.inf
+        drives, mimics = drives_of(config), mimics_of(config.joints)
+        self.cycle = ServoCycle(self.opened(), drives, mimics, config.watchdog, config.thermal.scope == "bus")
+        self.controllers = ControllerManager(
+            {
+                name: controller_type(one.type)(name, one.config, ControllerSeat(self, name, one.config.led))
+                for name, one in config.controllers.items()
+            }
+        )
+        self.is_stopped, self.lost_at = self.context.is_stopped, -math.inf
         self.told_at, self.published_at = -math.inf, -math.inf
+        self.is_parking = False
+        self.prepare()
 
-    def opened(self, joints: list[ServoJoint]) -> Bus:
+    def opened(self) -> Bus:
         """Return the bus: that of the port, or simulated servos."""
-        models = {joint.id: joint.model for joint in joints}
+        models = self.config.models
         if self.config.twin == "servo":
-            return TwinBus([FakeServo(one.name, id_) for id_, one in models.items()], lambda: self.now)
+            return TwinBus([FakeServo(model, id_) for id_, model in models.items()], lambda: self.now)
         path = self.config.port
         if self.config.twin == "pty":
-            path = self.at_end.enter_context(pseudo_terminal({id_: one.name for id_, one in models.items()}))
+            path = self.at_end.enter_context(pseudo_terminal(models))
         from rbxcompose.actuation.dynamixel_bus import DynamixelBus
 
-        bus = DynamixelBus(path, models, baud=self.config.baud, clock=lambda: self.now)
+        known = {id_: servo_models()[name] for id_, name in models.items()}
+        bus = DynamixelBus(path, known, baud=self.config.baud, clock=lambda: self.now)
         self.at_end.callback(bus.close)
         return bus
+
+    def prepare(self) -> None:
+        """Set the modes of the servos."""
+        joints = [drive.joint for drive in self.cycle.drives.values()]
+        for text in prepare(self.cycle.bus, joints, self.config.watchdog):
+            self.info(text)
 
     def activate(self) -> None:
         """Begin the cycles."""
@@ -180,72 +150,85 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.tell()
 
     def run_cycle(self) -> None:
-        """Take new goals, run the cycle, end goals that are over, and publish."""
+        """Run the cycle with all active controllers, and publish."""
         if self.lost_at > -math.inf:
             if self.now - self.lost_at < REOPEN:
                 return
             self.cycle.bus.reopen()
             for drive in self.cycle.drives.values():  # their servos have no torque now, and may be elsewhere
-                drive.ask(Relax())
+                drive.relax()
+            self.prepare()
             self.info(f"the port '{self.config.port}' is back")
             self.lost_at = -math.inf
-        for name in self.goals:
-            self.take(name)
-        for name, outcome in self.cycle.run(self.now, self.period).items():
-            self.end(name, outcome)
+        self.cycle.run(self.now, self.period, self.controllers.active)
         if self.now - self.published_at >= 1 / PUBLISHED - 1e-9:
             self.published_at = self.now
             self.publish()
 
-    def take(self, name: str) -> None:
-        """Take over the newest goal of a controller, or its cancellation."""
-        goal, follower = self.bound[name].current, self.cycle.followers[name]
-        if goal is not None and goal.cancel_requested:
-            follower.cancel(self.now)
-            self.goals[name] = None
-            goal.canceled(Follow.Result(error_string="canceled"))
-        elif goal is not None and goal is not self.goals[name]:
-            self.goals[name] = goal
-            answer = self.cycle.accept(name, trajectory_of(goal.request, self.now, self.stamp), self.now)
-            if isinstance(answer, TrajectoryRefusal):
-                self.goals[name] = None
-                goal.aborted(answer.message, Follow.Result(error_code=answer.code, error_string=answer.message))
+    # Controllers
 
-    def end(self, name: str, outcome: TrajectoryOutcome) -> None:
-        """End the goal of a controller as its trajectory ended."""
-        goal: ServedGoal[Any, Any, Any] | None = self.goals[name]
-        self.goals[name] = None
-        if goal is None:
-            return
-        result = Follow.Result(error_code=outcome.code, error_string=outcome.message)
-        if outcome.code == Follow.Result.SUCCESSFUL:
-            goal.succeeded(result)
-        else:
-            goal.aborted(outcome.message, result)
+    def accept(self, controller: str, port: str, goal: Any) -> str:
+        """Refuse what moves while the robot is stopped, or its bus has gone; else the controller decides."""
+        if not self.controllers.is_active(controller):
+            return f"controller '{controller}' is not active"
+        return self.refusal() or self.controllers.controllers[controller].accept(port, goal)
 
-    def accept(self, goal: Follow.Goal) -> str:
-        """Refuse what moves while the robot is stopped, or its bus has gone."""
-        return self.refusal()
+    def asked(self, controller: str, port: str, request: Any) -> Any:
+        """Pass a request on to a controller."""
+        return self.controllers.controllers[controller].asked(port, request)
+
+    @answers(ListControllers)
+    def listed(self, request: ListControllers) -> tuple[ControllerState, ...]:
+        """Return all controllers."""
+        return tuple(
+            ControllerState(name, one.type_name, self.controllers.is_active(name), one.config.led, one.note)
+            for name, one in self.controllers.controllers.items()
+        )
+
+    @answers(SwitchControllers)
+    def switch(self, request: SwitchControllers) -> str:
+        """Switch controllers, all at once or not at all."""
+        if objection := self.controllers.objection(request.on, request.off):
+            raise Refused(objection)
+        told = list(self.controllers.switch(request.on, request.off, self.now))
+        for text in told:
+            self.info(text)
+        return "; ".join(told) or "nothing changes"
+
+    # Joints
 
     def refusal(self) -> str:
         """Return why nothing may move now, or nothing."""
         return "the robot is stopped" if self.is_stopped else GONE if self.lost_at > -math.inf else ""
 
     def received(self, port: str, message: Any) -> None:
-        """Move one joint, unless a controller leads it."""
-        name = port.removesuffix("_command")
-        leader = next(
-            (one for one, each in self.cycle.followers.items() if name in each.joints and each.is_following), ""
-        )
-        reason = f"controller '{leader}' leads it" if leader else self.refusal()
-        if reason:
-            self.cycle.drives[name].refused = reason
+        """Pass a message on to its controller, or move one joint unless a controller leads it."""
+        if port in self.owners:
+            controller, short = self.owners[port]
+            if self.controllers.is_active(controller) and not self.refusal():
+                self.controllers.controllers[controller].received(short, message)
             return
-        self.cycle.drives[name].ask(MoveTo(message.data))
+        name = port.removesuffix("_command")
+        leader, drive = self.controllers.leader(name), self.cycle.drives[name]
+        drive.refused = f"controller '{leader}' leads it" if leader else self.refusal()
+        if not drive.refused:
+            drive.ask(MoveTo(message.data))
 
     def relax(self, name: str, request: Trigger.Request) -> Trigger.Response:
         """Switch the torque of a joint off, until its next command."""
-        self.cycle.drives[name].ask(Relax())
+        self.let_go(name)
+        return Trigger.Response(success=True)
+
+    def let_go(self, name: str) -> None:
+        """Relax a joint; a controller that leads it ends what it does, or it would have torque again at once."""
+        if leader := self.controllers.leader(name):
+            self.controllers.controllers[leader].halt(self.now, f"joint '{name}' was relaxed")
+        self.cycle.drives[name].relax()
+
+    def on_relax_all(self, request: Trigger.Request) -> Trigger.Response:
+        """Relax all joints."""
+        for name in self.cycle.drives:
+            self.let_go(name)
         return Trigger.Response(success=True)
 
     def enable(self, name: str, request: SetBool.Request) -> SetBool.Response:
@@ -253,8 +236,27 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.cycle.drives[name].ask(Enable(request.data))
         return SetBool.Response(success=True)
 
+    def on_enable_all(self, request: SetBool.Request) -> SetBool.Response:
+        """Enable all joints, or disable them."""
+        for drive in self.cycle.drives.values():
+            drive.ask(Enable(request.data))
+        return SetBool.Response(success=True)
+
+    def set_speed(self, name: str, request: SetSpeed.Request) -> SetSpeed.Response:
+        """Set how fast a joint moves by single commands, within its limits."""
+        drive = self.cycle.drives[name]
+        if not (math.isfinite(request.speed) and request.speed > 0.0):
+            return SetSpeed.Response(success=False, message=f"a speed of {request.speed} is none")
+        if isinstance(drive, PositionDrive):
+            drive.speed = request.speed
+        fastest = drive.joint.limits.speed
+        clamped = f"its limit is {fastest:g}" if request.speed > fastest else ""
+        return SetSpeed.Response(success=True, message=clamped)
+
+    # What is told
+
     def publish(self) -> None:
-        """Publish where the joints are."""
+        """Publish where the joints are, and what controllers know."""
         known = [one for one in self.cycle.drives.values() if math.isfinite(one.measured.position)]
         if known:
             self.joint_states(
@@ -263,18 +265,24 @@ class ServoBusDriver(Component[ServoBusConfig]):
                     name=tuple(one.joint.name for one in known),
                     position=np.array([one.measured.position for one in known]),
                     velocity=np.array([one.measured.velocity for one in known]),
+                    effort=np.array([one.effort for one in known]),
                 )
             )
+        for controller in self.controllers.active:
+            controller.publish()
 
     def tell(self) -> None:
         """Report to diagnostics."""
         drives = self.cycle.drives
         notes = {name: one.condition.note or one.refused for name, one in drives.items()}
+        notes |= {name: one.note for name, one in self.controllers.controllers.items()}
         notes = {name: words for name, words in notes.items() if words}
         bad = [name for name, one in drives.items() if one.mode in (JointMode.FAULT, JointMode.RESTING)]
         level = Level.ERROR if bad or self.lost_at > -math.inf else Level.WARN if notes else Level.OK
         message = "; ".join(f"{name}: {words}" for name, words in notes.items()) or f"{len(drives)} joints"
         self.status(level, message, **{name: one.mode for name, one in drives.items()})
+
+    # Stopping
 
     def lose(self, error: PortError) -> None:
         """Remember that the port has gone; trajectories end."""
@@ -284,9 +292,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.halt(GONE)
 
     def halt(self, reason: str) -> None:
-        """End all trajectories, and bring the joints to rest."""
-        for name, outcome in self.cycle.halt(self.now, reason).items():
-            self.end(name, outcome)
+        """End what all controllers do, and bring the joints to rest."""
+        for controller in self.controllers.active:
+            controller.halt(self.now, reason)
         for drive in self.cycle.drives.values():
             if drive.mode is JointMode.ACTIVE:
                 drive.ask(Hold())
@@ -312,57 +320,39 @@ class ServoBusDriver(Component[ServoBusConfig]):
     def cleanup(self) -> None:
         """Relax the joints, unless they are to hold, and give the port back."""
         try:
-            if self.config.on_shutdown == "relax":
+            if self.config.on_shutdown != "hold":
                 self.cycle.relax(self.now, self.period)
         except PortError as error:
             self.warn(f"the joints could not be relaxed: {error}")
         self.at_end.close()
 
 
-def servo_joint(name: str, config: DrivenJointConfig) -> ServoJoint:
-    """Return a joint with its servo. ValueError if there is no such model."""
-    model = model_named(config.model)
-    if model is None:
-        raise ValueError(f"no servo is called '{config.model}'")
-    neutral = model.family.centre if config.neutral is None else config.neutral
-    limits = MotionLimits(config.lower, config.upper, config.velocity, config.acceleration)
-    return ServoJoint(name, config.id, model, limits, neutral, config.invert)
+class ControllerSeat:
+    """What a controller uses of its bus: see `ControllerSite`."""
 
+    def __init__(self, bus: ServoBusDriver, name: str, joints: tuple[str, ...]) -> None:
+        self._bus, self._name = bus, name
+        self.joints: Mapping[str, LedJoint] = {joint: bus.cycle.drives[joint] for joint in joints}
 
-def trajectory_of(goal: Follow.Goal, now: float, stamp: int) -> TrajectoryGoal:
-    """Return a goal as the follower takes it; its stamp [ns] is by the clock of headers, a zero one is now."""
-    begin = to_nanoseconds(goal.trajectory.header.stamp)
-    points = tuple(
-        TrajectoryPoint(
-            seconds(one.time_from_start), tuple(one.positions), tuple(one.velocities), tuple(one.accelerations)
-        )
-        for one in goal.trajectory.points
-    )
-    paths = {one.name: one.position for one in goal.path_tolerance}
-    ends = {one.name: (one.position, one.velocity) for one in goal.goal_tolerance}
-    default = TrajectoryTolerance()
-    tolerances = {
-        name: TrajectoryTolerance(
-            allowed(paths.get(name, 0.0), default.path),
-            allowed(ends.get(name, (0.0, 0.0))[0], default.goal),
-            allowed(ends.get(name, (0.0, 0.0))[1], default.velocity),
-        )
-        for name in {*paths, *ends}
-    }
-    return TrajectoryGoal(
-        tuple(goal.trajectory.joint_names),
-        points,
-        now + (begin - stamp) / NANOSECONDS if begin else 0.0,
-        tolerances,
-        seconds(goal.goal_time_tolerance) or None,
-    )
+    @property
+    def now(self) -> float:
+        """Return robot time [s]."""
+        return self._bus.now
 
+    @property
+    def stamp(self) -> int:
+        """Return the time for message headers [ns]."""
+        return self._bus.stamp
 
-def allowed(written: float, default: float | None) -> float | None:
-    """Return a tolerance as ROS writes it: 0 is the default, a negative one is no limit."""
-    return default if written == 0.0 else None if written < 0.0 else written
+    def goal(self, port: str) -> ServedGoal[Any, Any, Any] | None:
+        """Return the current goal at one of the controller's ports."""
+        goal: ServedGoal[Any, Any, Any] | None = self._bus.bound[f"{self._name}_{port}"].current
+        return goal
 
+    def send(self, port: str, message: Any) -> None:
+        """Publish at one of the controller's ports."""
+        self._bus.bound[f"{self._name}_{port}"](message)
 
-def seconds(duration: Duration) -> float:
-    """Return a duration in seconds."""
-    return duration.sec + duration.nanosec / NANOSECONDS
+    def warn(self, text: str) -> None:
+        """Log something that a person should look at."""
+        self._bus.warn(f"controller '{self._name}': {text}")

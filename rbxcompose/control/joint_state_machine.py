@@ -21,6 +21,7 @@ from rbxcompose.control.joint_states import (
     JointMode,
     JointPolicy,
     JointRequest,
+    MoveAt,
     MoveTo,
     Pursue,
     Refuse,
@@ -90,8 +91,8 @@ class _Cycle:
                 self._switch_off()
             case Hold():
                 self._hold()
-            case MoveTo(position=position):
-                self._pursue(position)
+            case MoveTo() | MoveAt():
+                self._pursue(request)
 
     def note(self) -> str:
         """Return why the joint is as it is; empty if there is nothing to say."""
@@ -145,10 +146,10 @@ class _Cycle:
             self._switch_on()
         self._become(JointMode.HOLDING)
 
-    def _pursue(self, position: float) -> None:
+    def _pursue(self, request: MoveTo | MoveAt) -> None:
         if self.state.base not in WITH_TORQUE:
             self._switch_on()
-        self.actions.append(Pursue(position))
+        self.actions.append(Pursue(request))
         self._become(JointMode.ACTIVE)
 
     def _switch_on(self) -> None:
@@ -167,6 +168,8 @@ class _Cycle:
                 return ""
             case MoveTo(position=position) if not math.isfinite(position):
                 return f"the position {position} is not a finite number"
+            case MoveAt(velocity=velocity) if not math.isfinite(velocity):
+                return f"the velocity {velocity} is not a finite number"
             case _:
                 return self._block_reason() or self._age_reason()
 

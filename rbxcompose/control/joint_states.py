@@ -85,9 +85,18 @@ class MoveTo:
     """Follow a command: a position [rad or m]."""
 
     position: float
+    velocity: float | None = None
+    """With which it is to pass there, for a path [rad/s or m/s]; None stops there."""
 
 
-JointRequest = Enable | Relax | Hold | MoveTo
+@dataclass(frozen=True, slots=True)
+class MoveAt:
+    """Follow a command: a velocity [rad/s or m/s]."""
+
+    velocity: float
+
+
+JointRequest = Enable | Relax | Hold | MoveTo | MoveAt
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,9 +133,9 @@ class TorqueOff:
 
 @dataclass(frozen=True, slots=True)
 class Pursue:
-    """Hand a wanted position to the limiter."""
+    """Hand what is wanted to the limiter."""
 
-    position: float
+    request: MoveTo | MoveAt
 
 
 @dataclass(frozen=True, slots=True)

@@ -158,3 +158,36 @@ class SetBatteryLevel(Service["SetBatteryLevel.Request", "SetBatteryLevel.Respon
         TYPE: ClassVar[str] = "rbxcompose_msgs/srv/SetBatteryLevel_Response"
         HASH: ClassVar[str] = "RIHS01_fc8f512490bd24062400b1008921aa57d62e6e2fb0ad8add789ef1d0f4347ed5"
         FIELDS: ClassVar[Fields] = {}
+
+
+class SetSpeed(Service["SetSpeed.Request", "SetSpeed.Response"]):
+    """Set how fast a joint moves by single commands."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/srv/SetSpeed"
+    HASH: ClassVar[str] = "RIHS01_63d25211ce11e08fa5e6c1be6ccb2015ac4a7e4da7e8c7c6c9399e26e38812bb"
+
+    @dataclass(frozen=True, slots=True)
+    class Request(Message):
+        """Request of `SetSpeed`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/srv/SetSpeed_Request"
+        HASH: ClassVar[str] = "RIHS01_4d14ce7e2147ab93166b6431a7da8d63c6893fd71e2b0590defda6236e18f068"
+        FIELDS: ClassVar[Fields] = {
+            "speed": "float64",
+        }
+
+        speed: float = 0.0
+
+    @dataclass(frozen=True, slots=True)
+    class Response(Message):
+        """Response of `SetSpeed`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/srv/SetSpeed_Response"
+        HASH: ClassVar[str] = "RIHS01_20030845a56ae048731092e7fcda57213204caf71aa6915ad68214de58be5777"
+        FIELDS: ClassVar[Fields] = {
+            "success": "bool",
+            "message": "string",
+        }
+
+        success: bool = False
+        message: str = ""

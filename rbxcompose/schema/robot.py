@@ -11,13 +11,15 @@ from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.registry import sections as all_sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
 from rbxcompose.schema.components import component_schemas
+from rbxcompose.schema.controllers import controller_schemas
 from rbxcompose.schema.overlays import laid_over, or_removed
 from rbxcompose.schema.scalars import DEFINITIONS, Schema, quantities
 from rbxcompose.schema.settle import opened, schemas_of
 from rbxcompose.sections.components import components
+from rbxcompose.sections.controllers import controllers
 from rbxcompose.sections.profiles import profiles
 
-MADE_OTHERWISE = (components, profiles)  # made from more than one model
+MADE_OTHERWISE = (components, controllers, profiles)  # made from more than one model
 
 CHANGES = "changes"  # the definition of the changes that the sections of a file accept
 NAMES: Schema = {"pattern": "^[a-z][a-z0-9_]*$", "maxLength": 60}
@@ -35,8 +37,13 @@ def sections_of(types: Iterable[str]) -> Sections:
     """Return the sections of a robot that may use these types of components."""
     others = [one for one in all_sections() if one not in MADE_OTHERWISE]
     schemas, definitions = schemas_of({one.name: one.type for one in others})
-    entry, made = component_schemas(types)
-    schemas[components.name] = {"type": "object", "propertyNames": NAMES, "additionalProperties": entry}
+    made: dict[str, Schema] = {}
+    for name, (entry, needed) in {
+        components.name: component_schemas(types),
+        controllers.name: controller_schemas(),
+    }.items():
+        schemas[name] = {"type": "object", "propertyNames": NAMES, "additionalProperties": entry}
+        made |= needed
     return Sections({name: or_empty(opened(one, definitions)) for name, one in schemas.items()}, definitions | made)
 
 

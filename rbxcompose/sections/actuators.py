@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -99,6 +99,8 @@ class ActuatorModel(Config):
     """The tick at which its joint is at 0; without it the middle of its range."""
     invert: bool = False
     """Whether it turns the other way round than its joint."""
+    mode: Literal["position", "velocity"] = "position"
+    """Whether it is given positions, or velocities as a wheel or a spindle is."""
 
 
 def _details(read: Mapping[str, ActuatorModel]) -> dict[str, str]:

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Literal
 
 from pydantic import Field
 
 from rbxcompose.body.model import Body, BodyJoint
-from rbxcompose.config import Config, Frequency
+from rbxcompose.config import BitRate, Config, Frequency, Time
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, SetScope
 from rbxcompose.manifest.tree import key_span
 from rbxcompose.manifest.validate import MISSING_KEY
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
+from rbxcompose.manifest.written import as_written
 from rbxcompose.references import SERVO_BUS
 from rbxcompose.sections.actuators import ActuatorModel, actuators
 from rbxcompose.sections.body import body
 from rbxcompose.sections.controllers import controllers
-from rbxcompose.sections.joints import JointModel, joints
+from rbxcompose.sections.joints import JointModel, joints, table_of
+from rbxcompose.sections.safety import safety
+from rbxcompose.units import Quantity
 
 
 class BusOfServosModel(Config):
@@ -28,55 +32,81 @@ class BusOfServosModel(Config):
     """What speaks on it."""
     port: str = ""
     """The serial port, such as `/dev/ttyUSB0`; simulated servos need none."""
-    baud: int = Field(1_000_000, gt=0)
+    baud: BitRate = Field(1_000_000, gt=0)
     """Bits per second."""
     rate: Frequency = Field(100.0, gt=0, le=1000)
     """How often all joints are read and written."""
+    watchdog: Time = Field(0.2, ge=0)
+    """Silence after which servos stop by themselves, if their model can; 0 is never."""
     sim: Literal["servo", "pty"] = "servo"
     """How simulated servos answer: at once, or by bytes on a pseudo-terminal, through the driver of real ones."""
-    on_shutdown: Literal["relax", "hold"] = "relax"
-    """What happens to torque when the robot goes down."""
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     """Yield the component that drives the joints of each bus."""
     description, driven, servos = contents.of(body), contents.of(joints), contents.of(actuators)
+    known, care = description.body if description else Body(""), contents.of(safety)
     for name, bus in contents.of(buses).items():
-        own = {joint: one for joint, one in driven.items() if (to := servos.get(one.actuator)) and to.bus == name}
+        own = {joint: one for joint, one in driven.items() if _bus_of(one, servos) == name}
         if not own:
             continue
-        known = description.body if description else Body("")
         config = {
+            "name": name,
             "port": bus.port,
-            "baud": bus.baud,
+            "baud": round(bus.baud),
             "rate": bus.rate,
+            "watchdog": bus.watchdog,
             "twin": bus.sim if contents.is_simulated else "",
-            "on_shutdown": bus.on_shutdown,
-            "joints": {joint: _joint(known.joints.get(joint), one, servos[one.actuator]) for joint, one in own.items()},
+            "on_start": care.on_start,
+            "on_shutdown": care.on_shutdown,
+            "park": {joint: one.value for joint, one in care.park.items() if joint in own},
+            "start_speed": care.start_speed,
+            "thermal": care.thermal.model_dump(),
+            "joints": {
+                joint: _joint(known.joints.get(joint), one, [servos[each] for each in one.servos])
+                for joint, one in own.items()
+            },
             "controllers": {
-                controller: {"joints": list(one.joints)}
+                controller: {"type": one.type, "settings": as_written(one)}
                 for controller, one in contents.of(controllers).items()
-                if set(one.joints) <= own.keys()
+                if set(one.led) <= own.keys()
             },
         }
         yield WantedComponent(name, "servo_bus", config, ("buses", name))
 
 
-def _joint(joint: BodyJoint | None, driven: JointModel, servo: ActuatorModel) -> Mapping[str, object]:
+def _bus_of(joint: JointModel, servos: Mapping[str, ActuatorModel]) -> str:
+    """Return the bus of a joint's servos; empty if one of them has mistakes."""
+    return servos[joint.servos[0]].bus if all(one in servos for one in joint.servos) else ""
+
+
+def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorModel]) -> dict[str, object]:
     """Return how a joint is driven, within the limits of the body."""
-    least, greatest = driven.limits.position or (None, None)
+    limits = driven.limits
+    least, greatest = [one.value for one in limits.position] if limits.position else (None, None)
+    is_continuous = joint is not None and joint.kind == "continuous"
     outer = joint.limits if joint else None
-    is_bounded = outer is not None and joint is not None and joint.kind != "continuous"
+    is_bounded = outer is not None and not is_continuous
+    mimic = joint.mimic if joint else None
     return {
-        "id": servo.id,
-        "model": servo.model,
-        "neutral": servo.neutral,
-        "invert": servo.invert,
+        "servos": [{"id": one.id, "model": one.model, "neutral": one.neutral, "invert": one.invert} for one in servos],
+        "mode": servos[0].mode,
+        "ratio": math.tau / driven.travel if driven.travel else driven.ratio,
+        "offset": driven.offset,
+        "calibration": table_of(driven),
+        "is_continuous": is_continuous,
         "lower": _tighter(max, outer.lower if outer and is_bounded else None, least),
         "upper": _tighter(min, outer.upper if outer and is_bounded else None, greatest),
-        "velocity": _tighter(min, outer.velocity if outer else None, driven.limits.velocity),
-        "acceleration": driven.limits.acceleration,
+        "velocity": _tighter(min, outer.velocity if outer else None, _value(limits.velocity)),
+        "acceleration": _value(limits.acceleration),
+        "mimic": mimic.joint if mimic else "",
+        "multiplier": mimic.multiplier if mimic else 1.0,
+        "mimic_offset": mimic.offset if mimic else 0.0,
     }
+
+
+def _value(quantity: Quantity | None) -> float | None:
+    return None if quantity is None else quantity.value
 
 
 def _tighter(pick: Callable[[float, float], float], outer: float | None, inner: float | None) -> float | None:

@@ -1,17 +1,17 @@
-"""The section `controllers`: what leads groups of joints."""
+"""The section `controllers`: what leads joints."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Literal
+from collections.abc import Iterator, Mapping
 
-from pydantic import Field
-
-from rbxcompose.config import Config, JointName
-from rbxcompose.findings import Finding, kind
+from rbxcompose.config import Config
+from rbxcompose.controller_interface import ControllerConfig, controller_names, controller_type
+from rbxcompose.findings import Finding, Related, Span, kind
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Reading
-from rbxcompose.manifest.tree import value_span
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
+from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
+from rbxcompose.plugins import BROKEN, BrokenPluginError
 from rbxcompose.references import CONTROLLER
 from rbxcompose.sections.actuators import actuators
 from rbxcompose.sections.joints import joints
@@ -20,26 +20,72 @@ NOT_DRIVEN = kind(
     "RBX2215",
     """A controller leads a joint that it cannot drive
 
-Each joint of a controller has a servo, and the servos of one controller are on one bus.
+Each joint of a controller has a servo of the right mode, and the servos of one controller are on one bus.
 
 Bad: a controller with the joint `tilt_joint`, which `joints:` does not have.
 Good: `tilt_joint: {actuator: tilt_servo}` under `joints:`.
 """,
 )
+CLAIMED_TWICE = kind(
+    "RBX2220",
+    """Two controllers lead the same joint from the start
+
+Both would move it at once. One of them can wait with `start: inactive` until `rbxcompose controller switch` makes it
+active.
+
+Bad: `head` and `gaze`, both with `joints: [pan_joint]`.
+Good: `gaze: {type: joint_command, joints: [pan_joint], start: inactive}`
+""",
+)
+NAME_OF_JOINT = kind(
+    "RBX2221",
+    """A controller has the name of a joint
+
+Both have topics and services below their name, such as `NAME/command`, and nobody could tell them apart.
+
+Bad: a controller `lift_joint`, which leads the joint `lift_joint`.
+Good: a controller `lift`.
+""",
+)
+CANNOT_WORK = kind(
+    "RBX2222",
+    """A controller cannot work with its settings
+
+Each value is permitted, but together they describe nothing that can be: fingers that open farther than they reach, a
+base without an extent.
+
+Bad: `hand: {type: gripper, ..., finger_length: 2 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
+Good: `hand: {type: gripper, ..., finger_length: 6 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
+""",
+)
 
 
-class ControllerModel(Config):
-    """Leads joints together."""
+def _models(node: TreeNode) -> Iterator[type[Config]]:
+    """Yield the configuration of the type, if that is written down and known."""
+    written = at(node, ("type",))
+    name = written.text if isinstance(written, ScalarNode) else ""
+    try:
+        yield controller_type(name).config_type() if name in controller_names() else ControllerConfig
+    except BrokenPluginError:  # told where the section is read
+        yield ControllerConfig
 
-    type: Literal["joint_trajectory"]
-    """How: `joint_trajectory` follows trajectories, by the action `NAME/follow_joint_trajectory`."""
-    joints: list[JointName] = Field(min_length=1)
-    """The joints that it leads."""
+
+def _details(read: Mapping[str, ControllerConfig]) -> dict[str, str]:
+    return {name: f"{one.type} of {', '.join(one.led)}" for name, one in read.items()}
 
 
-@section("controllers", ControllerModel, order=34, names=CONTROLLER, entry="controller")
-def controllers(reading: Reading[ControllerModel]) -> dict[str, ControllerModel]:
-    """What leads groups of joints, by name. A controller is a skill of missions.
+@section(
+    "controllers",
+    ControllerConfig,
+    order=34,
+    names=CONTROLLER,
+    entry="controller",
+    needs="type",
+    models=_models,
+    details=_details,
+)
+def controllers(reading: Reading[ControllerConfig]) -> dict[str, ControllerConfig]:
+    """What leads joints, by name: a `type`, and the settings of that type. A controller is a skill of missions.
 
     Example:
         body:
@@ -56,24 +102,96 @@ def controllers(reading: Reading[ControllerModel]) -> dict[str, ControllerModel]
             type: joint_trajectory
             joints: [pan_joint]
     """
-    found = reading.entries()
-    wrong = {name: finding for name, one in found.items() if (finding := _undriven(reading, name, one))}
-    reading.report.extend(wrong.values())
-    return {name: one for name, one in found.items() if name not in wrong}
+    found: dict[str, ControllerConfig] = {}
+    owners: dict[str, tuple[str, Span]] = {}
+    for name, entry in reading.named():
+        config = _read(reading, name, entry)
+        wrong = None if config is None else next(_mistakes(reading, name, config, owners), None)
+        if wrong is not None:
+            reading.report.add(wrong)
+        elif config is not None:
+            found[name] = config
+    return found
 
 
-def _undriven(reading: Reading[ControllerModel], name: str, one: ControllerModel) -> Finding | None:
+def _read(reading: Reading[ControllerConfig], name: str, entry: Entry) -> ControllerConfig | None:
+    """Return a controller's settings, None after findings."""
+    written = at(entry.value, ("type",))
+    names = controller_names()
+    if not isinstance(entry.value, MappingNode) or not isinstance(written, ScalarNode):
+        if isinstance(entry.value, MappingNode) and written is None:
+            reading.report.add(MISSING_KEY.at(entry.key.span, f"controller '{name}' needs the key 'type'"))
+        else:
+            reading.valid(ControllerConfig, name, entry.value)
+        return None
+    if written.text not in names:
+        reading.report.add(not_a_choice(written.span, "type", written, names))
+        return None
+    try:
+        return reading.valid(controller_type(written.text).config_type(), name, entry.value)
+    except BrokenPluginError as error:
+        reading.report.add(BROKEN.at(written.span, str(error)))
+        return None
+
+
+def _mistakes(
+    reading: Reading[ControllerConfig], name: str, one: ControllerConfig, owners: dict[str, tuple[str, Span]]
+) -> Iterator[Finding]:
+    root = reading.contents.root
+    here, cls = key_span(root, ("controllers", name)), controller_type(one.type)
+    yield from _undriven(reading, name, one)
+    if name in reading.contents.of(joints):
+        yield NAME_OF_JOINT.at(here, f"'{name}' is a joint and a controller")
+    if (mistake := cls.mistake(one)) is not None:
+        field, reason = mistake
+        yield CANNOT_WORK.at(key_span(root, ("controllers", name, field)), f"controller '{name}': {reason}")
+    for joint in one.led if one.start == "active" else ():
+        other, span = owners.setdefault(joint, (name, here))
+        if other != name:
+            message = f"controllers '{other}' and '{name}' both lead '{joint}' from the start"
+            help_text = "give one of them 'start: inactive'"
+            yield CLAIMED_TWICE.at(here, message, help=help_text, related=[Related(span, "the other one")])
+
+
+def _undriven(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
     driven, servos = reading.contents.of(joints), reading.contents.of(actuators)
     if not driven and "joints" in reading.contents.root:
-        return None  # they have mistakes, which are told
-    buses: Mapping[str, int] = {}
-    for index, joint in enumerate(one.joints):
-        span = value_span(reading.contents.root, ("controllers", name, "joints", index))
+        return  # they have mistakes, which are told
+    wanted, buses = controller_type(one.type).interface, set[str]()
+    for joint in one.led:
+        span = _place(reading, name, joint)
         if joint not in driven:
+            if joint in _written(reading):
+                return  # it has a mistake, which is told
             message = f"the controller '{name}' leads '{joint}', which no servo drives"
-            return NOT_DRIVEN.misspelt(span, message, joint, driven, "joints with a servo")
-        if (servo := servos.get(driven[joint].actuator)) is not None:
-            buses = {servo.bus: index, **buses}
+            yield NOT_DRIVEN.misspelt(span, message, joint, driven, "joints with a servo")
+            return
+        for servo in (servos[each] for each in driven[joint].servos if each in servos):
+            buses.add(servo.bus)
+            if servo.mode != wanted:
+                given, taken = _PLURAL[wanted], _PLURAL[servo.mode]
+                message = f"the controller '{name}' gives {given}, and the servos of '{joint}' take {taken}"
+                yield NOT_DRIVEN.at(span, message, help=f"give the actuator 'mode: {wanted}'")
         if len(buses) > 1:
-            return NOT_DRIVEN.at(span, f"the joints of the controller '{name}' are on two buses: {', '.join(buses)}")
-    return None
+            yield NOT_DRIVEN.at(
+                span, f"the joints of the controller '{name}' are on two buses: {', '.join(sorted(buses))}"
+            )
+
+
+_PLURAL = {"position": "positions", "velocity": "velocities"}
+
+
+def _written(reading: Reading[ControllerConfig]) -> Mapping[str, object]:
+    node = reading.contents.root.get("joints")
+    return node.entries if isinstance(node, MappingNode) else {}
+
+
+def _place(reading: Reading[ControllerConfig], name: str, joint: str) -> Span:
+    """Return where a controller names a joint."""
+    node = at(reading.contents.root, ("controllers", name))
+    for key, entry in node.entries.items() if isinstance(node, MappingNode) else ():
+        items = [entry.value, *getattr(entry.value, "items", ())] if not isinstance(entry.value, MappingNode) else []
+        for item in items:
+            if isinstance(item, ScalarNode) and item.text == joint and key != "type":
+                return item.span
+    return value_span(reading.contents.root, ("controllers", name))

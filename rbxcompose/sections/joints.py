@@ -1,40 +1,125 @@
-"""The section `joints`: which servo turns which joint of the body."""
+"""The section `joints`: which servos turn which joint of the body."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import PlainValidator, WithJsonSchema
 
-from rbxcompose.config import Angle, AngularAcceleration, AngularSpeed, Config, JointName, Name
+from rbxcompose.body.model import BodyJoint
+from rbxcompose.config import Angle, Config, JointName, Length, Name
+from rbxcompose.control.calibration import Calibration
+from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Reading
+from rbxcompose.manifest.tree import KeyPath, key_span, value_span
+from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE
 from rbxcompose.references import ACTUATOR, Refers
+from rbxcompose.sections.actuators import ActuatorModel, actuators
+from rbxcompose.sections.body import body
+from rbxcompose.units import (
+    ACCELERATION,
+    ANGLE,
+    ANGULAR_ACCELERATION,
+    ANGULAR_SPEED,
+    LENGTH,
+    SPEED,
+    Dimension,
+    Quantity,
+    UnitError,
+    example,
+    parse_quantity,
+)
+
+NOT_TOGETHER = kind(
+    "RBX2216",
+    """Servos and their joint do not fit together
+
+A joint that slides needs to know how far it goes for each turn of its servo: `travel`, or a `calibration`. Servos that
+drive one joint together are on one bus and have one mode, and no servo drives two joints.
+
+Bad: `lift_joint: {actuator: lift_servo}`, where `lift_joint` slides.
+Good: `lift_joint: {actuator: lift_servo, travel: 8 mm}`
+""",
+)
+DOES_NOT_MOVE = kind(
+    "RBX2217",
+    """A servo is to move a joint that does not move
+
+In the URDF the joint is fixed, or floats. Either another joint is meant, or the URDF has the wrong type.
+
+Bad: `camera_joint: {actuator: pan_servo}`, where the URDF has `<joint name="camera_joint" type="fixed">`.
+Good: `pan_joint: {actuator: pan_servo}`, where the URDF has `<joint name="pan_joint" type="revolute">`.
+""",
+)
+
+
+def _either(turning: Dimension, sliding: Dimension) -> PlainValidator:
+    """Return what reads a quantity of a joint that turns or slides."""
+
+    def read(value: object) -> Quantity:
+        read = value if isinstance(value, Quantity) else parse_quantity(value) if isinstance(value, str) else None
+        if read is None or read.dimension not in (turning, sliding):
+            raise UnitError(f"must be {turning.phrase} or {sliding.phrase}, such as '{example(turning)}'")
+        return read
+
+    shape = {"anyOf": [{"x-dimension": turning.name}, {"x-dimension": sliding.name}]}
+    return PlainValidator(read, json_schema_input_type=Annotated[Any, WithJsonSchema(shape)])
+
+
+JointPosition = Annotated[Quantity, _either(ANGLE, LENGTH)]
+JointSpeed = Annotated[Quantity, _either(ANGULAR_SPEED, SPEED)]
+JointAcceleration = Annotated[Quantity, _either(ANGULAR_ACCELERATION, ACCELERATION)]
 
 
 class DrivenLimitsModel(Config):
-    """Limits of a joint; those of the body hold, too."""
+    """Limits of a joint; those of the body hold, too. Those of a joint that slides are lengths."""
 
-    position: tuple[Angle, Angle] | None = None
+    position: tuple[JointPosition, JointPosition] | None = None
     """Least and greatest position."""
-    velocity: AngularSpeed | None = Field(None, gt=0)
+    velocity: JointSpeed | None = None
     """Largest speed."""
-    acceleration: AngularAcceleration | None = Field(None, gt=0)
+    acceleration: JointAcceleration | None = None
     """Largest acceleration."""
+
+
+class CalibrationPointModel(Config):
+    """Where a joint is at an angle of its servo."""
+
+    servo: Angle
+    """Angle of the servo."""
+    joint: JointPosition
+    """Position of the joint."""
 
 
 class JointModel(Config):
     """A joint that is driven."""
 
-    actuator: Annotated[Name, Refers(ACTUATOR)]
+    actuator: Annotated[Name, Refers(ACTUATOR)] | None = None
     """The servo that turns it."""
+    actuators: list[Annotated[Name, Refers(ACTUATOR)]] = []
+    """Several servos that turn it together, instead of one."""
+    ratio: float = 1.0
+    """Turns of its servo for each turn of the joint."""
+    offset: Angle = 0.0
+    """Position of the joint when its servo is at the neutral tick."""
+    travel: Length | None = None
+    """How far a joint that slides goes for each turn of its servo."""
+    calibration: list[CalibrationPointModel] = []
+    """Measured angles of the servo and positions of the joint, instead of a ratio; straight lines between them."""
     limits: DrivenLimitsModel = DrivenLimitsModel()
     """Limits, tighter than those of the body."""
+
+    @property
+    def servos(self) -> list[str]:
+        """Return the names of its servos."""
+        return [*([self.actuator] if self.actuator else []), *self.actuators]
 
 
 @section("joints", dict[JointName, JointModel], order=33, shared=((),))
 def joints(reading: Reading[dict[str, JointModel]]) -> dict[str, JointModel]:
-    """Which joints of the body are driven, by their names in the URDF: the servo of each, and its limits.
+    """Which joints of the body are driven, by their names in the URDF: the servos of each, and its limits.
 
     Example:
         body:
@@ -51,4 +136,83 @@ def joints(reading: Reading[dict[str, JointModel]]) -> dict[str, JointModel]:
               position: [-90 deg, 90 deg]
               velocity: 90 deg/s
     """
-    return reading.whole() or {}
+    found, known = reading.whole() or {}, reading.contents.of(body)
+    there = known.body.joints if known else {}
+    wrong: dict[str, Finding] = {}
+    users: dict[str, str] = {}
+    for name, one in found.items():
+        finding = next(_mistakes(reading, name, one, there.get(name), users), None)
+        if finding is not None:
+            wrong[name] = finding
+    reading.report.extend(wrong.values())
+    return {name: one for name, one in found.items() if name not in wrong}
+
+
+def _mistakes(
+    reading: Reading[dict[str, JointModel]], name: str, one: JointModel, joint: BodyJoint | None, users: dict[str, str]
+) -> Iterator[Finding]:
+    root = reading.contents.root
+    at = key_span(root, ("joints", name))
+    if not one.servos:
+        yield MISSING_KEY.at(at, f"joint '{name}' needs the key 'actuator'")
+    yield from _servos(reading, name, one, users)
+    if joint is None:
+        return
+    if not joint.moves:
+        yield DOES_NOT_MOVE.at(at, f"joint '{name}' is {joint.kind} in the body, so no servo can move it")
+    slides = joint.kind == "prismatic"
+    if slides and one.travel is None and not one.calibration:
+        yield NOT_TOGETHER.at(at, f"joint '{name}' slides: it needs 'travel' or 'calibration'")
+    if not slides and one.travel is not None:
+        span = value_span(root, ("joints", name, "travel"))
+        yield NOT_TOGETHER.at(span, f"joint '{name}' turns: 'travel' is for joints that slide")
+    for path, written in _quantities(one):
+        if written.dimension not in ((LENGTH, SPEED, ACCELERATION) if slides else _TURNING):
+            words = "slides" if slides else "turns"
+            span = value_span(root, ("joints", name, *path))
+            yield WRONG_TYPE.at(span, f"joint '{name}' {words}, and this is {written.dimension.phrase}")
+    if one.calibration and (reason := _no_table(one)):
+        yield NOT_TOGETHER.at(key_span(root, ("joints", name, "calibration")), reason)
+
+
+_TURNING = (ANGLE, ANGULAR_SPEED, ANGULAR_ACCELERATION)
+
+
+def _servos(
+    reading: Reading[dict[str, JointModel]], name: str, one: JointModel, users: dict[str, str]
+) -> Iterator[Finding]:
+    known = reading.contents.of(actuators)
+    at = key_span(reading.contents.root, ("joints", name))
+    there: Mapping[str, ActuatorModel] = {servo: known[servo] for servo in one.servos if servo in known}
+    for servo in one.servos:
+        if (other := users.setdefault(servo, name)) != name:
+            yield NOT_TOGETHER.at(at, f"the servo '{servo}' drives '{other}' and '{name}'")
+    for what in ("bus", "mode"):
+        values = sorted({str(getattr(servo, what)) for servo in there.values()})
+        if len(values) > 1:
+            yield NOT_TOGETHER.at(at, f"the servos of joint '{name}' differ in their {what}: {', '.join(values)}")
+
+
+def _quantities(one: JointModel) -> Iterator[tuple[KeyPath, Quantity]]:
+    limits = one.limits
+    for index, position in enumerate(limits.position or ()):
+        yield ("limits", "position", index), position
+    for name in ("velocity", "acceleration"):
+        if (value := getattr(limits, name)) is not None:
+            yield ("limits", name), value
+    for index, point in enumerate(one.calibration):
+        yield ("calibration", index, "joint"), point.joint
+
+
+def _no_table(one: JointModel) -> str:
+    """Return why the calibration is none, or nothing."""
+    try:
+        Calibration(table_of(one))
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def table_of(one: JointModel) -> tuple[tuple[float, float], ...]:
+    """Return the calibration: angles of the servo and positions of the joint, in SI."""
+    return tuple(sorted((point.servo, point.joint.value) for point in one.calibration))

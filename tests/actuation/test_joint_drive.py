@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.joint_drive import JointDrive, ServoJoint
+from rbxcompose.actuation.position_drive import PositionDrive
 from rbxcompose.actuation.servo_cycle import ServoCycle
+from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
 from rbxcompose.actuation.servo_models import model_named, servo_models
 from rbxcompose.control.joint_states import Enable, JointMode, JointPolicy, MoveTo, Relax
 from rbxcompose.control.limits import MotionLimits
@@ -30,7 +31,7 @@ def joint(model: str = "AX-12", *, is_inverted: bool = False, neutral: int | Non
     found = model_named(model)
     assert found
     middle = found.family.centre if neutral is None else neutral
-    return ServoJoint("pan", 1, found, LIMITS, middle, is_inverted)
+    return ServoJoint("pan", (JointServo(1, found, middle, is_inverted),), LIMITS)
 
 
 class Driven:
@@ -38,7 +39,7 @@ class Driven:
 
     def __init__(self, model: str = "AX-12") -> None:
         self.now = 0.0
-        self.drive = JointDrive(joint(model), JointPolicy(cycle=PERIOD))
+        self.drive = PositionDrive(joint(model), JointPolicy(cycle=PERIOD))
         self.bus = TwinBus([FakeServo(model, 1)], lambda: self.now)
         self.cycle = ServoCycle(self.bus, {"pan": self.drive})
 
@@ -60,9 +61,10 @@ class Driven:
 @pytest.mark.parametrize("is_inverted", [False, True])
 def test_each_tick_is_the_tick_of_its_angle(name: str, is_inverted: bool) -> None:
     one = joint(name, is_inverted=is_inverted, neutral=100)
-    assert all(one.raw(one.position(tick)) == tick for tick in range(one.model.family.ticks))
-    assert (one.position(101) < 0) == is_inverted
-    assert one.position(100) == 0.0
+    ticks = range(one.servo(1).model.family.ticks)
+    assert all(one.raws(one.positions({1: tick})[1]) == {1: tick} for tick in ticks)
+    assert (one.positions({1: 101})[1] < 0) == is_inverted
+    assert one.positions({1: 100}) == {1: 0.0}
 
 
 def test_a_joint_starts_without_torque_and_moves_from_where_it_is() -> None:
@@ -76,7 +78,7 @@ def test_a_joint_starts_without_torque_and_moves_from_where_it_is() -> None:
     assert driven.servo.get("torque_enable") == 1
     assert abs(driven.servo.get("goal_position") - 600) < 5  # not where an old goal was
     driven.run(200)
-    assert driven.drive.measured.position == pytest.approx(start + 0.5, abs=driven.drive.joint.model.per_tick)
+    assert driven.drive.measured.position == pytest.approx(start + 0.5, abs=driven.drive.per_tick)
 
 
 @settings(max_examples=60)
@@ -84,14 +86,14 @@ def test_a_joint_starts_without_torque_and_moves_from_where_it_is() -> None:
 def test_whatever_is_asked_the_goal_keeps_to_the_limits(asked: list[list[MoveTo | Relax | Enable]], start: int) -> None:
     driven = Driven()
     driven.servo.move_to(start)
-    tick = driven.drive.joint.model.per_tick
+    tick = driven.drive.per_tick
     goals: list[float] = []
     for each in asked:
         for request in each:
             driven.drive.ask(request)
         driven.run()
         has_torque = driven.drive.mode in (JointMode.HOLDING, JointMode.ACTIVE)
-        goals = [*goals, driven.drive.joint.position(driven.servo.get("goal_position"))] if has_torque else []
+        goals = [*goals, driven.drive.joint.positions({1: driven.servo.get("goal_position")})[1]] if has_torque else []
         if not driven.drive.condition.is_enabled:
             assert driven.servo.get("torque_enable") == 0
         if len(goals) > 1:
@@ -102,16 +104,16 @@ def test_whatever_is_asked_the_goal_keeps_to_the_limits(asked: list[list[MoveTo 
 
 def test_the_same_cycle_drives_servos_by_bytes() -> None:
     one = joint()
-    with pseudo_terminal({1: "AX-12"}) as path, DynamixelBus(path, {1: one.model}) as bus:
-        drive = JointDrive(one, JointPolicy(cycle=PERIOD))
+    with pseudo_terminal({1: "AX-12"}) as path, DynamixelBus(path, {1: one.servo(1).model}) as bus:
+        drive = PositionDrive(one, JointPolicy(cycle=PERIOD))
         cycle = ServoCycle(bus, {"pan": drive})
         begin = time.monotonic()
         while drive.mode is not JointMode.RELAXED and time.monotonic() < begin + 5:
             cycle.run(time.monotonic(), PERIOD)
         drive.ask(MoveTo(0.2))
-        while abs(drive.measured.position - 0.2) > one.model.per_tick and time.monotonic() < begin + 10:
+        while abs(drive.measured.position - 0.2) > one.per_tick and time.monotonic() < begin + 10:
             cycle.run(time.monotonic(), PERIOD)
-        assert drive.measured.position == pytest.approx(0.2, abs=one.model.per_tick)
+        assert drive.measured.position == pytest.approx(0.2, abs=one.per_tick)
         cycle.relax(time.monotonic(), PERIOD)
         assert bus.read([1], ["torque_enable"])[1].values["torque_enable"] == 0
 
@@ -146,7 +148,9 @@ def test_a_hot_joint_rests_without_torque_until_it_has_cooled_down() -> None:
 
 def test_a_joint_is_not_enabled_while_its_servo_still_reports_an_error() -> None:
     driven = Driven("XL430-W250")
-    other = JointDrive(replace(driven.drive.joint, name="tilt", id=2), JointPolicy(cycle=PERIOD))
+    other = PositionDrive(
+        ServoJoint("tilt", (replace(driven.drive.joint.servo(1), id=2),), LIMITS), JointPolicy(cycle=PERIOD)
+    )
     driven.bus = TwinBus([FakeServo("XL430-W250", id_) for id_ in (1, 2)], lambda: driven.now)
     driven.cycle = ServoCycle(driven.bus, {"pan": driven.drive, "tilt": other})  # errors are read in turns
     driven.run(3)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from rbxcompose.actuation.port_errors import LostPortError
-from rbxcompose.components.servo_bus import ServoBusConfig
 from rbxcompose.msgs.builtin_interfaces import Duration
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -17,15 +16,21 @@ from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Ended, Outcome
+from rbxcompose.servo_bus_config import ServoBusConfig
 from rbxcompose.testing import Bench, instance
 
 Follow = FollowJointTrajectory
 TICK = 0.00512  # [rad] of an AX-12
-JOINT = {"model": "AX-12", "lower": -2.0, "upper": 2.0, "velocity": 1.5, "acceleration": 8.0}
+LIMITS = {"lower": -2.0, "upper": 2.0, "velocity": 1.5, "acceleration": 8.0}
 CONFIG: dict[str, Any] = {
     "twin": "servo",
-    "joints": {"pan": {**JOINT, "id": 1}, "tilt": {**JOINT, "id": 2, "invert": True}},
-    "controllers": {"head": {"joints": ["pan", "tilt"]}},
+    "joints": {
+        "pan": {**LIMITS, "servos": [{"id": 1, "model": "AX-12"}]},
+        "tilt": {**LIMITS, "servos": [{"id": 2, "model": "AX-12", "invert": True}]},
+    },
+    "controllers": {
+        "head": {"type": "joint_trajectory", "settings": {"type": "joint_trajectory", "joints": ["pan", "tilt"]}}
+    },
 }
 
 

@@ -147,8 +147,8 @@ def test_a_command_switches_torque_on_only_behind_the_measured_position_as_goal(
     bench = Bench()
     assert bench.step() == (TorqueOff(),)
     assert bench.mode() == JointMode.RELAXED
-    assert bench.step(MoveTo(1.0)) == (WriteGoal(0.3), TorqueOn(), Pursue(1.0))
-    assert bench.step(MoveTo(1.1)) == (Pursue(1.1),)
+    assert bench.step(MoveTo(1.0)) == (WriteGoal(0.3), TorqueOn(), Pursue(MoveTo(1.0)))
+    assert bench.step(MoveTo(1.1)) == (Pursue(MoveTo(1.1)),)
 
 
 def test_a_joint_that_is_unknown_refuses_commands() -> None:
@@ -168,7 +168,7 @@ def test_the_next_command_after_relax_switches_torque_on_again() -> None:
     assert bench.step(Relax()) == (TorqueOff(),)
     assert bench.mode() == JointMode.RELAXED
     bench.position = 0.7
-    assert bench.step(MoveTo(1.0)) == (WriteGoal(0.7), TorqueOn(), Pursue(1.0))
+    assert bench.step(MoveTo(1.0)) == (WriteGoal(0.7), TorqueOn(), Pursue(MoveTo(1.0)))
 
 
 def test_a_disabled_joint_refuses_commands_until_it_is_enabled() -> None:

@@ -53,8 +53,13 @@ ABOVE = {
     "cli": "actuation body bus compiler composition doctor executive.requests finding_pages inspection lsp.server "
     "mission_tests missions model params plan recording rendering replay runtime scaffold schema.documents sdk "
     "sections",
+    "controller_interface": "control sdk",
+    "controller_manager": "controller_interface",
+    "controller_requests": "",
+    "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
-    "components": "actuation body control diagnostics executive missions mux.core navigation.go_to sdk sim twins",
+    "components": "actuation body control controller_interface controller_manager controller_requests diagnostics "
+    "executive missions mux.core navigation.go_to sdk servo_bus_config sim twins",
     "composition": "body.description sections",
     "control": "",
     "diagnostics": "",
@@ -75,9 +80,10 @@ ABOVE = {
     "replay": "bus plan.model recording runtime.process_group runtime.records sdk",
     "runtime": "body.transform_errors body.transforms bus missions.program.sources params plan recording sdk",
     "scaffold": "composition missions sdk",
-    "schema": "missions sdk sections",
+    "schema": "controller_interface missions sdk sections",
     "sdk": "",
-    "sections": "actuation.servo_models body sdk",
+    "sections": "actuation.servo_models body control.calibration controller_interface sdk",
+    "servo_bus_config": "actuation control controller_interface",
     "sim": "",
     "skills": "sdk",
     "twins": "actuation",

@@ -30,8 +30,8 @@ def driver(name: str, *, real: bool = False) -> Any:
 )
 def test_one_bus_has_all_joints_of_all_parts(name: str, ids: dict[str, int]) -> None:
     config = driver(name).config
-    assert {joint: one.id for joint, one in config.joints.items()} == ids
-    led = [joint for one in config.controllers.values() for joint in one.joints]
+    assert {joint: one.servos[0].id for joint, one in config.joints.items()} == ids
+    led = [joint for one in config.controllers.values() for joint in one.config.led]
     assert sorted(led) == sorted(ids)
 
 

@@ -75,7 +75,7 @@ def test_a_bus_drives_its_joints_within_the_tighter_limits(tmp_path: Path) -> No
     assert (config.rate, config.twin, list(config.controllers)) == (50.0, "servo", ["head"])
     pan, tilt = config.joints["pan_joint"], config.joints["tilt_joint"]
     assert (pan.lower, pan.upper, pan.velocity) == pytest.approx((-1.0, 0.5236, 1.0472), abs=1e-4)
-    assert (tilt.lower, tilt.upper, tilt.velocity, tilt.invert) == (-1.0, 1.0, 2.0, True)
+    assert (tilt.lower, tilt.upper, tilt.velocity, tilt.servos[0].invert) == (-1.0, 1.0, 2.0, True)
 
 
 def test_two_instances_of_a_part_bring_their_joints_to_one_bus(tmp_path: Path) -> None:
@@ -86,10 +86,13 @@ def test_two_instances_of_a_part_bring_their_joints_to_one_bus(tmp_path: Path) -
     checked = check_text(robot, tmp_path, others={"head.urdf": BODY, "part.yaml": PART})
     assert checked.codes == []
     config = driver_of(checked)
-    assert {name: one.id for name, one in config.joints.items()} == {"left_pan_joint": 1, "right_pan_joint": 2}
-    assert {name: one.joints for name, one in config.controllers.items()} == {
-        "left_look": ["left_pan_joint"],
-        "right_look": ["right_pan_joint"],
+    assert {name: one.servos[0].id for name, one in config.joints.items()} == {
+        "left_pan_joint": 1,
+        "right_pan_joint": 2,
+    }
+    assert {name: one.config.led for name, one in config.controllers.items()} == {
+        "left_look": ("left_pan_joint",),
+        "right_look": ("right_pan_joint",),
     }
 
 

@@ -114,7 +114,8 @@ class RequestHandler:
 
     def _pass_on(self, data: object, number: int) -> None:
         """Pass a request on to the first component that takes it; this component answers."""
-        taker = self._taker(name_in(data))
+        wanted = data.get("component", "") if isinstance(data, dict) else ""
+        taker = self._taker(name_in(data), wanted)
         known = component_type(taker.type).requests()
         request = known.from_data(data)
         if isinstance(request, Command):
@@ -123,14 +124,17 @@ class RequestHandler:
             raise Refused(f"'{taker.name}' is not active")
         self._supervisor.send(taker.process, say.Ask(number, taker.name, as_data(request)))
 
-    def _taker(self, name: str) -> Instance:
+    def _taker(self, name: str, wanted: object) -> Instance:
+        """Return the first component that takes a request; one that names its component is for that one."""
         abouts = {ROBOT}
         for one in self._supervisor.conductor.plan.instances:
             known = component_type(one.type).requests().types
-            if name in known:
+            if name in known and wanted in ("", one.name):
                 return one
             abouts.update(each.about for each in known.values())
         about, dot, _ = name.partition(".")
+        if wanted:
+            raise Refused(f"the component '{wanted}' takes no such request")
         if dot and about not in abouts:
             raise Refused(f"this robot has no component of type '{about}'")
         raise Refused(f"there is no request '{name}'" if name else "this version of rbxcompose has no such request")

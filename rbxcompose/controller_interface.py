@@ -1,0 +1,198 @@
+"""What a controller is: it leads joints, once in each cycle of the bus that drives them.
+
+Each is one file in `controllers/`, declared by `@controller(TYPE)` and found by its name.
+"""
+
+from __future__ import annotations
+
+import inspect
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Generic, Literal, Protocol, TypeVar, get_args
+
+from rbxcompose.config import Config
+from rbxcompose.control.curves import JointSample
+from rbxcompose.control.trajectory_plan import JointRules
+from rbxcompose.plugins import Plugins
+from rbxcompose.sdk.bound import ServedGoal
+from rbxcompose.sdk.capabilities import Capability
+from rbxcompose.sdk.ports import Port
+
+PLUGINS = Plugins("controller", "rbxcompose.controllers")
+_TYPES: dict[str, type[Controller[Any]]] = {}
+
+
+class ControllerConfig(Config):
+    """What every controller can be given; a subclass names its joints, by fields of the type `JointName`."""
+
+    type: str
+    """How it leads its joints."""
+    start: Literal["active", "inactive"] = "active"
+    """Whether it leads its joints from the start, or waits until somebody switches to it."""
+
+    @property
+    def led(self) -> tuple[str, ...]:
+        """Return the joints that it leads."""
+        raise NotImplementedError
+
+
+C = TypeVar("C", bound=ControllerConfig)
+T = TypeVar("T", bound="type[Controller[Any]]")
+
+
+class LedJoint(Protocol):
+    """A joint as a controller sees it; positions are [rad], or [m] if it slides."""
+
+    rules: JointRules
+    measured: JointSample
+    effort: float
+
+    @property
+    def commanded(self) -> JointSample:
+        """Return where it was told to be, within its limits."""
+
+    @property
+    def blocked(self) -> str:
+        """Return why it may not move; empty if it may."""
+
+    @property
+    def per_tick(self) -> float:
+        """Return how far it moves for one tick of its servo."""
+
+    def follow(self, sample: JointSample) -> None:
+        """Be at a position at the end of this cycle, and pass there with its velocity."""
+
+    def turn(self, velocity: float) -> None:
+        """Move with a velocity up to the end of this cycle."""
+
+
+class ControllerSite(Protocol):
+    """What a controller uses of the component that runs it."""
+
+    @property
+    def now(self) -> float:
+        """Return robot time [s]."""
+
+    @property
+    def stamp(self) -> int:
+        """Return the time for message headers [ns]."""
+
+    @property
+    def joints(self) -> Mapping[str, LedJoint]:
+        """Return its joints by name."""
+
+    def goal(self, port: str) -> ServedGoal[Any, Any, Any] | None:
+        """Return the current goal at one of its ports."""
+
+    def send(self, port: str, message: Any) -> None:
+        """Publish at one of its ports."""
+
+    def warn(self, text: str) -> None:
+        """Log something that a person should look at."""
+
+
+class Controller(ABC, Generic[C]):
+    """Leads joints. It is made when its bus is configured; ports have names of their own, without that of the bus.
+
+    `interface` is what it gives its joints: positions or velocities. While it is inactive, it is not called.
+    """
+
+    type_name: ClassVar[str] = ""
+    interface: ClassVar[Literal["position", "velocity"]] = "position"
+
+    def __init__(self, name: str, config: C, site: ControllerSite) -> None:
+        self.name, self.config, self.site = name, config, site
+        self.prepare()
+
+    @classmethod
+    def config_type(cls) -> type[ControllerConfig]:
+        """Return the configuration model, as named by `Controller[...]`."""
+        for generic in (one for base in inspect.getmro(cls) for one in getattr(base, "__orig_bases__", ())):
+            for argument in get_args(generic):
+                if isinstance(argument, type) and issubclass(argument, ControllerConfig):
+                    return argument
+        raise TypeError(f"{cls.__qualname__} does not name its configuration: Controller[...]")
+
+    @classmethod
+    def ports(cls, name: str, config: C) -> dict[str, Port[Any]]:
+        """Return its ports."""
+        return {}
+
+    @classmethod
+    def capabilities(cls, name: str, config: C) -> tuple[Capability, ...]:
+        """Return what checks and commands should know about it; texts are names of its ports."""
+        return ()
+
+    @classmethod
+    def mistake(cls, config: C) -> tuple[str, str] | None:
+        """Return the field and the reason, if a configuration cannot work although each of its values can."""
+        return None
+
+    def prepare(self) -> None:
+        """Set up what it needs."""
+
+    def accept(self, port: str, goal: Any) -> str:
+        """Return why a goal at a port is refused; nothing accepts it."""
+        return ""
+
+    def received(self, port: str, message: Any) -> None:
+        """Take a message of an input."""
+
+    def asked(self, port: str, request: Any) -> Any:
+        """Return the response to a request."""
+        raise NotImplementedError(port)
+
+    @abstractmethod
+    def cycle(self, now: float, dt: float) -> None:
+        """Lead its joints up to `now + dt` [s]; called in each cycle, after all joints were measured."""
+
+    def publish(self) -> None:
+        """Publish what it knows, some 50 times per second."""
+
+    def halt(self, now: float, reason: str) -> None:
+        """End what it does; its joints come to rest within their limits."""
+
+    @property
+    def leads(self) -> bool:
+        """Return whether it moves its joints now, so that they take no single commands."""
+        return False
+
+    @property
+    def note(self) -> str:
+        """Return what people should know of it now; empty if there is nothing to say."""
+        return ""
+
+
+def controller(name: str) -> Callable[[T], T]:
+    """Register a controller class under the name of its type.
+
+    Raises:
+        ValueError: if another class has this name.
+    """
+
+    def register(cls: T) -> T:
+        other = _TYPES.get(name)
+        if other is not None and (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
+            raise ValueError(f"two controllers are named '{name}': {other.__module__} and {cls.__module__}")
+        cls.type_name = name
+        _TYPES[name] = cls
+        return cls
+
+    return register
+
+
+def controller_names() -> list[str]:
+    """Return the names of all types, sorted, without importing any."""
+    return sorted({*PLUGINS.names(), *_TYPES})
+
+
+def controller_type(name: str) -> type[Controller[Any]]:
+    """Return the class of a type, importing its file if necessary.
+
+    Raises:
+        KeyError: if no type has this name.
+        BrokenPluginError: if it belongs to another package and cannot be used.
+    """
+    if name not in _TYPES and PLUGINS.load(name) and name not in _TYPES:
+        raise PLUGINS.broken(name, f"its module declares no class by @controller({name!r})")
+    return _TYPES[name]

@@ -1,0 +1,58 @@
+"""The controllers of a bus: which are active, what each claims, and how they are switched."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from rbxcompose.controller_interface import Controller, ControllerConfig
+
+
+class ControllerManager:
+    """Controllers by name; no joint is led by two active ones."""
+
+    def __init__(self, controllers: Mapping[str, Controller[ControllerConfig]]) -> None:
+        self.controllers = dict(controllers)
+        self._active = {name for name, one in self.controllers.items() if one.config.start == "active"}
+
+    @property
+    def active(self) -> list[Controller[ControllerConfig]]:
+        """Return the active controllers, in the order of the manifest."""
+        return [one for name, one in self.controllers.items() if name in self._active]
+
+    def is_active(self, name: str) -> bool:
+        """Return whether a controller leads its joints."""
+        return name in self._active
+
+    def leader(self, joint: str) -> str:
+        """Return the active controller that moves a joint now, or nothing."""
+        return next((one.name for one in self.active if joint in one.config.led and one.leads), "")
+
+    def objection(self, on: Iterable[str], off: Iterable[str]) -> str:
+        """Return why controllers cannot be switched on and off, or nothing."""
+        on, off = list(on), list(off)
+        if unknown := [name for name in (*on, *off) if name not in self.controllers]:
+            return f"there is no controller '{unknown[0]}'; there are {', '.join(self.controllers)}"
+        if both := set(on) & set(off):
+            return f"controller '{min(both)}' cannot be switched on and off at once"
+        wanted = (self._active - set(off)) | set(on)
+        owners: dict[str, str] = {}
+        for name in self.controllers:
+            for joint in self.controllers[name].config.led if name in wanted else ():
+                if (other := owners.setdefault(joint, name)) != name:
+                    return f"controllers '{other}' and '{name}' both lead joint '{joint}': switch one of them off"
+        return ""
+
+    def switch(self, on: Iterable[str], off: Iterable[str], now: float) -> Iterator[str]:
+        """Switch controllers on and off; yield a sentence for each that changes.
+
+        What those that are switched off do ends, and their joints come to rest. There must be no `objection`.
+        """
+        for name in off:
+            if name in self._active:
+                self.controllers[name].halt(now, f"controller '{name}' was switched off")
+                self._active.discard(name)
+                yield f"controller '{name}' is inactive"
+        for name in on:
+            if name not in self._active:
+                self._active.add(name)
+                yield f"controller '{name}' is active"

@@ -1,0 +1,44 @@
+"""What people may ask of the controllers of a running robot."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass
+
+from rbxcompose.requests import Command, Query
+
+BUS = "servo_bus"
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerState:
+    """A controller on a running robot."""
+
+    name: str
+    type: str
+    is_active: bool
+    joints: tuple[str, ...]
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ListControllers(Query[tuple[ControllerState, ...]]):
+    """Return the controllers of a bus."""
+
+    about = BUS
+    component: str
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchControllers(Command):
+    """Switch controllers of a bus on and off, all at once or not at all."""
+
+    about = BUS
+    component: str
+    on: tuple[str, ...] = ()
+    off: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """Return it as written on the command line."""
+        return shlex.join(["controller", "switch", *self.on, *(word for one in self.off for word in ("--off", one))])

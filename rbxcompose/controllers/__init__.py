@@ -1,0 +1,1 @@
+"""Controllers: what leads joints, one file each."""

@@ -1,0 +1,179 @@
+"""Follows trajectories of several joints."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from rbxcompose.config import Angle, Config, JointName, Time
+from rbxcompose.control.trajectory import (
+    TrajectoryGoal,
+    TrajectoryPoint,
+    TrajectoryPolicy,
+    TrajectoryRefusal,
+    TrajectoryTolerance,
+)
+from rbxcompose.control.trajectory_follower import TrajectoryFollower, TrajectoryOutcome
+from rbxcompose.controller_interface import Controller, ControllerConfig, controller
+from rbxcompose.msgs.builtin_interfaces import Duration
+from rbxcompose.msgs.control_msgs import FollowJointTrajectory
+from rbxcompose.msgs.stamps import to_nanoseconds
+from rbxcompose.sdk import Port, ServedGoal, ServesAction
+
+Follow = FollowJointTrajectory
+NANOSECONDS = 1_000_000_000
+
+
+class TrajectoryToleranceConfig(Config):
+    """How far joints may be from where they should be; those of a goal hold instead, if it has any."""
+
+    path: Angle | None = Field(None, gt=0)
+    """On the way; without it, that is not watched."""
+    goal: Angle = Field(0.05, gt=0)
+    """At the end."""
+    goal_time: Time = Field(1.0, ge=0)
+    """How long after the end of a trajectory its joints may take to arrive."""
+
+
+class JointTrajectoryConfig(ControllerConfig):
+    """Leads joints along trajectories."""
+
+    type: Literal["joint_trajectory"] = "joint_trajectory"
+    """How it leads its joints."""
+    joints: list[JointName] = Field(min_length=1)
+    """The joints that it leads."""
+    interpolation: Literal["auto", "linear"] = "auto"
+    """Between points without velocities: a smooth curve that ends at rest, or straight lines."""
+    outside: Literal["refuse", "clamp"] = "refuse"
+    """What to do with positions outside of the limits."""
+    too_fast: Literal["refuse", "stretch"] = "refuse"
+    """What to do with a trajectory that is too fast for a joint; `stretch` takes more time."""
+    tolerance: TrajectoryToleranceConfig = TrajectoryToleranceConfig()
+    """When a trajectory has failed."""
+
+    @property
+    def led(self) -> tuple[str, ...]:
+        """Return the joints that it leads."""
+        return tuple(self.joints)
+
+
+@controller("joint_trajectory")
+class JointTrajectoryController(Controller[JointTrajectoryConfig]):
+    """Follows trajectories, by the action `NAME/follow_joint_trajectory` of ROS.
+
+    Trajectories are linear, cubic or quintic by what their points hold; one at 0 s is reached as fast as the limits
+    allow. A new goal replaces the old one. However a trajectory ends, its joints come to rest within their limits.
+
+    Example:
+        head: {type: joint_trajectory, joints: [pan_joint, tilt_joint]}
+    """
+
+    @classmethod
+    def ports(cls, name: str, config: JointTrajectoryConfig) -> dict[str, Port[Any]]:
+        """Return the action."""
+        return {"follow": ServesAction(Follow, f"{name}/follow_joint_trajectory", claims=name, skill=name)}
+
+    def prepare(self) -> None:
+        """Set up the follower."""
+        config, joints = self.config, self.site.joints
+        policy = TrajectoryPolicy(
+            interpolation=config.interpolation,
+            outside=config.outside,
+            too_fast=config.too_fast,
+            tolerance=TrajectoryTolerance(config.tolerance.path, config.tolerance.goal),
+            goal_time=config.tolerance.goal_time,
+        )
+        self.follower = TrajectoryFollower({name: one.rules for name, one in joints.items()}, policy)
+        self.followed: ServedGoal[Any, Any, Any] | None = None  # the goal of the trajectory that runs
+
+    @property
+    def leads(self) -> bool:
+        """Return whether a trajectory runs."""
+        return self.follower.is_following
+
+    def cycle(self, now: float, dt: float) -> None:
+        """Take over the newest goal, or its cancellation, and lead the joints."""
+        self._take(now)
+        joints = self.site.joints
+        for name, joint in joints.items():
+            if self.follower.is_moving and joint.blocked:
+                self._end(self.follower.lose(name, now, f"joint '{name}': {joint.blocked}"))
+        step = self.follower.step(now, self._measured(), self._commanded())
+        for name, sample in step.desired.items():
+            joints[name].follow(sample)
+        self._end(step.outcome)
+
+    def halt(self, now: float, reason: str) -> None:
+        """End the trajectory."""
+        self._end(self.follower.abort(now, reason))
+
+    def _measured(self) -> dict[str, Any]:
+        return {name: one.measured for name, one in self.site.joints.items()}
+
+    def _commanded(self) -> dict[str, Any]:
+        return {name: one.commanded for name, one in self.site.joints.items()}
+
+    def _take(self, now: float) -> None:
+        goal = self.site.goal("follow")
+        if goal is not None and goal.cancel_requested:
+            self.follower.cancel(now)
+            self.followed = None
+            goal.canceled(Follow.Result(error_string="canceled"))
+        elif goal is not None and goal is not self.followed:
+            self.followed = goal
+            wanted = trajectory_of(goal.request, now, self.site.stamp)
+            answer = self.follower.accept(wanted, now, self._measured(), self._commanded())
+            if isinstance(answer, TrajectoryRefusal):
+                self.followed = None
+                goal.aborted(answer.message, Follow.Result(error_code=answer.code, error_string=answer.message))
+
+    def _end(self, outcome: TrajectoryOutcome | None) -> None:
+        goal = self.followed
+        if outcome is None or goal is None:
+            return
+        self.followed = None
+        result = Follow.Result(error_code=outcome.code, error_string=outcome.message)
+        if outcome.code == Follow.Result.SUCCESSFUL:
+            goal.succeeded(result)
+        else:
+            goal.aborted(outcome.message, result)
+
+
+def trajectory_of(goal: Follow.Goal, now: float, stamp: int) -> TrajectoryGoal:
+    """Return a goal as the follower takes it; its stamp [ns] is by the clock of headers, a zero one is now."""
+    begin = to_nanoseconds(goal.trajectory.header.stamp)
+    points = tuple(
+        TrajectoryPoint(
+            seconds(one.time_from_start), tuple(one.positions), tuple(one.velocities), tuple(one.accelerations)
+        )
+        for one in goal.trajectory.points
+    )
+    paths = {one.name: one.position for one in goal.path_tolerance}
+    ends = {one.name: (one.position, one.velocity) for one in goal.goal_tolerance}
+    default = TrajectoryTolerance()
+    tolerances = {
+        name: TrajectoryTolerance(
+            allowed(paths.get(name, 0.0), default.path),
+            allowed(ends.get(name, (0.0, 0.0))[0], default.goal),
+            allowed(ends.get(name, (0.0, 0.0))[1], default.velocity),
+        )
+        for name in {*paths, *ends}
+    }
+    return TrajectoryGoal(
+        tuple(goal.trajectory.joint_names),
+        points,
+        now + (begin - stamp) / NANOSECONDS if begin else 0.0,
+        tolerances,
+        seconds(goal.goal_time_tolerance) or None,
+    )
+
+
+def allowed(written: float, default: float | None) -> float | None:
+    """Return a tolerance as ROS writes it: 0 is the default, a negative one is no limit."""
+    return default if written == 0.0 else None if written < 0.0 else written
+
+
+def seconds(duration: Duration) -> float:
+    """Return a duration in seconds."""
+    return duration.sec + duration.nanosec / NANOSECONDS

@@ -1,0 +1,100 @@
+"""The section `safety`: what happens to the torque of joints."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from rbxcompose.config import AngularSpeed, Config, JointName, Temperature, Time
+from rbxcompose.findings import kind
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.section import Reading
+from rbxcompose.manifest.tree import key_span
+from rbxcompose.sections.joints import JointPosition
+
+THERMAL_ORDER = kind(
+    "RBX2218",
+    """Temperatures in the wrong order
+
+A joint above `limit` rests until it is at `resume` or below, so `resume` is below `limit`; `warn` is not above it.
+
+Bad:
+```yaml
+safety:
+  thermal: {limit: 60 degC, resume: 65 degC}
+```
+Good:
+```yaml
+safety:
+  thermal: {limit: 60 degC, resume: 45 degC}
+```
+""",
+)
+NOTHING_TO_PARK = kind(
+    "RBX2219",
+    """Joints are to be parked, but nothing says where
+
+Bad:
+```yaml
+safety:
+  on_shutdown: park
+```
+Good:
+```yaml
+safety:
+  on_shutdown: park
+  park: {arm_lift_joint: -60 deg}
+```
+""",
+)
+
+
+class ThermalModel(Config):
+    """Temperatures of joints."""
+
+    warn: Temperature = 50.0
+    """Above this, diagnostics warn."""
+    limit: Temperature = 60.0
+    """Above this, a joint loses its torque and rests."""
+    resume: Temperature = 45.0
+    """It rests until it is at this or below."""
+    rest: Time = Field(60.0, ge=0)
+    """It rests for this long at least."""
+    scope: Literal["joint", "bus"] = "joint"
+    """Whether a joint that is too hot rests alone, or all joints of its bus with it."""
+
+
+class SafetyModel(Config):
+    """What joints do without commands."""
+
+    on_start: Literal["relax", "hold"] = "relax"
+    """Whether joints have torque from the start."""
+    on_shutdown: Literal["relax", "hold", "park"] = "relax"
+    """What happens to torque when the robot goes down or its driver fails; `park` moves there, then relaxes."""
+    park: dict[JointName, JointPosition] = {}
+    """Where joints are parked."""
+    start_speed: AngularSpeed | None = Field(None, gt=0)
+    """Largest speed of single commands, until `set_speed` gives a joint another one."""
+    thermal: ThermalModel = ThermalModel()
+    """When joints are too hot, and what happens then."""
+
+
+@section("safety", SafetyModel, order=35, shared=((), ("park",)))
+def safety(reading: Reading[SafetyModel]) -> SafetyModel:
+    """What happens to the torque of joints at the start, at the end, and when they are too hot.
+
+    Example:
+        safety:
+          on_shutdown: hold
+          thermal: {limit: 65 degC, resume: 50 degC}
+    """
+    read = reading.whole() or SafetyModel()
+    root, heat = reading.contents.root, read.thermal
+    if not (heat.resume < heat.limit and heat.warn <= heat.limit):
+        message = f"resume {heat.resume:g} degC, warn {heat.warn:g} degC, limit {heat.limit:g} degC"
+        reading.report.add(THERMAL_ORDER.at(key_span(root, ("safety", "thermal")), message))
+    if read.on_shutdown == "park" and not read.park:
+        span = key_span(root, ("safety", "on_shutdown"))
+        reading.report.add(NOTHING_TO_PARK.at(span, "joints are to be parked, but 'park' names none"))
+    return read

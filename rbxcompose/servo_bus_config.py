@@ -1,0 +1,169 @@
+"""The configuration of a bus of servos, and the drives of joints that it describes; all in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from rbxcompose.actuation.joint_drive import JointDrive
+from rbxcompose.actuation.position_drive import PositionDrive
+from rbxcompose.actuation.servo_cycle import JointMimic
+from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
+from rbxcompose.actuation.servo_models import model_named
+from rbxcompose.actuation.velocity_drive import VelocityDrive
+from rbxcompose.config import Config
+from rbxcompose.control.calibration import Calibration
+from rbxcompose.control.joint_states import JointPolicy, ThermalPolicy
+from rbxcompose.control.limits import MotionLimits
+from rbxcompose.control.transmission import Gear, Measured
+from rbxcompose.controller_interface import ControllerConfig, controller_type
+
+
+class JointServoConfig(Config):
+    """A servo of a joint."""
+
+    id: int
+    """Its id."""
+    model: str
+    """Its model."""
+    neutral: int | None = None
+    """The tick at angle 0; without it the middle of its range."""
+    invert: bool = False
+    """Whether it turns the other way round than the joint."""
+
+
+class DrivenJointConfig(Config):
+    """A joint and its servos, in radians, or in metres if it slides."""
+
+    servos: list[JointServoConfig]
+    """The servos that drive it together."""
+    mode: Literal["position", "velocity"] = "position"
+    """Whether they are given positions or velocities."""
+    ratio: float = 1.0
+    """Turns of a servo for each turn of the joint."""
+    offset: float = 0.0
+    """Position of the joint when its servos are at 0 [rad]."""
+    calibration: list[tuple[float, float]] = []
+    """Angles of a servo [rad] and positions of the joint, instead of a ratio."""
+    is_continuous: bool = False
+    """Whether it turns without end."""
+    lower: float | None = None
+    """Least position."""
+    upper: float | None = None
+    """Greatest position."""
+    velocity: float | None = None
+    """Largest speed."""
+    acceleration: float | None = None
+    """Largest acceleration."""
+    mimic: str = ""
+    """The joint that it follows instead of commands."""
+    multiplier: float = 1.0
+    """How far it moves for each radian or metre of that joint."""
+    mimic_offset: float = 0.0
+    """Where it is when that joint is at 0."""
+
+
+class ControllerSetup(Config):
+    """A controller: its type, and the settings of that type as a person writes them."""
+
+    type: str
+    """Its type."""
+    settings: dict[str, Any] = {}
+    """Settings of that type."""
+
+    @property
+    def config(self) -> ControllerConfig:
+        """Return the settings as the configuration of the type."""
+        return controller_type(self.type).config_type().model_validate(self.settings)
+
+
+class ThermalConfig(Config):
+    """When joints are too hot [degC], and how long they rest [s]."""
+
+    warn: float = 50.0
+    """Above this, people are told."""
+    limit: float = 60.0
+    """Above this, a joint loses its torque and rests."""
+    resume: float = 45.0
+    """It rests until it is at this or below."""
+    rest: float = 60.0
+    """It rests for this long at least."""
+    scope: Literal["joint", "bus"] = "joint"
+    """Whether a joint that is too hot rests alone, or all joints of its bus with it."""
+
+
+class ServoBusConfig(Config):
+    """A bus of servos, its joints and its controllers."""
+
+    name: str = "servos"
+    """Its name, which begins the topics of the services for all joints."""
+    port: str = ""
+    """The serial port."""
+    baud: int = 1_000_000
+    """Bits per second."""
+    rate: float = 100.0
+    """Cycles per second."""
+    watchdog: float = 0.2
+    """Silence of the bus after which servos stop by themselves, if they can [s]; 0 is never."""
+    twin: Literal["", "servo", "pty"] = ""
+    """How its servos are simulated, if they are."""
+    on_start: Literal["relax", "hold"] = "relax"
+    """Whether joints have torque from the start."""
+    on_shutdown: Literal["relax", "hold", "park"] = "relax"
+    """What happens to torque at the end; `park` first moves to `park`."""
+    park: dict[str, float] = {}
+    """Where joints are parked."""
+    start_speed: float | None = None
+    """Largest speed of single commands, until a joint is given another one."""
+    thermal: ThermalConfig = ThermalConfig()
+    """When joints rest."""
+    joints: dict[str, DrivenJointConfig] = {}
+    """Joints by name."""
+    controllers: dict[str, ControllerSetup] = {}
+    """Controllers by name."""
+
+    @property
+    def models(self) -> dict[int, str]:
+        """Return the names of the servos' models by id."""
+        return {servo.id: servo.model for joint in self.joints.values() for servo in joint.servos}
+
+    @property
+    def policy(self) -> JointPolicy:
+        """Return how joints are watched."""
+        heat = self.thermal
+        thermal = ThermalPolicy(heat.warn, heat.limit, heat.resume, heat.rest)
+        cycle = 1.0 / self.rate
+        return JointPolicy(cycle, fault_after=max(0.5, 3 * cycle), on_start=self.on_start, thermal=thermal)
+
+
+def drives_of(config: ServoBusConfig) -> dict[str, JointDrive]:
+    """Return a drive for each joint."""
+    policy, drives = config.policy, dict[str, JointDrive]()
+    for name, one in config.joints.items():
+        joint = servo_joint(name, one)
+        drives[name] = (
+            VelocityDrive(joint, policy) if one.mode == "velocity" else PositionDrive(joint, policy, config.start_speed)
+        )
+    return drives
+
+
+def mimics_of(joints: Mapping[str, DrivenJointConfig]) -> dict[str, JointMimic]:
+    """Return the joints that follow others."""
+    return {name: JointMimic(one.mimic, one.multiplier, one.mimic_offset) for name, one in joints.items() if one.mimic}
+
+
+def servo_joint(name: str, config: DrivenJointConfig) -> ServoJoint:
+    """Return a joint with its servos. ValueError if there is no such model, or the calibration is none."""
+    servos = tuple(_servo(one) for one in config.servos)
+    limits = MotionLimits(config.lower, config.upper, config.velocity, config.acceleration)
+    table = config.calibration
+    transmission = Measured(Calibration(tuple(sorted(table)))) if table else Gear(config.ratio, config.offset)
+    return ServoJoint(name, servos, limits, transmission, config.is_continuous, config.mode)
+
+
+def _servo(config: JointServoConfig) -> JointServo:
+    model = model_named(config.model)
+    if model is None:
+        raise ValueError(f"no servo is called '{config.model}'")
+    neutral = model.family.centre if config.neutral is None else config.neutral
+    return JointServo(config.id, model, neutral, config.invert)
