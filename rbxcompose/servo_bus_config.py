@@ -113,6 +113,8 @@ class ServoBusConfig(Config):
     """What happens to torque at the end; `park` first moves to `park`."""
     park: dict[str, float] = {}
     """Where joints are parked."""
+    park_time: float = 10.0
+    """How long they may take to get there [s]."""
     start_speed: float | None = None
     """Largest speed of single commands, until a joint is given another one."""
     thermal: ThermalConfig = ThermalConfig()

@@ -11,10 +11,11 @@ from rbxcompose.actuation.bus import ServoStatistics
 class Attention:
     """Keeps the statistics of servos, and skips those that missed `patience` reads in a row.
 
-    One of those is probed each `period` [s], so that at most one silent servo costs its timeout in one cycle.
+    One of those is probed each `period` [s], so that at most one silent servo costs its timeout in one cycle. The
+    period is short against the time after which a joint without measurements is a fault: a few lost replies are none.
     """
 
-    def __init__(self, patience: int = 3, period: float = 0.5) -> None:
+    def __init__(self, patience: int = 3, period: float = 0.1) -> None:
         self.patience, self.period = patience, period
         self.statistics: defaultdict[int, ServoStatistics] = defaultdict(ServoStatistics)
         self._probed: dict[int, float] = {}

@@ -126,7 +126,7 @@ class JointDrive(ABC):
     def was_cut(self) -> None:
         """Go on from where the joint is: a servo has stopped by itself, since the bus was silent for too long."""
         if self.limiter is not None and math.isfinite(self.measured.position):
-            self.limiter.reseed(self.measured.position)
+            self.limiter.put(self.measured.position)
 
     def ask(self, request: JointRequest) -> None:
         """Take a request for the next cycle."""

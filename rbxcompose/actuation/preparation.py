@@ -31,6 +31,14 @@ def prepare(bus: ServoBus, joints: Iterable[ServoJoint], watchdog: float) -> Ite
             arm(bus, servo, watchdog)
 
 
+def with_torque(bus: ServoBus, joints: Iterable[ServoJoint]) -> set[str]:
+    """Return the joints whose servos all have torque now."""
+    joints = list(joints)
+    found = bus.read([id_ for joint in joints for id_ in joint.ids], ["torque_enable"])
+    held = {id_ for id_, reading in found.items() if reading.values["torque_enable"]}
+    return {joint.name for joint in joints if held.issuperset(joint.ids)}
+
+
 def arm(bus: ServoBus, servo: JointServo, watchdog: float) -> None:
     """Let a servo stop after a silence of the bus [s], if its model can; one that has done so goes on."""
     if (item := servo.model.items.get(WATCHDOG)) is not None and watchdog > 0:

@@ -33,9 +33,10 @@ class JointServo:
 
     def raw(self, angle: float, *, is_endless: bool = False) -> int:
         """Return the tick nearest to an angle [rad], within those of the servo unless it turns without end."""
-        last = self.model.family.ticks - 1
+        family = self.model.family
+        first = family.centre - family.ticks // 2
         ticks = self.neutral + round(angle / self.per_tick)
-        return ticks if is_endless and self.model.protocol == 2 else max(0, min(last, ticks))
+        return ticks if is_endless and family.protocol == 2 else max(first, min(first + family.ticks - 1, ticks))
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,13 +9,13 @@ from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.robots.lookup import NO_ANSWER, NotDoneError, add_robot_option, find_robot, known_state
 from rbxcompose.requests import Refused
 from rbxcompose.runtime.control import NoAnswerError, ask, supervisor_of
-from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, wait_until_ended
 from rbxcompose.runtime.requests import BringDown
 from rbxcompose.runtime.supervision.leftovers import end_leftovers, kill_supervisor
 
 _ANSWER = 1.0  # [s]
-_ORDERLY = 4.0  # [s] for a supervisor to bring everything down
+_ORDERLY = 3.0  # [s] for a supervisor to bring everything down, after it has come to rest
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,8 +48,10 @@ def _end(folder: RobotFolder) -> list[str]:
         NotDoneError: if someone else holds the robot and cannot be found.
     """
     told: list[str] = []
-    if (supervisor := _supervisor(folder)) is not None:
-        if not supervisor.is_stopped and _asked(folder) and not wait_until_ended([supervisor], _ORDERLY):
+    state = known_state(folder)
+    patience = _ORDERLY + (state.rest_time if state is not None else 1.0)
+    if (supervisor := _supervisor(folder, state)) is not None:
+        if not supervisor.is_stopped and _asked(folder) and not wait_until_ended([supervisor], patience):
             return told
         told.append("the supervisor did not answer and was killed")
         kill_supervisor(supervisor)
@@ -61,8 +63,7 @@ def _end(folder: RobotFolder) -> list[str]:
     return told
 
 
-def _supervisor(folder: RobotFolder) -> Process | None:
-    state = known_state(folder)
+def _supervisor(folder: RobotFolder, state: RobotState | None) -> Process | None:
     return state.supervisor if state is not None and state.is_supervised else supervisor_of(folder)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from rbxcompose.actuation.bus import ServoBus as Bus
 from rbxcompose.actuation.port_errors import PortError
 from rbxcompose.actuation.position_drive import PositionDrive
-from rbxcompose.actuation.preparation import prepare
+from rbxcompose.actuation.preparation import prepare, with_torque
 from rbxcompose.actuation.servo_cycle import ServoCycle
 from rbxcompose.actuation.servo_models import servo_models
 from rbxcompose.control.joint_states import Enable, Hold, JointMode, MoveTo
@@ -75,6 +76,11 @@ class ServoBusDriver(Component[ServoBusConfig]):
         return {name: port.named(name) for name, port in found.items()}
 
     @classmethod
+    def rest_time(cls, config: ServoBusConfig) -> float:
+        """Return the time that parking may take."""
+        return config.park_time if config.on_shutdown == "park" else super().rest_time(config)
+
+    @classmethod
     def capabilities(cls, config: ServoBusConfig) -> tuple[Capability, ...]:
         """Declare what its controllers can do."""
         setups = config.controllers.items()
@@ -111,7 +117,6 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.is_stopped, self.lost_at = self.context.is_stopped, -math.inf
         self.told_at, self.published_at = -math.inf, -math.inf
         self.is_parking = False
-        self.prepare()
 
     def opened(self) -> Bus:
         """Return the bus: that of the port, or simulated servos."""
@@ -135,7 +140,15 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.info(text)
 
     def activate(self) -> None:
-        """Begin the cycles."""
+        """Begin the cycles; torque that an earlier driver has left on is kept if that is what the end is to be."""
+        try:
+            self.prepare()
+            if self.config.on_shutdown != "relax":
+                for name in with_torque(self.cycle.bus, [drive.joint for drive in self.cycle.drives.values()]):
+                    drive = self.cycle.drives[name]
+                    drive.policy = replace(drive.policy, on_start="hold")
+        except PortError as error:
+            self.lose(error)
         self.wake()
 
     def wake(self) -> None:
@@ -160,7 +173,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.prepare()
             self.info(f"the port '{self.config.port}' is back")
             self.lost_at = -math.inf
-        self.cycle.run(self.now, self.period, self.controllers.active)
+        self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.active)
         if self.now - self.published_at >= 1 / PUBLISHED - 1e-9:
             self.published_at = self.now
             self.publish()
@@ -301,8 +314,15 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     @property
     def is_at_rest(self) -> bool:
-        """Return whether no command moves."""
-        return all(one.is_at_rest for one in self.cycle.drives.values())
+        """Return whether no command moves, and all joints are where they are to be parked."""
+        return all(one.is_at_rest and not self.is_on_the_way(name) for name, one in self.cycle.drives.items())
+
+    def is_on_the_way(self, name: str) -> bool:
+        """Return whether a joint has still to be parked."""
+        drive, wanted = self.cycle.drives[name], self.config.park.get(name)
+        if not self.is_parking or wanted is None or not drive.has_torque or self.lost_at > -math.inf:
+            return False
+        return abs(drive.commanded.position - drive.joint.limits.clamped(wanted)) > drive.per_tick
 
     def stop(self) -> None:
         """Bring all joints to rest, and refuse what moves them."""
@@ -314,8 +334,12 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.is_stopped = False
 
     def brake(self) -> None:
-        """Bring all joints to rest for good."""
+        """Bring all joints to rest for good; those with torque go where they are parked, if they are."""
         self.stop()
+        self.is_parking = self.config.on_shutdown == "park"
+        for name, position in self.config.park.items() if self.is_parking else ():
+            if self.cycle.drives[name].has_torque:
+                self.cycle.drives[name].ask(MoveTo(position))
 
     def cleanup(self) -> None:
         """Relax the joints, unless they are to hold, and give the port back."""

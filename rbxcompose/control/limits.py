@@ -129,9 +129,12 @@ class Limiter:
         """Start again from a measured `position`, at rest. ValueError if it is not finite."""
         if not math.isfinite(position):
             raise ValueError(f"a joint cannot start from the position {position}")
-        self.position = position
-        self.velocity = 0.0
+        self.put(position)
         self._wanted, self._wanted_velocity = position, 0.0
+
+    def put(self, position: float) -> None:
+        """Go on from a measured `position`, at rest, to what is wanted."""
+        self.position, self.velocity = position, 0.0
 
     @property
     def is_at_rest(self) -> bool:

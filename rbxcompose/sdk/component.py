@@ -114,6 +114,11 @@ class Component(Generic[C]):
         """Return whether everything that this component moves is at rest."""
         return True
 
+    @classmethod
+    def rest_time(cls, config: C) -> float:
+        """Return how long it may take to come to rest when the robot goes down [s]; then it ends as it is."""
+        return 1.0
+
     @property
     def occupation(self) -> str:
         """Return the work that a restart would cut off, such as `mission patrol runs`; empty if none."""

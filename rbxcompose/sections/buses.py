@@ -60,6 +60,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             "on_start": care.on_start,
             "on_shutdown": care.on_shutdown,
             "park": {joint: one.value for joint, one in care.park.items() if joint in own},
+            "park_time": care.park_time,
             "start_speed": care.start_speed,
             "thermal": care.thermal.model_dump(),
             "joints": {

@@ -30,8 +30,8 @@ CLAIMED_TWICE = kind(
     "RBX2220",
     """Two controllers lead the same joint from the start
 
-Both would move it at once. One of them can wait with `start: inactive` until `rbxcompose controller switch` makes it
-active.
+Both would move it at once. One of them can wait with `start: inactive` until `rbxcompose controller switch NAME --off
+OTHER` makes it active.
 
 Bad: `head` and `gaze`, both with `joints: [pan_joint]`.
 Good: `gaze: {type: joint_command, joints: [pan_joint], start: inactive}`

@@ -74,6 +74,8 @@ class SafetyModel(Config):
     """What happens to torque when the robot goes down or its driver fails; `park` moves there, then relaxes."""
     park: dict[JointName, JointPosition] = {}
     """Where joints are parked."""
+    park_time: Time = Field(10.0, gt=0)
+    """How long they may take to get there."""
     start_speed: AngularSpeed | None = Field(None, gt=0)
     """Largest speed of single commands, until `set_speed` gives a joint another one."""
     thermal: ThermalModel = ThermalModel()

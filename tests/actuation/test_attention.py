@@ -27,14 +27,14 @@ def test_who_answers_is_always_asked_and_at_most_one_probe_is(cycles: list[set[i
                 attention.answered(one, now)
 
 
-def test_a_mute_servo_is_asked_thrice_then_twice_a_second_and_again_when_it_answers() -> None:
+def test_a_mute_servo_is_asked_thrice_then_ten_times_a_second_and_again_when_it_answers() -> None:
     attention = Attention()
     asked = 0
     for number in range(200):
         if 2 in attention.due(IDS, number * PERIOD):
             attention.missed(2, number * PERIOD, is_corrupt=False)
             asked += 1
-    assert asked == 3 + 3
+    assert 3 + 17 <= asked <= 3 + 20
     attention.answered(2, 2.0)
     assert attention.due(IDS, 2.01) == IDS
     assert (attention.of(2).timeouts, attention.of(2).reads, attention.of(2).last_seen) == (6, 1, 2.0)

@@ -57,11 +57,13 @@ class Driven:
             self.now += PERIOD
 
 
-@pytest.mark.parametrize("name", [name for name, one in servo_models().items() if one.family.table != "P"])
+@pytest.mark.parametrize("name", servo_models())
 @pytest.mark.parametrize("is_inverted", [False, True])
 def test_each_tick_is_the_tick_of_its_angle(name: str, is_inverted: bool) -> None:
     one = joint(name, is_inverted=is_inverted, neutral=100)
-    ticks = range(one.servo(1).model.family.ticks)
+    family = one.servo(1).model.family
+    first = family.centre - family.ticks // 2
+    ticks = range(first, first + family.ticks, max(1, family.ticks // 5000))
     assert all(one.raws(one.positions({1: tick})[1]) == {1: tick} for tick in ticks)
     assert (one.positions({1: 101})[1] < 0) == is_inverted
     assert one.positions({1: 100}) == {1: 0.0}

@@ -21,6 +21,8 @@ MISTAKES = {
     "action send": "go_to",
     "apply": "nowhere.yaml",
     "body check": "nowhere.yaml",
+    "controller ls": "",
+    "controller switch": "head",
     "doctor": "nobody",
     "down": "nobody",
     "expand": "nowhere.yaml",

@@ -50,8 +50,8 @@ ABOVE = {
     "bus": "sdk.bound",
     "check_runner": "missions.analysis model.robot",
     "checks": "body.model check_runner composition diagnostics.core missions model sdk sections",
-    "cli": "actuation body bus compiler composition doctor executive.requests finding_pages inspection lsp.server "
-    "mission_tests missions model params plan recording rendering replay runtime scaffold schema.documents sdk "
+    "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
+    "inspection lsp.server mission_tests missions model params plan recording rendering replay runtime scaffold schema.documents sdk "
     "sections",
     "controller_interface": "control sdk",
     "controller_manager": "controller_interface",

@@ -42,8 +42,7 @@ if TYPE_CHECKING:
 
 LONGEST_CONFIGURE = 30.0  # [s]
 LONGEST_CLOSE = 1.0  # [s] to deactivate, clean up and leave the bus
-REST_BOUND = 1.0  # [s] of robot time to come to rest when the supervisor is gone
-STEPPED_REST_BOUND = 2.0  # [s] of robot time to come to rest on a stepped clock
+STEPPED_REST_BOUND = 2.0  # [s] of robot time to come to rest on a stepped clock, at least
 CLOCK_TOPIC = "/clock"
 CLOCK_STATUS = "bus.clock"  # what diagnostics call it: no component has a dot in its name
 _TOLD = {
@@ -274,7 +273,7 @@ class ProcessGroup:
 
     def _brake(self, host: Host) -> None:
         host.brake()
-        bound = STEPPED_REST_BOUND if self._options.is_stepped else REST_BOUND
+        bound = max(host.rest_time, STEPPED_REST_BOUND if self._options.is_stepped else 0.0)
         self._rest_deadline = self._clock.now() + bound
         if isinstance(self._driver, SteppedDriver):
             self._driver.hurry()

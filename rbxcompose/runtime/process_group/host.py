@@ -148,6 +148,12 @@ class Host:
         self.is_held = False
         self._each_active("go_on")
 
+    @property
+    def rest_time(self) -> float:
+        """Return how long the components may take to come to rest [s]."""
+        each = (one.instance for one in self.hosted.values())
+        return max((component_type(one.type).rest_time(one.config) for one in each), default=0.0)
+
     def brake(self) -> None:
         """Bring everything to rest for good: the robot goes down."""
         self._told("brake")

@@ -20,7 +20,7 @@ from rbxcompose.runtime.supervision.changes import WORLD, Changes
 from rbxcompose.runtime.supervision.dependents import blocked_by, blocked_text, is_commanding
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member, Phase
 from rbxcompose.runtime.supervision.plan_change import LONGEST, Changing, WhenDone, text_of
-from rbxcompose.runtime.supervision.shutdown import DOWN_BOUND, REST_BOUND, Closing
+from rbxcompose.runtime.supervision.shutdown import END_BOUND, Closing, rest_time
 from rbxcompose.runtime.supervision.silence import LOOK, Silence
 from rbxcompose.scheduler import Scheduler
 
@@ -384,8 +384,9 @@ class Conductor:
             self._changing.cut_off(f"the robot goes down: {reason}")
         if level > Level.OK:
             self._effects.log(level, f"{reason}; the robot goes down", detail)
-        self._after(REST_BOUND, closing.close)
-        self._after(DOWN_BOUND, closing.hurry)
+        bound = rest_time(self.plan)
+        self._after(bound, closing.close)
+        self._after(bound + END_BOUND, closing.hurry)
         closing.brake()
 
     def hurry(self) -> None:

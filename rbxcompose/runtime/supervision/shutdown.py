@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from rbxcompose.plan.model import Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member, Phase
+from rbxcompose.sdk.registry import component_type
 
-REST_BOUND = 1.0  # [s] to come to rest
-DOWN_BOUND = 1.9  # [s] for the whole shutdown; what is left then is killed
+END_BOUND = 0.9  # [s] to end after everything is at rest; what is left then is killed
+
+
+def rest_time(plan: Plan) -> float:
+    """Return how long the components of a plan may take to come to rest [s]."""
+    return max((component_type(one.type).rest_time(one.config) for one in plan.instances), default=0.0)
 
 
 class Closing:

@@ -30,6 +30,7 @@ from rbxcompose.runtime.supervision.gauges import gauges_of
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.runtime.supervision.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
+from rbxcompose.runtime.supervision.shutdown import rest_time
 from rbxcompose.runtime.supervision.silence import DEAD, LOOK
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.capabilities import RunsMissions
@@ -336,6 +337,7 @@ class Supervisor:
             domain=self._launch.plan.bus.domain,
             batteries=gauges_of(plan),
             executive=_executive(plan),
+            rest_time=rest_time(plan),
         )
 
     def _component(self, name: str, type_name: str, process: str) -> ComponentState:

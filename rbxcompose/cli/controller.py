@@ -1,0 +1,84 @@
+"""List and switch the controllers that lead the joints of a running robot."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Iterator
+
+from rbxcompose.cli.bus.entities import table
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.robots.commands import add_asking_options, show_answer
+from rbxcompose.cli.robots.lookup import REFUSED, NotDoneError, answer_of, find_robot, known_state
+from rbxcompose.controller_requests import BUS, ControllerState, ListControllers, SwitchControllers
+from rbxcompose.findings import suggest
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.typed_json import to_data
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    actions = parser.add_subparsers(dest="action", metavar="ls|switch", required=True)
+    ls = actions.add_parser("ls", help="list controllers, whether they are active, and their joints")
+    ls.set_defaults(do=_ls)
+    switch = actions.add_parser(
+        "switch",
+        help="switch controllers on and off, all at once or not at all",
+        description="No joint may be led by two controllers, so name those that give way with --off.",
+    )
+    switch.add_argument("on", metavar="NAME", nargs="*", help="a controller that becomes active")
+    switch.add_argument("--off", metavar="NAME", action="append", default=[], help="one that becomes inactive")
+    switch.set_defaults(do=_switch)
+    for one in (ls, switch):
+        add_asking_options(one)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the chosen subcommand."""
+    do: Callable[[argparse.Namespace], int] = arguments.do
+    try:
+        return do(arguments)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def _listed(folder: RobotFolder) -> Iterator[tuple[str, ControllerState]]:
+    """Yield the controllers of a robot, each with its bus."""
+    state = known_state(folder)
+    for component in state.components if state else ():
+        if component.type == BUS:
+            for one in answer_of(folder, ListControllers(component.name)):
+                yield component.name, one
+
+
+def _ls(arguments: argparse.Namespace) -> int:
+    found = list(_listed(find_robot(arguments.robot)))
+    if arguments.json:
+        tell(json.dumps([{"bus": bus, **to_data(one)} for bus, one in found]))
+    elif not found:
+        tell("this robot has no controllers")
+    else:
+        rows = [(one.name, one.type, _state(one), bus, ", ".join(one.joints), one.note) for bus, one in found]
+        tell(table([("name", "type", "state", "bus", "joints", ""), *rows]))
+    return 0
+
+
+def _state(one: ControllerState) -> str:
+    return "active" if one.is_active else "inactive"
+
+
+def _switch(arguments: argparse.Namespace) -> int:
+    folder = find_robot(arguments.robot)
+    buses = {one.name: bus for bus, one in _listed(folder)}
+    names = [*arguments.on, *arguments.off]
+    if not names:
+        raise NotDoneError(REFUSED.at(None, "name a controller to switch on, or one to switch off with --off"))
+    for name in names:
+        if name not in buses:
+            message = f"there is no controller '{name}'; {suggest(name, buses, 'controllers')}"
+            raise NotDoneError(REFUSED.at(None, message))
+    if len({buses[name] for name in names}) > 1:
+        raise NotDoneError(REFUSED.at(None, "these controllers are on different buses: switch those of one at a time"))
+    request = SwitchControllers(buses[names[0]], tuple(arguments.on), tuple(arguments.off))
+    show_answer(arguments, folder, answer_of(folder, request))
+    return 0
