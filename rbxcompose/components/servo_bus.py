@@ -17,28 +17,33 @@ from rbxcompose.actuation.servo_models import model_named
 from rbxcompose.control.joint_states import Enable, Hold, JointMode, JointPolicy, MoveTo, Relax
 from rbxcompose.control.limits import MotionLimits
 from rbxcompose.control.trajectory import (
+    TrajectoryCode,
     TrajectoryGoal,
     TrajectoryPoint,
     TrajectoryPolicy,
-    TrajectoryRefusal,
     TrajectoryTolerance,
 )
-from rbxcompose.control.trajectory_follower import TrajectoryFollower, TrajectoryOutcome
+from rbxcompose.control.trajectory_follower import TrajectoryFollower
+from rbxcompose.control.trajectory_goals import TrajectoryGoals, TrajectoryWay, move_way
 from rbxcompose.control.trajectory_plan import JointRules
 from rbxcompose.levels import Level
 from rbxcompose.msgs.builtin_interfaces import Duration
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
+from rbxcompose.msgs.entries import ArrayEntries
+from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.std_msgs import Float64, Header
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
-from rbxcompose.sdk import Component, Config, In, Out, Port, ServedGoal, Serves, ServesAction, component
+from rbxcompose.sdk import Component, Config, In, Out, Port, Serves, ServesAction, component
 from rbxcompose.sdk.component import Context
 from rbxcompose.twins.pseudo_terminal import pseudo_terminal
 from rbxcompose.twins.servo_fake import FakeServo
 from rbxcompose.twins.servo_twin import TwinBus
+from rbxcompose.units import ANGLE
 
 Follow = FollowJointTrajectory
+FOLLOW, MOVE = "follow_joint_trajectory", "move"  # the actions of a controller
 NANOSECONDS = 1_000_000_000
 GONE = "the bus of servos has gone"
 REOPEN = 0.5  # [s] between attempts to find a port that has gone
@@ -98,8 +103,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
     """Reads and writes the servos of a bus, keeps their joints within limits, and follows trajectories.
 
     Each joint has a topic `JOINT/command` [rad], and the services `JOINT/relax` and `JOINT/enable`. A joint starts
-    relaxed; the first command switches its torque on, where it is. A controller serves the action
-    `NAME/follow_joint_trajectory`.
+    relaxed; the first command switches its torque on, where it is. A controller serves the actions
+    `NAME/follow_joint_trajectory` and `NAME/move`; the newest goal of either leads its joints.
 
     Example:
         servos: {type: servo_bus, twin: servo, joints: {pan: {id: 1, model: AX-12}}}
@@ -119,9 +124,11 @@ class ServoBusDriver(Component[ServoBusConfig]):
             )
             found[f"{name}_relax"] = Serves(Trigger, f"{name}/relax").named(f"{name}_relax")
             found[f"{name}_enable"] = Serves(SetBool, f"{name}/enable").named(f"{name}_enable")
-        for name in config.controllers:
-            action = ServesAction(Follow, f"{name}/follow_joint_trajectory", claims=name, skill=name)
-            found[name] = action.named(name)
+        for name, one in config.controllers.items():
+            angles = ArrayEntries("joints", "positions", dict.fromkeys(one.joints, ANGLE))
+            follow = ServesAction(Follow, f"{name}/follow_joint_trajectory", claims=name, skill=None)
+            move = ServesAction(MoveJoints, f"{name}/move", claims=name, skill=name, entries=angles)
+            found |= {port: end.named(port) for port, end in ((name, follow), (f"{name}_move", move))}
         return found
 
     def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
@@ -131,7 +138,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
             setattr(self, f"on_{joint}_relax", partial(self.relax, joint))
             setattr(self, f"on_{joint}_enable", partial(self.enable, joint))
         for controller in config.controllers:
-            setattr(self, f"accept_{controller}", self.accept)
+            for way, port in ((FOLLOW, controller), (MOVE, f"{controller}_move")):
+                setattr(self, f"accept_{port}", partial(self.accept, controller, way))
 
     def configure(self) -> None:
         """Open the bus, real or simulated; nothing moves."""
@@ -146,7 +154,11 @@ class ServoBusDriver(Component[ServoBusConfig]):
         }
         drives = {name: JointDrive(joint, policy) for name, joint in joints.items()}
         self.cycle = ServoCycle(self.opened(list(joints.values())), drives, followers)
-        self.goals: dict[str, Any] = dict.fromkeys(config.controllers)
+        follow = partial(TrajectoryWay, trajectory=self.followed, result=result_of)
+        self.goals = {
+            name: TrajectoryGoals(one, {FOLLOW: follow(self.bound[name]), MOVE: move_way(self.bound[f"{name}_move"])})
+            for name, one in followers.items()
+        }
         self.is_stopped, self.lost_at = False, -math.inf
         self.told_at, self.published_at = -math.inf, -math.inf
 
@@ -189,43 +201,23 @@ class ServoBusDriver(Component[ServoBusConfig]):
                 drive.ask(Relax())
             self.info(f"the port '{self.config.port}' is back")
             self.lost_at = -math.inf
-        for name in self.goals:
-            self.take(name)
+        for name, goals in self.goals.items():
+            goals.take(self.now, partial(self.cycle.accept, name, now=self.now))
         for name, outcome in self.cycle.run(self.now, self.period).items():
-            self.end(name, outcome)
+            self.goals[name].end(outcome)
         if self.now - self.published_at >= 1 / PUBLISHED - 1e-9:
             self.published_at = self.now
             self.publish()
 
-    def take(self, name: str) -> None:
-        """Take over the newest goal of a controller, or its cancellation."""
-        goal, follower = self.bound[name].current, self.cycle.followers[name]
-        if goal is not None and goal.cancel_requested:
-            follower.cancel(self.now)
-            self.goals[name] = None
-            goal.canceled(Follow.Result(error_string="canceled"))
-        elif goal is not None and goal is not self.goals[name]:
-            self.goals[name] = goal
-            answer = self.cycle.accept(name, trajectory_of(goal.request, self.now, self.stamp), self.now)
-            if isinstance(answer, TrajectoryRefusal):
-                self.goals[name] = None
-                goal.aborted(answer.message, Follow.Result(error_code=answer.code, error_string=answer.message))
+    def followed(self, goal: Follow.Goal) -> TrajectoryGoal:
+        """Return what a goal asks the follower for."""
+        return trajectory_of(goal, self.now, self.stamp)
 
-    def end(self, name: str, outcome: TrajectoryOutcome) -> None:
-        """End the goal of a controller as its trajectory ended."""
-        goal: ServedGoal[Any, Any, Any] | None = self.goals[name]
-        self.goals[name] = None
-        if goal is None:
-            return
-        result = Follow.Result(error_code=outcome.code, error_string=outcome.message)
-        if outcome.code == Follow.Result.SUCCESSFUL:
-            goal.succeeded(result)
-        else:
-            goal.aborted(outcome.message, result)
-
-    def accept(self, goal: Follow.Goal) -> str:
-        """Refuse what moves while the robot is stopped, or its bus has gone."""
-        return self.refusal()
+    def accept(self, controller: str, way: str, goal: Any) -> str:
+        """Refuse what moves while the robot is stopped, or its bus has gone; what is accepted replaces what leads."""
+        if not (reason := self.refusal()):
+            self.goals[controller].replace(way)
+        return reason
 
     def refusal(self) -> str:
         """Return why nothing may move now, or nothing."""
@@ -286,7 +278,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
     def halt(self, reason: str) -> None:
         """End all trajectories, and bring the joints to rest."""
         for name, outcome in self.cycle.halt(self.now, reason).items():
-            self.end(name, outcome)
+            self.goals[name].end(outcome)
         for drive in self.cycle.drives.values():
             if drive.mode is JointMode.ACTIVE:
                 drive.ask(Hold())
@@ -356,6 +348,11 @@ def trajectory_of(goal: Follow.Goal, now: float, stamp: int) -> TrajectoryGoal:
         tolerances,
         seconds(goal.goal_time_tolerance) or None,
     )
+
+
+def result_of(code: TrajectoryCode, message: str) -> Follow.Result:
+    """Return how a trajectory ended as ROS writes it."""
+    return Follow.Result(error_code=code, error_string=message)
 
 
 def allowed(written: float, default: float | None) -> float | None:

@@ -26,7 +26,7 @@ GROUND = {
     "levels": "",
     "manifest": "config expressions findings per_compile plugins printable references regular_files restarts slips "
     "units",
-    "msgs": "findings",
+    "msgs": "findings units",
     "per_compile": "",
     "plugins": "findings printable",
     "printable": "",
@@ -90,7 +90,7 @@ TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
 }
-TYPE_CHECKING_BLOCKS = 11
+TYPE_CHECKING_BLOCKS = 12
 
 
 def imports(path: Path) -> set[str]:
