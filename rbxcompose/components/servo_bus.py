@@ -40,7 +40,7 @@ from rbxcompose.sdk.component import Context
 from rbxcompose.twins.pseudo_terminal import pseudo_terminal
 from rbxcompose.twins.servo_fake import FakeServo
 from rbxcompose.twins.servo_twin import TwinBus
-from rbxcompose.units import ANGLE
+from rbxcompose.units import ANGLE, LENGTH
 
 Follow = FollowJointTrajectory
 FOLLOW, MOVE = "follow_joint_trajectory", "move"  # the actions of a controller
@@ -60,6 +60,8 @@ class DrivenJointConfig(Config):
     """Model of the servo."""
     neutral: int | None = None
     """The tick at position 0; without it the middle of the range."""
+    slides: bool = False
+    """Whether it slides: its positions are in m then."""
     invert: bool = False
     """Whether it turns the other way round."""
     lower: float | None = None
@@ -124,10 +126,13 @@ class ServoBusDriver(Component[ServoBusConfig]):
             )
             found[f"{name}_relax"] = Serves(Trigger, f"{name}/relax").named(f"{name}_relax")
             found[f"{name}_enable"] = Serves(SetBool, f"{name}/enable").named(f"{name}_enable")
+        sliding = {name for name, one in config.joints.items() if one.slides}
         for name, one in config.controllers.items():
-            angles = ArrayEntries("joints", "positions", dict.fromkeys(one.joints, ANGLE))
+            each = {joint: LENGTH if joint in sliding else ANGLE for joint in one.joints}
             follow = ServesAction(Follow, f"{name}/follow_joint_trajectory", claims=name, skill=None)
-            move = ServesAction(MoveJoints, f"{name}/move", claims=name, skill=name, entries=angles)
+            move = ServesAction(
+                MoveJoints, f"{name}/move", claims=name, skill=name, entries=ArrayEntries("joints", "positions", each)
+            )
             found |= {port: end.named(port) for port, end in ((name, follow), (f"{name}_move", move))}
         return found
 

@@ -71,6 +71,7 @@ def _joint(joint: BodyJoint | None, driven: JointModel, servo: ActuatorModel) ->
         "id": servo.id,
         "model": servo.model,
         "neutral": servo.neutral,
+        "slides": joint is not None and joint.kind == "prismatic",
         "invert": servo.invert,
         "lower": _tighter(max, outer.lower if outer and is_bounded else None, least),
         "upper": _tighter(min, outer.upper if outer and is_bounded else None, greatest),
