@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.expressions.types import TypeKind
-from rbxcompose.findings import Finding
+from rbxcompose.findings import Finding, suggest
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
@@ -66,7 +66,8 @@ def _missing(view: View, skill: Skill) -> Iterator[Finding]:
 def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[Finding]:
     name = argument.name or skill.main
     if not name:
-        yield wrong_argument.at(argument.span, f"the skill '{skill.name}' takes no single value")
+        message = f"the skill '{skill.name}' takes no single value"
+        yield wrong_argument.at(argument.span, message, help=suggest("", skill.arguments, "its arguments"))
     elif name not in skill.arguments:
         message = f"the skill '{skill.name}' has no argument '{name}'"
         taken = {one.name for one in view.node.step.arguments}
