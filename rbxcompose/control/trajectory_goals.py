@@ -43,12 +43,12 @@ class TrajectoryGoals:
         self._way = ""
 
     def replace(self, way: str) -> None:
-        """End the goals of all actions but this one, to which a goal has been sent."""
-        for name, other in self._ways.items():
+        """End the goal that is there, since this action accepts another."""
+        reason = f"replaced by a newer goal of '{way}'"
+        for other in self._ways.values():
             goal = other.server.current
-            if name == way or goal is None:
+            if goal is None:
                 continue
-            reason = f"replaced by a newer goal of '{way}'"
             if goal.cancel_requested:
                 goal.canceled(other.result(TrajectoryCode.SUCCESSFUL, "canceled"))
             else:

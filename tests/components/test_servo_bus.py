@@ -193,6 +193,16 @@ def test_a_newer_goal_of_either_action_replaces_the_older_one(head: Head) -> Non
     assert head.at["pan"] == pytest.approx(0.3, abs=TICK)
 
 
+def test_a_newer_goal_of_the_same_action_replaces_the_older_one_with_the_reason(head: Head) -> None:
+    older: list[Ended[MoveJoints.Result]] = []
+    head.moves(MoveJoints.Goal(joints=("pan",), positions=np.array([1.0]), duration=Duration(sec=3)), older.append)
+    head.robot.advance(1.0)
+    head.move(1.0, pan=0.0)
+    head.robot.advance(2.0)
+    assert [one.result and one.result.message for one in older] == ["replaced by a newer goal of 'move'"]
+    assert head.move_ended[0] == "succeeded"
+
+
 def test_of_goals_that_come_at_the_same_time_the_last_one_leads(head: Head) -> None:
     head.follow((1.0, 0.0, 2.0))
     head.move(1.0, pan=-0.3)
