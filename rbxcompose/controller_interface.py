@@ -7,16 +7,19 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Generic, Literal, Protocol, TypeVar, get_args
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, ClassVar, Generic, Literal, Protocol, Self, TypeVar, get_args
+
+from pydantic import PrivateAttr
 
 from rbxcompose.config import Config
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.trajectory_plan import JointRules
 from rbxcompose.plugins import Plugins
-from rbxcompose.sdk.bound import ServedGoal
+from rbxcompose.sdk.bound import ActionServer, ServedGoal
 from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.ports import Port
+from rbxcompose.units import ANGLE, LENGTH, Dimension
 
 PLUGINS = Plugins("controller", "rbxcompose.controllers")
 _TYPES: dict[str, type[Controller[Any]]] = {}
@@ -30,10 +33,23 @@ class ControllerConfig(Config):
     start: Literal["active", "inactive"] = "active"
     """Whether it leads its joints from the start, or waits until somebody switches to it."""
 
+    _sliding: frozenset[str] = PrivateAttr(default=frozenset())
+
     @property
     def led(self) -> tuple[str, ...]:
         """Return the joints that it leads."""
         raise NotImplementedError
+
+    @property
+    def dimensions(self) -> dict[str, Dimension]:
+        """Return what the positions of its joints measure: angles, or lengths of those that slide."""
+        return {joint: LENGTH if joint in self._sliding else ANGLE for joint in self.led}
+
+    def with_sliding(self, joints: Iterable[str]) -> Self:
+        """Return it for a robot of whose joints these slide."""
+        made = self.model_copy()
+        made._sliding = frozenset(joints)
+        return made
 
 
 C = TypeVar("C", bound=ControllerConfig)
@@ -80,6 +96,9 @@ class ControllerSite(Protocol):
     @property
     def joints(self) -> Mapping[str, LedJoint]:
         """Return its joints by name."""
+
+    def action(self, port: str) -> ActionServer[Any, Any, Any]:
+        """Return the action at one of its ports."""
 
     def goal(self, port: str) -> ServedGoal[Any, Any, Any] | None:
         """Return the current goal at one of its ports."""

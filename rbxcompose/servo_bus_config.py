@@ -70,11 +70,13 @@ class ControllerSetup(Config):
     """Its type."""
     settings: dict[str, Any] = {}
     """Settings of that type."""
+    sliding: list[str] = []
+    """Those of its joints that slide."""
 
     @property
     def config(self) -> ControllerConfig:
         """Return the settings as the configuration of the type."""
-        return controller_type(self.type).config_type().model_validate(self.settings)
+        return controller_type(self.type).config_type().model_validate(self.settings).with_sliding(self.sliding)
 
 
 class ThermalConfig(Config):

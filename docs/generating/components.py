@@ -107,4 +107,4 @@ def remarks(port: Port[Any]) -> str:
 def arguments_of(port: ServesAction[Any, Any, Any] | ServesTopic[Any]) -> list[str]:
     """Return the arguments that a skill takes, the first one first."""
     message = port.interface.Goal if isinstance(port, ServesAction) and port.interface else port.interface
-    return list(typed_fields(message)) if message else []
+    return [*(port.entries.each if port.entries else ()), *(typed_fields(message) if message else ())]

@@ -203,9 +203,10 @@ def skills() -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for name in sorted(PLUGINS.shipped):
         for port in ports_of(name).values():
-            if isinstance(port, ServesAction | ServesTopic) and port.interface:
+            named = port.skill if isinstance(port, ServesAction) else ""
+            if isinstance(port, ServesAction | ServesTopic) and port.interface and named is not None:
                 make = skill_of if isinstance(port, ServesAction) else topic_skill
-                skill = make(port.interface, port.topic.rpartition("/")[2])
+                skill = make(port.interface, named or port.topic.rpartition("/")[2], entries=port.entries)
                 arguments = [f"{code(key)}: {one.phrase}" for key, one in skill.arguments.items()]
                 what = f"{code(name)}: {lowered(first_line(component_type(name).__doc__))}"
                 rows.append((code(skill.name), ", ".join(arguments) or "none", what, code(port.interface.TYPE)))

@@ -102,6 +102,11 @@ class BodyJoint:
         return self.kind in MOVING
 
     @property
+    def slides(self) -> bool:
+        """Return whether its positions are lengths."""
+        return self.kind == "prismatic"
+
+    @property
     def rest(self) -> float:
         """Return the position nearest to 0 within its limits."""
         if self.limits is None or self.kind == "continuous":
@@ -111,7 +116,7 @@ class BodyJoint:
     def at(self, position: float) -> Transform3:
         """Return the child's frame in the parent's at a position [rad or m]; 0 if it does not move."""
         x, y, z = self.axis
-        if self.kind == "prismatic":
+        if self.slides:
             return self.origin.compose(Transform3((x * position, y * position, z * position)))
         if self.moves:
             return self.origin.compose(Transform3(rotation=quaternion_about(self.axis, position)))
@@ -121,7 +126,7 @@ class BodyJoint:
         """Return the position [rad or m] at which the child's frame is there in the parent's; 0 if it does not move."""
         moved = self.origin.inverse().compose(child)
         (x, y, z), (ax, ay, az) = moved.translation, self.axis
-        if self.kind == "prismatic":
+        if self.slides:
             return ax * x + ay * y + az * z
         if not self.moves:
             return 0.0

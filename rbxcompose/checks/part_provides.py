@@ -53,8 +53,7 @@ def part_provides(robot: Robot) -> Iterator[Finding]:
 
 
 def _serves(end: PortEnd, skill: str) -> bool:
-    is_serving = isinstance(end.port, Serves | ServesAction | ServesTopic)
-    return is_serving and end.topic.rpartition("/")[-1] == skill
+    return isinstance(end.port, Serves | ServesAction | ServesTopic) and end.skill == skill
 
 
 def _lacking(robot: Robot, claim: Claim, ends: list[PortEnd]) -> str:

@@ -39,10 +39,8 @@ def two_skills(robot: Robot) -> Iterator[Finding]:
     """
     first: dict[str, PortEnd] = {}
     for end in robot.ends:
-        if not isinstance(end.port, ServesAction | ServesTopic):
+        if not isinstance(end.port, ServesAction | ServesTopic) or not (skill := end.skill):
             continue
-        named = end.port.skill if isinstance(end.port, ServesAction) else ""
-        skill = named or end.topic.rpartition("/")[-1]
         other = first.setdefault(skill, end)
         if other.topic != end.topic:
             yield two_skills.at(

@@ -29,6 +29,7 @@ from rbxcompose.msgs.std_msgs import Float64, Header
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.requests import Refused, answers
 from rbxcompose.sdk import Component, In, Out, Port, ServedGoal, Serves, ServesAction, component
+from rbxcompose.sdk.bound import ActionServer
 from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.component import Context
 from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, mimics_of
@@ -368,10 +369,14 @@ class ControllerSeat:
         """Return the time for message headers [ns]."""
         return self._bus.stamp
 
+    def action(self, port: str) -> ActionServer[Any, Any, Any]:
+        """Return the action at one of the controller's ports."""
+        server: ActionServer[Any, Any, Any] = self._bus.bound[f"{self._name}_{port}"]
+        return server
+
     def goal(self, port: str) -> ServedGoal[Any, Any, Any] | None:
         """Return the current goal at one of the controller's ports."""
-        goal: ServedGoal[Any, Any, Any] | None = self._bus.bound[f"{self._name}_{port}"].current
-        return goal
+        return self.action(port).current
 
     def send(self, port: str, message: Any) -> None:
         """Publish at one of the controller's ports."""

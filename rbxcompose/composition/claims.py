@@ -9,7 +9,7 @@ from rbxcompose.composition.instance_names import Renaming
 from rbxcompose.composition.robot_manifest import About, Claim
 from rbxcompose.manifest.section import Contents
 from rbxcompose.manifest.tree import key_span, value_span
-from rbxcompose.references import TOPIC, VALUE
+from rbxcompose.references import CONTROLLER, TOPIC, VALUE
 from rbxcompose.sections.needs import needs
 from rbxcompose.sections.provides import provides
 
@@ -26,10 +26,11 @@ def claims_of(part: Contents) -> Iterator[Claim]:
 
 
 def renamed(claim: Claim, renaming: Renaming) -> Claim:
-    """Return a claim with its name outside the part; a skill is named like the topic of its action."""
+    """Return a claim with its name outside the part; a skill is a controller, or named like the topic of its action."""
     match claim.about:
         case About.VALUE:
             return replace(claim, name=renaming.name(VALUE, claim.name))
         case About.SKILL:
-            return replace(claim, name=renaming.topic(claim.name).rpartition("/")[-1])
+            name = renaming.name(CONTROLLER, claim.name)
+            return replace(claim, name=renaming.topic(name).rpartition("/")[-1])
     return replace(claim, name=renaming.name(TOPIC, claim.name))

@@ -7,21 +7,26 @@ from typing import Any, Literal
 from pydantic import Field
 
 from rbxcompose.config import Angle, Config, JointName, Time
+from rbxcompose.control.curves import JointSample
 from rbxcompose.control.trajectory import (
+    TrajectoryCode,
     TrajectoryGoal,
     TrajectoryPoint,
     TrajectoryPolicy,
-    TrajectoryRefusal,
     TrajectoryTolerance,
 )
 from rbxcompose.control.trajectory_follower import TrajectoryFollower, TrajectoryOutcome
+from rbxcompose.control.trajectory_goals import TrajectoryGoals, TrajectoryWay, move_way
 from rbxcompose.controller_interface import Controller, ControllerConfig, controller
 from rbxcompose.msgs.builtin_interfaces import Duration
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
+from rbxcompose.msgs.entries import ArrayEntries
+from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.stamps import to_nanoseconds
-from rbxcompose.sdk import Port, ServedGoal, ServesAction
+from rbxcompose.sdk import Port, ServesAction
 
 Follow = FollowJointTrajectory
+FOLLOW, MOVE = "follow_joint_trajectory", "move"  # its ports
 NANOSECONDS = 1_000_000_000
 
 
@@ -60,7 +65,7 @@ class JointTrajectoryConfig(ControllerConfig):
 
 @controller("joint_trajectory")
 class JointTrajectoryController(Controller[JointTrajectoryConfig]):
-    """Follows trajectories, by the action `NAME/follow_joint_trajectory` of ROS.
+    """Follows trajectories, by the action `NAME/follow_joint_trajectory` of ROS; `NAME/move` is the skill of missions.
 
     Trajectories are linear, cubic or quintic by what their points hold; one at 0 s is reached as fast as the limits
     allow. A new goal replaces the old one. However a trajectory ends, its joints come to rest within their limits.
@@ -71,12 +76,16 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
 
     @classmethod
     def ports(cls, name: str, config: JointTrajectoryConfig) -> dict[str, Port[Any]]:
-        """Return the action."""
-        return {"follow": ServesAction(Follow, f"{name}/follow_joint_trajectory", claims=name, skill=name)}
+        """Return both actions; `move` is a skill."""
+        entries = ArrayEntries("joints", "positions", config.dimensions)
+        return {
+            FOLLOW: ServesAction(Follow, f"{name}/{FOLLOW}", claims=name, skill=None),
+            MOVE: ServesAction(MoveJoints, f"{name}/{MOVE}", claims=name, skill=name, entries=entries),
+        }
 
     def prepare(self) -> None:
         """Set up the follower."""
-        config, joints = self.config, self.site.joints
+        config, site = self.config, self.site
         policy = TrajectoryPolicy(
             interpolation=config.interpolation,
             outside=config.outside,
@@ -84,18 +93,24 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
             tolerance=TrajectoryTolerance(config.tolerance.path, config.tolerance.goal),
             goal_time=config.tolerance.goal_time,
         )
-        self.follower = TrajectoryFollower({name: one.rules for name, one in joints.items()}, policy)
-        self.followed: ServedGoal[Any, Any, Any] | None = None  # the goal of the trajectory that runs
+        self.follower = TrajectoryFollower({name: one.rules for name, one in site.joints.items()}, policy)
+        follow = TrajectoryWay(site.action(FOLLOW), self._trajectory, result_of)
+        self.goals = TrajectoryGoals(self.follower, {FOLLOW: follow, MOVE: move_way(site.action(MOVE))})
 
     @property
     def leads(self) -> bool:
         """Return whether a trajectory runs."""
         return self.follower.is_following
 
+    def accept(self, port: str, goal: Any) -> str:
+        """Replace what leads the joints."""
+        self.goals.replace(port)
+        return ""
+
     def cycle(self, now: float, dt: float) -> None:
         """Take over the newest goal, or its cancellation, and lead the joints."""
-        self._take(now)
         joints = self.site.joints
+        self.goals.take(now, lambda goal: self.follower.accept(goal, now, self._measured(), self._commanded()))
         for name, joint in joints.items():
             if self.follower.is_moving and joint.blocked:
                 self._end(self.follower.lose(name, now, f"joint '{name}': {joint.blocked}"))
@@ -108,36 +123,23 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
         """End the trajectory."""
         self._end(self.follower.abort(now, reason))
 
-    def _measured(self) -> dict[str, Any]:
+    def _trajectory(self, goal: Follow.Goal) -> TrajectoryGoal:
+        return trajectory_of(goal, self.site.now, self.site.stamp)
+
+    def _measured(self) -> dict[str, JointSample]:
         return {name: one.measured for name, one in self.site.joints.items()}
 
-    def _commanded(self) -> dict[str, Any]:
+    def _commanded(self) -> dict[str, JointSample]:
         return {name: one.commanded for name, one in self.site.joints.items()}
 
-    def _take(self, now: float) -> None:
-        goal = self.site.goal("follow")
-        if goal is not None and goal.cancel_requested:
-            self.follower.cancel(now)
-            self.followed = None
-            goal.canceled(Follow.Result(error_string="canceled"))
-        elif goal is not None and goal is not self.followed:
-            self.followed = goal
-            wanted = trajectory_of(goal.request, now, self.site.stamp)
-            answer = self.follower.accept(wanted, now, self._measured(), self._commanded())
-            if isinstance(answer, TrajectoryRefusal):
-                self.followed = None
-                goal.aborted(answer.message, Follow.Result(error_code=answer.code, error_string=answer.message))
-
     def _end(self, outcome: TrajectoryOutcome | None) -> None:
-        goal = self.followed
-        if outcome is None or goal is None:
-            return
-        self.followed = None
-        result = Follow.Result(error_code=outcome.code, error_string=outcome.message)
-        if outcome.code == Follow.Result.SUCCESSFUL:
-            goal.succeeded(result)
-        else:
-            goal.aborted(outcome.message, result)
+        if outcome is not None:
+            self.goals.end(outcome)
+
+
+def result_of(code: TrajectoryCode, message: str) -> Follow.Result:
+    """Return how a trajectory ended as ROS writes it."""
+    return Follow.Result(error_code=code, error_string=message)
 
 
 def trajectory_of(goal: Follow.Goal, now: float, stamp: int) -> TrajectoryGoal:

@@ -102,13 +102,13 @@ class RobotWorld:
         source = self._shell.equipment.skills[skill]
         match source.way:
             case SkillWay.ACTION:
-                goal = goal_of(registry.action(source.action), arguments)
+                goal = goal_of(registry.action(source.action), arguments, source.skill.entries)
                 return GoalErrand(self._shell, done, source.skill, goal)
             case SkillWay.SERVICE:
                 request = filled(registry.service(source.action).Request, arguments)
                 return CallErrand(self._shell, done, skill, SKILL + skill, request)
             case SkillWay.TOPIC:
-                order = filled(registry.message(source.action), arguments)
+                order = filled(registry.message(source.action), arguments, source.skill.entries)
                 return TopicErrand(self._shell, done, self._desks.of(source), source, order)
             case SkillWay.PYTHON:
                 return PythonErrand(self._shell, done, skill_type(skill), arguments)

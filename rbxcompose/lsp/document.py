@@ -9,7 +9,7 @@ from rbxcompose.lsp.cursor import Cursor, locate
 from rbxcompose.lsp.names import KnownNames
 from rbxcompose.lsp.project import MISSION, OVERLAY, kind_of
 from rbxcompose.model.robot import Robot
-from rbxcompose.schema.documents import MAKERS, installed_schema
+from rbxcompose.schema.documents import MAKERS, schema_for
 from rbxcompose.schema.guide import Guide
 
 DEFAULT_KIND = "Robot"  # unless the text names another
@@ -45,7 +45,7 @@ class Document:
         if cursor is None:
             return None
         known = KnownNames(self.path, cursor.root, self.robot)
-        return Spot(self, cursor, known, Guide(installed_schema(self.kind), cursor.root, known.types))
+        return Spot(self, cursor, known, Guide(schema_for(self.kind, known.skills), cursor.root, known.types))
 
 
 @dataclass(frozen=True, slots=True)

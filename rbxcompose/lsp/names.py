@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.registry import naming, section_named
 from rbxcompose.manifest.shapes import kind_of_keys
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, at
+from rbxcompose.missions.program.program import Skill
 from rbxcompose.model.robot import Robot
 from rbxcompose.references import COMPONENT, PORT, RUNNING, VALUE
 from rbxcompose.sections.args import args
@@ -65,6 +66,11 @@ class KnownNames:
         if self.robot is None:
             return {}
         return {name: entry.type for name, entry in self.robot.manifest.components.items()}
+
+    @property
+    def skills(self) -> Mapping[str, Skill]:
+        """Return the skills of the robot."""
+        return self.robot.names.skills if self.robot else {}
 
     def _in_text(self, kind: str) -> dict[str, str]:
         found: dict[str, str] = {}

@@ -119,7 +119,8 @@ def _arguments(context: TrialContext, name: str, node: TreeNode) -> dict[str, Va
     found: dict[str, Value] = {}
     for key, value in written.items():
         if key not in skill.arguments:
-            message = f"the skill '{name}' has no argument '{key}'" if key else f"the skill '{name}' takes no argument"
+            nothing = "single value" if skill.arguments else "argument"
+            message = f"the skill '{name}' has no argument '{key}'" if key else f"the skill '{name}' takes no {nothing}"
             span = key_span(node, (key,))
             context.report.add(codes.UNKNOWN.misspelt(span, message, key, skill.arguments, "its arguments"))
             continue

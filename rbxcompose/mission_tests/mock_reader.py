@@ -62,7 +62,8 @@ def _values(context: TrialContext, skill: Skill, node: TreeNode | None) -> list[
     if not isinstance(node, SequenceNode):
         return []
     if not skill.main:
-        context.report.add(codes.NEVER.at(node.span, f"'{skill.name}' takes no argument"))
+        what = "single value" if skill.arguments else "argument"
+        context.report.add(codes.NEVER.at(node.span, f"'{skill.name}' takes no {what}"))
         return []
     found: list[Value] = []
     for item in node.items:

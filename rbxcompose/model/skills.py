@@ -38,15 +38,15 @@ def _served(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
 def _actions(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
     for end in _ends(components):
         port = end.port
-        if isinstance(port, ServesAction) and port.interface is not None:
-            name = port.skill or end.topic.rsplit("/", 1)[-1]
+        if isinstance(port, ServesAction) and port.interface is not None and end.skill:
             skill = skill_of(
                 port.interface,
-                name,
+                end.skill,
                 port.claims,
                 port.restartable,
                 pausable=port.pausable,
                 outcomes=port.outcomes,
+                entries=port.entries,
             )
             yield SkillSource(skill, end.type_name, end.topic)
 
@@ -54,7 +54,7 @@ def _actions(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
 def _services(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
     for end in _ends(components):
         if isinstance(end.port, Serves) and end.port.interface is not None:
-            skill = service_skill(end.port.interface, end.topic.rsplit("/", 1)[-1])
+            skill = service_skill(end.port.interface, end.skill)
             if skill is not None:
                 yield SkillSource(skill, end.type_name, end.topic, SkillWay.SERVICE)
 
@@ -65,8 +65,15 @@ def _topics(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
         if not isinstance(port, ServesTopic) or port.interface is None:
             continue
         told = port.ends.interface if port.ends is not None else None
-        name = end.topic.rsplit("/", 1)[-1]
-        skill = topic_skill(port.interface, name, told, port.claims, port.restartable, outcomes=port.outcomes)
+        skill = topic_skill(
+            port.interface,
+            end.skill,
+            told,
+            port.claims,
+            port.restartable,
+            outcomes=port.outcomes,
+            entries=port.entries,
+        )
         yield SkillSource(skill, end.type_name, end.topic, SkillWay.TOPIC, _orders(components, end, port))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from rbxcompose.config import Config
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import Port
+from rbxcompose.sdk.ports import Port, ServesAction
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +24,12 @@ class PortEnd:
     def type_name(self) -> str:
         """Return the ROS name of the port's type; empty for a look-up."""
         return self.port.interface.TYPE if self.port.interface else ""
+
+    @property
+    def skill(self) -> str:
+        """Return the name that a skill served here has in missions; empty if they do not have it."""
+        named = self.port.skill if isinstance(self.port, ServesAction) else ""
+        return "" if named is None else named or self.topic.rpartition("/")[-1]
 
 
 def resolve(topic: str, namespace: str) -> str:

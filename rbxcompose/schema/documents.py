@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rbxcompose.atomic_files import replace_file
+from rbxcompose.missions.program.program import Skill
 from rbxcompose.schema.mission import mission_schema
 from rbxcompose.schema.robot import overlay_schema, part_schema, robot_schema
 from rbxcompose.schema.scalars import Schema
@@ -35,6 +36,11 @@ _WIDTH = 120  # of a line in a file
 def installed_schema(kind: str) -> Schema:
     """Return the schema of a kind of manifest with all installed component types; it must not be modified."""
     return MAKERS[kind](registry.usable_names())
+
+
+def schema_for(kind: str, skills: Mapping[str, Skill]) -> Schema:
+    """Return the schema of a kind of manifest for a robot with these skills; it must not be modified."""
+    return mission_schema(registry.usable_names(), skills) if skills and kind == "Mission" else installed_schema(kind)
 
 
 def as_text(schema: Schema) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from rbxcompose.config import Name
@@ -74,8 +75,11 @@ class MissionFile(ManifestHeader):
     """A mission: what the robot does, as a tree of nodes."""
 
 
-def mission_schema(types: Iterable[str]) -> Schema:
-    """Return the schema of a mission's file for robots that may use these types of components."""
+def mission_schema(types: Iterable[str], skills: Mapping[str, Skill] = MappingProxyType({})) -> Schema:
+    """Return the schema of a mission's file for robots that may use these types of components.
+
+    `skills` are those of a known robot: some depend on the configurations of its components.
+    """
     schemas, definitions = schemas_of({"inputs": dict[Name, ArgumentModel]})
     properties: dict[str, Schema] = {
         "inputs": {**schemas["inputs"], "type": ["object", "null"]},
@@ -87,7 +91,7 @@ def mission_schema(types: Iterable[str]) -> Schema:
         "machine": MACHINE,
     }
     made = {key: {**properties[key], "description": _ABOUT[key]} for key in KEYS if key in properties}
-    schema = document("Mission", MissionFile, made, definitions | _nodes(types))
+    schema = document("Mission", MissionFile, made, definitions | _nodes(types, skills))
     # `check` reports which of the two bodies is missing: editors name neither well when a choice fails.
     return {**schema, "anyOf": [{"required": ["do"]}, {"required": ["machine"]}]}
 
@@ -116,10 +120,12 @@ def _interrupt() -> Schema:
     }
 
 
-def _nodes(types: Iterable[str]) -> dict[str, Schema]:
+def _nodes(types: Iterable[str], skills: Mapping[str, Skill]) -> dict[str, Schema]:
     """Return the definitions of a node and of a list of nodes."""
+    told = skills_of(types)
+    told |= {name: (skill, told[name][1] if name in told else "Skill of this robot.") for name, skill in skills.items()}
     anywhere = {"name": NODE_NAME, **modifier_schemas()}
-    known = {name: _skill(skill, about) for name, (skill, about) in skills_of(types).items()}
+    known = {name: _skill(skill, about) for name, (skill, about) in told.items()}
     closed: dict[str, Schema] = {}
     for name, kind in kinds().items():
         keys, needed = kind_schema(kind)
@@ -191,7 +197,7 @@ def _skill(skill: Skill, about: str) -> Schema:
     single = argument_schema(skill.arguments[skill.main]) if skill.main else {}
     several = {"type": "object", "properties": arguments, "additionalProperties": False}
     notes = {key: single[key] for key in ("x-names",) if key in single}
-    empty = [] if skill.required else [{"type": "null"}]
+    empty = [] if skill.required or skill.entries else [{"type": "null"}]
     word = {**single, "type": [name for name in single.get("type", ()) if name != "object"]}
     return {"anyOf": [*([word] if single else []), several, *empty], "description": about, **notes}
 
@@ -209,7 +215,7 @@ def skills_of(types: Iterable[str]) -> dict[str, tuple[Skill, str]]:
 def _skills(cls: type[Any]) -> Iterator[Skill]:
     for _, port in inspect.getmembers(cls):
         name = port.topic.rsplit("/", 1)[-1] if isinstance(port, ServesAction | ServesTopic) else ""
-        if isinstance(port, ServesAction) and port.interface is not None:
-            yield skill_of(port.interface, name, port.claims, port.restartable)
+        if isinstance(port, ServesAction) and port.interface is not None and port.skill is not None:
+            yield skill_of(port.interface, port.skill or name, port.claims, port.restartable, entries=port.entries)
         if isinstance(port, ServesTopic) and port.interface is not None:
-            yield topic_skill(port.interface, name, None, port.claims, port.restartable)
+            yield topic_skill(port.interface, name, None, port.claims, port.restartable, entries=port.entries)

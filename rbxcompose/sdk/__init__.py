@@ -21,6 +21,7 @@ from rbxcompose.config import (
 )
 from rbxcompose.geometry import Pose2
 from rbxcompose.levels import Level
+from rbxcompose.msgs.entries import ArrayEntries
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Command, Query, Refused, answers
 from rbxcompose.robot_events import MissionOver, MissionWaits
@@ -48,6 +49,7 @@ __all__ = [
     "Angle",
     "AngularAcceleration",
     "AngularSpeed",
+    "ArrayEntries",
     "Calls",
     "CallsAction",
     "Capability",

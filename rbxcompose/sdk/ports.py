@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, overload
 
+from rbxcompose.msgs.entries import ArrayEntries
 from rbxcompose.msgs.types import Action, Message, Service
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import ActionCaller, ActionServer, Caller, Latest, Look, Sender
@@ -96,7 +97,7 @@ class ServesTopic(In[M]):
     """Takes orders, each one a message; it is a skill of every mission under its topic's name.
 
     The method `on_<port>` begins to carry out an order, and a newer one replaces it. The fields of the message are the
-    arguments of the skill; `claims`, `restartable` and `outcomes` are as in `ServesAction`.
+    arguments of the skill; `claims`, `restartable`, `outcomes` and `entries` are as in `ServesAction`.
 
     `ends` is the output of the same component that reports how an order ended: by its flag `success`, perhaps an
     `outcome`, and a `message` with the reason. Without it the skill succeeds as soon as the order is sent. `halts` is
@@ -122,13 +123,15 @@ class ServesTopic(In[M]):
         claims: str = "",
         restartable: bool = True,
         outcomes: Mapping[str, str] = MappingProxyType({}),
+        entries: ArrayEntries | None = None,
         qos: Qos | str = Qos.EVENT,
         max_rate: float | None = None,
     ) -> None:
         """Declare the port.
 
         Raises:
-            ValueError: if `ends` cannot report an end, or if `halts` or `outcomes` could never be used.
+            ValueError: if `ends` cannot report an end, if `halts` or `outcomes` could never be used, or if the message
+                does not have the `entries`.
         """
         super().__init__(message, topic, qos=qos, is_open=True, max_rate=max_rate)
         end: type[Message] | None = ends.interface if ends is not None else None
@@ -141,7 +144,9 @@ class ServesTopic(In[M]):
         _require_outcomes(outcomes, end)
         if halts is not None:
             halts.is_open = True  # whether a mission feeds it depends on the skills that the robot's missions use
-        self.ends, self.halts = ends, halts
+        if entries is not None:
+            entries.require_in(message)
+        self.ends, self.halts, self.entries = ends, halts, entries
         self.claims, self.restartable, self.outcomes = claims, restartable, outcomes
 
 
@@ -180,7 +185,8 @@ class ServesAction(Port[ActionServer[G, R, F]]):
     ends besides success and failure, each with which of the two it counts as; the result names them in its text field
     `outcome`. A `pausable` one respects `current.is_paused`: the service `<topic>/pause` holds goals. The optional
     method `accept_<port>` may refuse a goal by returning the reason. `skill` is its name in missions; without it, that
-    is the last word of the topic.
+    is the last word of the topic, and None means that missions do not have it. Its arguments are the fields of the
+    goal, and the `entries` of two of its arrays.
     """
 
     kind = "serves_action"
@@ -194,16 +200,21 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         restartable: bool = True,
         pausable: bool = False,
         outcomes: Mapping[str, str] = MappingProxyType({}),
-        skill: str = "",
+        skill: str | None = "",
+        entries: ArrayEntries | None = None,
     ) -> None:
         """Declare the port.
 
         Raises:
-            ValueError: if there are outcomes but the result has no field for them, or one counts as something else.
+            ValueError: if there are outcomes but the result has no field for them, one counts as something else, or the
+                goal does not have the `entries`.
         """
         super().__init__(topic)
         self.skill = skill
         _require_outcomes(outcomes, action.Result)
+        if entries is not None:
+            entries.require_in(action.Goal)
+        self.entries = entries
         self.interface, self.claims, self.restartable = action, claims, restartable
         self.pausable, self.outcomes = pausable, outcomes
 

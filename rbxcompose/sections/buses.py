@@ -68,7 +68,11 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
                 for joint, one in own.items()
             },
             "controllers": {
-                controller: {"type": one.type, "settings": as_written(one)}
+                controller: {
+                    "type": one.type,
+                    "settings": as_written(one),
+                    "sliding": [joint for joint in one.led if joint in known.joints and known.joints[joint].slides],
+                }
                 for controller, one in contents.of(controllers).items()
                 if set(one.led) <= own.keys()
             },

@@ -160,7 +160,7 @@ def _mistakes(
         return
     if not joint.moves:
         yield DOES_NOT_MOVE.at(at, f"joint '{name}' is {joint.kind} in the body, so no servo can move it")
-    slides = joint.kind == "prismatic"
+    slides = joint.slides
     if slides and one.travel is None and not one.calibration:
         yield NOT_TOGETHER.at(at, f"joint '{name}' slides: it needs 'travel' or 'calibration'")
     if not slides and one.travel is not None:

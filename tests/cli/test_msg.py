@@ -52,13 +52,13 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
     assert main(["msg", "export", str(tmp_path)]) == 0
     folder = tmp_path / "rbxcompose_msgs"
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert written == {"package.xml", "CMakeLists.txt", "action/Recharge.action", "srv/SetBatteryLevel.srv"}
+    own = {"action/MoveJoints.action", "action/Recharge.action", "srv/SetBatteryLevel.srv"}
+    assert written == {"package.xml", "CMakeLists.txt", *own}
     cmake = (folder / "CMakeLists.txt").read_text()
-    assert '"action/Recharge.action"' in cmake
-    assert '"srv/SetBatteryLevel.srv"' in cmake
+    assert all(f'"{name}"' in cmake for name in own)
     root = ElementTree.fromstring((folder / "package.xml").read_text())
     assert root.findtext("name") == "rbxcompose_msgs"
-    assert [one.text for one in root.iter("depend")] == ["action_msgs"]
+    assert [one.text for one in root.iter("depend")] == ["action_msgs", "builtin_interfaces"]
 
 
 def test_an_export_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

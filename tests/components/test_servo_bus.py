@@ -10,7 +10,9 @@ import pytest
 from rbxcompose.actuation.port_errors import LostPortError
 from rbxcompose.msgs.builtin_interfaces import Duration
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
+from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.sensor_msgs import JointState
+from rbxcompose.msgs.stamps import to_duration
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
@@ -44,6 +46,8 @@ class Head:
         bus = self.robot.bus
         bus.subscribe("me", "/joint_states", JointState, Qos.STATE, self._moved)
         self.goals = bus.action_client("me", "/head/follow_joint_trajectory", Follow)
+        self.moves = bus.action_client("me", "/head/move", MoveJoints)
+        self.moved: Ended[MoveJoints.Result] | None = None
         self.commands = {
             name: bus.publisher("me", f"/{name}/command", Float64, Qos.COMMAND) for name in ("pan", "tilt")
         }
@@ -63,6 +67,31 @@ class Head:
         ]
         goal = Follow.Goal(trajectory=JointTrajectory(joint_names=joints, points=tuple(made)))
         return self.goals(goal, self._over)
+
+    def move(self, duration: float = 0.0, **positions: float) -> Any:
+        """Move joints by name."""
+        self.moved = None
+        goal = MoveJoints.Goal(
+            joints=tuple(positions), positions=np.array([*positions.values()]), duration=to_duration(duration)
+        )
+        return self.moves(goal, self._arrived)
+
+    def _arrived(self, ended: Ended[MoveJoints.Result]) -> None:
+        self.moved = ended
+
+    @property
+    def move_ended(self) -> tuple[str, str]:
+        """How the last move ended, and why."""
+        assert self.moved
+        assert self.moved.result
+        return self.moved.outcome, self.moved.result.message
+
+    @property
+    def follow_ended(self) -> tuple[str, str]:
+        """How the last trajectory ended, and why."""
+        assert self.ended
+        assert self.ended.result
+        return self.ended.outcome, self.ended.result.error_string
 
     def _over(self, ended: Ended[Follow.Result]) -> None:
         self.ended = ended
@@ -101,6 +130,121 @@ def test_goals_that_make_no_sense_are_refused_with_the_reason(head: Head) -> Non
         assert head.ended.result.error_code < 0
         assert reason in head.ended.result.error_string
     assert head.at == pytest.approx({"pan": 0.0, "tilt": 0.0}, abs=TICK)
+
+
+def test_a_joint_moves_by_its_name_in_its_time_while_the_others_stay(head: Head) -> None:
+    head.move(2.0, pan=0.5)
+    head.robot.advance(1.0)
+    assert head.moved is None
+    assert head.at["pan"] == pytest.approx(0.25, abs=0.05)
+    head.robot.advance(2.0)
+    assert head.move_ended == ("succeeded", "arrived")
+    assert head.at == pytest.approx({"pan": 0.5, "tilt": 0.0}, abs=TICK)
+
+
+def test_without_a_duration_a_move_is_as_fast_as_the_limits_allow(head: Head) -> None:
+    head.move(pan=1.5, tilt=-0.1)
+    head.robot.advance(0.9)
+    assert head.moved is None  # 1.5 rad/s
+    head.robot.advance(1.1)
+    assert head.move_ended == ("succeeded", "arrived")
+    assert head.at == pytest.approx({"pan": 1.5, "tilt": -0.1}, abs=TICK)
+
+
+def test_a_move_that_makes_no_sense_is_refused_with_the_reason_and_the_joints_rest(head: Head) -> None:
+    for duration, positions, reason in (
+        (2.0, {"pan": 5.0}, "outside of its limits"),
+        (0.1, {"pan": 1.0}, "its limit is 1.5"),
+        (2.0, {"roll": 1.0}, "joint 'roll' is unknown"),
+        (2.0, {}, "no joints"),
+        (-1.0, {"pan": 1.0}, "before the start"),
+        (2.0, {"pan": float("nan")}, "nan"),
+    ):
+        head.move(2.0, tilt=0.5)
+        head.robot.advance(0.5)
+        head.move(duration, **positions)
+        head.robot.advance(0.5)
+        outcome, message = head.move_ended
+        assert outcome == "aborted"
+        assert reason in message
+        there = dict(head.at)
+        head.robot.advance(0.5)
+        assert head.at == there
+
+
+def test_a_joint_without_limits_needs_a_duration() -> None:
+    free = Head(joints=CONFIG["joints"] | {"pan": {"servos": [{"id": 1, "model": "AX-12"}]}})
+    free.move(pan=0.5)
+    free.robot.advance(0.5)
+    assert "joint 'pan' has no limits that say how fast" in free.move_ended[1]
+    free.move(1.0, pan=0.5)
+    free.robot.advance(2.0)
+    assert free.move_ended[0] == "succeeded"
+
+
+def test_a_newer_goal_of_either_action_replaces_the_older_one(head: Head) -> None:
+    head.move(3.0, pan=1.0)
+    head.robot.advance(1.0)
+    head.follow((-0.5, 0.0, 3.0))
+    head.robot.advance(0.1)
+    assert head.move_ended == ("aborted", "replaced by a newer goal of 'follow_joint_trajectory'")
+    head.robot.advance(1.0)
+    assert head.ended is None
+    head.move(2.0, pan=0.3)
+    head.robot.advance(0.1)
+    assert head.follow_ended == ("aborted", "replaced by a newer goal of 'move'")
+    head.robot.advance(3.0)
+    assert head.move_ended[0] == "succeeded"
+    assert head.at["pan"] == pytest.approx(0.3, abs=TICK)
+
+
+def test_a_newer_goal_of_the_same_action_replaces_the_older_one_with_the_reason(head: Head) -> None:
+    older: list[Ended[MoveJoints.Result]] = []
+    head.moves(MoveJoints.Goal(joints=("pan",), positions=np.array([1.0]), duration=Duration(sec=3)), older.append)
+    head.robot.advance(1.0)
+    head.move(1.0, pan=0.0)
+    head.robot.advance(2.0)
+    assert [one.result and one.result.message for one in older] == ["replaced by a newer goal of 'move'"]
+    assert head.move_ended[0] == "succeeded"
+
+
+def test_of_goals_that_come_at_the_same_time_the_last_one_leads(head: Head) -> None:
+    head.follow((1.0, 0.0, 2.0))
+    head.move(1.0, pan=-0.3)
+    head.robot.advance(3.0)
+    assert head.follow_ended[0] == "aborted"
+    assert head.move_ended[0] == "succeeded"
+    head.move(1.0, pan=0.5)
+    head.follow((0.2, 0.0, 2.0))
+    head.robot.advance(3.0)
+    assert head.move_ended[0] == "aborted"
+    assert head.follow_ended[0] == "succeeded"
+    assert head.at["pan"] == pytest.approx(0.2, abs=TICK)
+
+
+def test_a_goal_that_is_replaced_while_it_is_being_canceled_is_canceled(head: Head) -> None:
+    sent = head.move(3.0, pan=1.5)
+    head.robot.advance(1.0)
+    sent.cancel()
+    head.follow((0.0, 0.0, 2.0))
+    head.robot.advance(3.0)
+    assert head.move_ended == ("canceled", "canceled")
+    assert head.follow_ended[0] == "succeeded"
+
+
+def test_a_move_is_canceled_and_refused_like_a_trajectory(head: Head) -> None:
+    sent = head.move(3.0, pan=1.5)
+    head.robot.advance(1.0)
+    sent.cancel()
+    head.robot.advance(1.0)
+    assert head.move_ended[0] == "canceled"
+    there = dict(head.at)
+    head.robot.host.stop()
+    head.move(1.0, pan=0.0)
+    head.robot.advance(1.0)
+    assert head.moved
+    assert head.moved.outcome is Outcome.REJECTED
+    assert head.at == there
 
 
 def test_a_single_joint_is_commanded_within_its_limits_but_not_while_a_controller_leads_it(head: Head) -> None:

@@ -25,6 +25,13 @@ URDF = """<robot name="example">
   </joint>
 </robot>
 """
+HEAD = """
+body: {urdf: robot.urdf}
+buses: {servos: {type: dynamixel}}
+actuators: {pan_servo: {bus: servos, model: AX-12, id: 1}}
+joints: {pan_joint: {actuator: pan_servo, limits: {acceleration: 360 deg/s^2}}}
+controllers: {head: {type: joint_trajectory, joints: [pan_joint]}}
+"""  # of a mission that says `head` behind its fence
 
 WALKED_THROUGH = ("tutorial.md", "missions.md", "sdk.md")  # their manifests need each other, or a package
 
@@ -81,7 +88,7 @@ def checked(block: Block, folder: Path) -> Checked:
     """Compile the manifest or the fragment that a block holds."""
     kind = next((word for word in ("robot", "mission") if word in block.words[1:]), "")
     if kind == "mission":
-        return check_mission(HEADER + block.text, folder)
+        return check_mission(HEADER + block.text, folder, HEAD if "head" in block.words else "")
     if kind == "robot":
         return check_robot(with_sections(ROBOT, block.text), folder, profiles=profiles_of(block.text))
     if "\nkind: Mission\n" in block.text:
@@ -108,10 +115,10 @@ def check_overlay(text: str, folder: Path) -> Checked:
     return check_robot(ROBOT, folder, overlays=[str(path)])
 
 
-def check_mission(text: str, folder: Path) -> Checked:
-    """Compile the patrol robot with one more mission; one that does not say what to do recharges."""
+def check_mission(text: str, folder: Path, more: str = "") -> Checked:
+    """Compile the patrol robot with more sections and a mission; one that does not say what to do recharges."""
     whole = text if _WORK.search(text) else f"{text}do: recharge\n"
-    robot = with_sections(ROBOT, "missions:\n  example: ../../missions/example.yaml\n")
+    robot = with_sections(ROBOT, f"{more}missions:\n  example: ../../missions/example.yaml\n")
     return check_robot(robot, folder, example=whole)
 
 

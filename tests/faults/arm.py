@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from signal import Signals
 from typing import Self
 
 from rbxcompose.runtime.folder import RobotFolder
@@ -102,9 +103,10 @@ class Arm:
     def process(self, name: str) -> Process | None:
         """Return one of the robot's processes, None if it is not there now."""
         state = self.state.read_state()
+        assert state is not None
         return state.supervisor if name == "supervisor" else state.processes.get(name)
 
-    def send(self, name: str, number: int) -> Process:
+    def send(self, name: str, number: Signals) -> Process:
         """Send a signal to one of the robot's processes, which must be there."""
         found = self.process(name)
         assert found is not None

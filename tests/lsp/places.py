@@ -13,6 +13,8 @@ from tests.conftest import ROOT
 
 ROBOT = ROOT / "robots/turtlebot/robot.yaml"
 TWINS = ROOT / "robots/twins/robot.yaml"
+HEAD = ROOT / "robots/head_only/robot.yaml"
+LOOK = ROOT / "missions/look_around.yaml"
 PATROL = ROOT / "missions/patrol.yaml"
 BATTERY = ROOT / "parts/battery.yaml"
 
@@ -22,7 +24,7 @@ class Editor:
 
     def __init__(self) -> None:
         self.project = Project({})
-        for path in (ROBOT, TWINS):
+        for path in (ROBOT, TWINS, HEAD):
             self.project.change(path, path.read_text(encoding="utf-8"))
 
     def complete(self, path: Path, old: str, new: str) -> list[CompletionItem]:

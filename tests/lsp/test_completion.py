@@ -9,7 +9,7 @@ import pytest
 from rbxcompose.lsp.completion import complete
 from rbxcompose.lsp.document import Document
 from rbxcompose.missions.modifiers.registry import modifier_keys
-from tests.lsp.places import BATTERY, PATROL, ROBOT, TWINS, Editor
+from tests.lsp.places import BATTERY, LOOK, PATROL, ROBOT, TWINS, Editor
 
 PLACES = ["dock", "corner_1", "corner_2", "corner_3", "corner_4"]
 COMPONENTS = ["battery", "base", "go_to", "charger", "cmd_vel"]
@@ -48,6 +48,14 @@ def editor() -> Editor:
         (PATROL, "afterwards: continue", "afterwards: ", ["continue"]),
         (PATROL, "optional: true", "optional: ", ["true"]),
         (TWINS, "      dock: dock\n      runtime: 60 s", "      ", ["reach", "warn", "error"]),
+        (LOOK, "      head_pan_joint: $side\n", "      head_", ["head_pan_joint", "head_tilt_joint"]),
+        (
+            LOOK,
+            "      head_pan_joint: $side\n      duration",
+            "      ",
+            ["head_pan_joint", "head_tilt_joint", "duration"],
+        ),
+        (LOOK, "head_pan_joint: $side", "head_pan_joint: $", ["side", "up"]),
         (BATTERY, "${args.reach}", "${args.", ["args.reach", "args.dock"]),
     ],
 )

@@ -10,6 +10,7 @@ from tests.msgs.samples import JAZZY, MESSAGES, ORACLE, STRUCTURES
 FIBONACCI = "example_interfaces/action/Fibonacci"
 NAVIGATE = "nav2_msgs/action/NavigateToPose"
 RECHARGE = "rbxcompose_msgs/action/Recharge"
+MOVE = "rbxcompose_msgs/action/MoveJoints"
 # From outside: what the ROS 2 generators (rosidl) wrote for Kilted, as shipped with micro-ROS in hpmicro/hpm_sdk
 # (middleware/microros/kilted/include/**/*__description.c). Jazzy's messages are the same.
 # Those of `String` and `AddTwoInts` also stand in the design document of ros2/rmw_zenoh.
@@ -80,6 +81,10 @@ FROZEN = {
     f"{RECHARGE}_SendGoal": "6695726de16a4b12f7a1622217a6a451feeef4522e0a2b9f60f2481a7123c3b1",
     f"{RECHARGE}_GetResult": "589276a9fce043dd216c8a3eaeba22b469c27b528c40dd1bc3bbbd894bcf47aa",
     f"{RECHARGE}_FeedbackMessage": "cec34c06663592f88b3da45ea79f14c373cf28b81951082053c86b5b5e028091",
+    MOVE: "d25ebab48100afe20354953d411e85f9615575d360eef3db70e012ccf8a9491f",
+    f"{MOVE}_SendGoal": "41a4e6a889099ce9ac66f60f88daf4d353e1ba5710104f036636c2378f03f676",
+    f"{MOVE}_GetResult": "e5f5e828f2bba75667a29187c2237d0639b619086d8441c9f6205e4caba756bf",
+    f"{MOVE}_FeedbackMessage": "9dd7601fae1f7c7a59008afb2f1601ae27a26147169558dad1269ed14e8425f3",
     "rbxcompose_msgs/srv/SetBatteryLevel": "f3de3ec6a24f423726cfed90fc0099d964acc55ca8091b092569b33f71b4cf2a",
 }
 

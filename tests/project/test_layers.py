@@ -26,7 +26,7 @@ GROUND = {
     "levels": "",
     "manifest": "config expressions findings per_compile plugins printable references regular_files restarts slips "
     "units",
-    "msgs": "findings",
+    "msgs": "findings units",
     "per_compile": "",
     "plugins": "findings printable",
     "printable": "",
@@ -51,8 +51,8 @@ ABOVE = {
     "check_runner": "missions.analysis model.robot",
     "checks": "body.model check_runner composition diagnostics.core missions model sdk sections",
     "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
-    "inspection lsp.server mission_tests missions model params plan recording rendering replay runtime scaffold schema.documents sdk "
-    "sections",
+    "inspection lsp.server mission_tests missions model params plan recording rendering replay runtime scaffold "
+    "schema.documents sdk sections",
     "controller_interface": "control sdk",
     "controller_manager": "controller_interface",
     "controller_requests": "",
@@ -96,7 +96,7 @@ TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
 }
-TYPE_CHECKING_BLOCKS = 11
+TYPE_CHECKING_BLOCKS = 12
 
 
 def imports(path: Path) -> set[str]:

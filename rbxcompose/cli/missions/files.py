@@ -142,7 +142,10 @@ def _how(source: SkillSource) -> str:
 
 def _example(skill: Skill) -> str:
     """Return a line of a mission that uses the skill."""
-    if not skill.arguments:
+    if skill.entries:
+        name, measured = next(iter(skill.entries.each.items()))
+        return f"{skill.name}: {{{name}: {example(measured)}}}"
+    if not skill.main:
         return skill.name
     main = skill.arguments[skill.main]
     if main.dimension:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.expressions.types import TypeKind
-from rbxcompose.findings import Finding
+from rbxcompose.findings import Finding, suggest
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
@@ -13,6 +13,7 @@ from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.language.argument_types import check_written
 from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.program.program import Skill
+from rbxcompose.units import example
 
 STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
 
@@ -21,7 +22,8 @@ STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
 def wrong_argument(mission: Examined) -> Iterator[Finding]:
     """Wrong, missing or unknown argument of a skill
 
-    A skill takes the fields of its action's goal as arguments; a single value is the main one.
+    A skill takes the fields of its action's goal as arguments; a single value is the main one. That of a controller
+    takes its joints by name, at least one of them.
 
     Bad:
 
@@ -51,6 +53,10 @@ def _missing(view: View, skill: Skill) -> Iterator[Finding]:
     given = {argument.name or skill.main for argument in view.node.step.arguments}
     if given - skill.arguments.keys():
         return  # the missing argument may be the misspelt one
+    if skill.entries and not given & skill.entries.each.keys():
+        first, measured = next(iter(skill.entries.each.items()))
+        message = f"the skill '{skill.name}' needs at least one of {', '.join(skill.entries.each)}"
+        yield wrong_argument.at(view.node.span, message, help=f"write '{first}: {example(measured)}' below it")
     for name in sorted(skill.required - given):
         message = f"the skill '{skill.name}' needs its argument '{name}'"
         help_text = f"write '{skill.name}: ...'" if name == skill.main else f"write '{name}: ...' below it"
@@ -60,7 +66,8 @@ def _missing(view: View, skill: Skill) -> Iterator[Finding]:
 def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[Finding]:
     name = argument.name or skill.main
     if not name:
-        yield wrong_argument.at(argument.span, f"the skill '{skill.name}' takes no single value")
+        message = f"the skill '{skill.name}' takes no single value"
+        yield wrong_argument.at(argument.span, message, help=suggest("", skill.arguments, "its arguments"))
     elif name not in skill.arguments:
         message = f"the skill '{skill.name}' has no argument '{name}'"
         taken = {one.name for one in view.node.step.arguments}

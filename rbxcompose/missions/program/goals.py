@@ -14,6 +14,7 @@ from rbxcompose.geometry import Pose2
 from rbxcompose.missions.program.program import Skill
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import INTEGERS, attribute, parse_type
+from rbxcompose.msgs.entries import ArrayEntries
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
 from rbxcompose.msgs.plain import from_plain, to_plain
 from rbxcompose.msgs.stamps import to_duration, to_seconds
@@ -47,14 +48,15 @@ def skill_of(
     *,
     pausable: bool = False,
     outcomes: Mapping[str, str] = MappingProxyType({}),
+    entries: ArrayEntries | None = None,
 ) -> Skill:
     """Return an action as a skill: the fields of its goal are the arguments, the first one is the main one.
 
     A field that is not a pose, time, text, flag or number is not an argument and keeps its zero value. A main argument
-    that is a pose or a time is required.
+    that is a pose or a time is required. With `entries`, those are arguments, too, and none is the main one.
     """
     results = typed_fields(action.Result)
-    return Skill(name, *_asked(action.Goal), claims, restartable, pausable, dict(outcomes), results)
+    return Skill(name, *_asked(action.Goal, entries), claims, restartable, pausable, dict(outcomes), results, entries)
 
 
 def topic_skill(
@@ -65,13 +67,15 @@ def topic_skill(
     restartable: bool = True,
     *,
     outcomes: Mapping[str, str] = MappingProxyType({}),
+    entries: ArrayEntries | None = None,
 ) -> Skill:
     """Return orders on a topic as a skill whose ends are messages `end`; its arguments are as for an action.
 
     Without `end`, it has no results.
     """
     results = typed_fields(end) if end is not None else {}
-    return Skill(name, *_asked(order), claims, restartable, outcomes=dict(outcomes), results=results)
+    asked = _asked(order, entries)
+    return Skill(name, *asked, claims, restartable, outcomes=dict(outcomes), results=results, entries=entries)
 
 
 def service_skill(service: type[Service[Any, Any]], name: str) -> Skill | None:
@@ -82,9 +86,11 @@ def service_skill(service: type[Service[Any, Any]], name: str) -> Skill | None:
     return Skill(name, arguments, next(iter(arguments), ""), results=results)
 
 
-def _asked(message: type[Message]) -> tuple[dict[str, Type], str, frozenset[str]]:
-    """Return the arguments that a message has fields for, the main one, and the required ones."""
+def _asked(message: type[Message], entries: ArrayEntries | None) -> tuple[dict[str, Type], str, frozenset[str]]:
+    """Return the arguments that a message has fields or entries for, the main one, and the required ones."""
     arguments = typed_fields(message)
+    if entries is not None:
+        return {name: quantity_of(one) for name, one in entries.each.items()} | arguments, "", frozenset()
     main = next(iter(arguments), "")
     needed = frozenset({main} if main and message.FIELDS[main] in (STAMPED, POSED, LASTING) else ())
     return arguments, main, needed
@@ -95,20 +101,25 @@ def typed_fields(message: type[Message]) -> dict[str, Type]:
     return {field: _TYPES[ros] for field, ros in message.FIELDS.items() if ros in _TYPES}
 
 
-def goal_of(action: type[Action[Any, Any, Any]], arguments: Mapping[str, Value]) -> Message:
+def goal_of(
+    action: type[Action[Any, Any, Any]], arguments: Mapping[str, Value], entries: ArrayEntries | None = None
+) -> Message:
     """Return the goal with these arguments; places and poses are in `map`.
 
     Raises:
-        KeyError: if the goal has no such field.
+        KeyError: if the goal has no such field or entry.
         ValueError: if a value does not fit into its field.
     """
-    return filled(action.Goal, arguments)
+    return filled(action.Goal, arguments, entries)
 
 
-def filled(message: type[Message], arguments: Mapping[str, Value]) -> Message:
-    """Return a message whose fields have these values; raises as `goal_of` does."""
-    fields = message.FIELDS
-    return message(**{attribute(name): _MAKERS[fields[name]](value) for name, value in arguments.items()})
+def filled(message: type[Message], arguments: Mapping[str, Value], entries: ArrayEntries | None = None) -> Message:
+    """Return a message whose fields and entries have these values; raises as `goal_of` does."""
+    fields, own = message.FIELDS, dict(arguments)
+    if entries is not None:
+        names = [name for name in own if name in entries.each and name not in typed_fields(message)]
+        own |= entries.arrays({name: own.pop(name) for name in names})
+    return message(**{attribute(name): _MAKERS[fields[name]](value) for name, value in own.items()})
 
 
 def message_of(message: type[M], fields: Mapping[str, Value]) -> M:
@@ -174,6 +185,7 @@ _MAKERS: Mapping[str, Callable[[Any], object]] = {
     "string": str,
     "bool": bool,
     **dict.fromkeys(("float32", "float64"), float),
+    **dict.fromkeys(("string[]", "float32[]", "float64[]"), tuple),
     **{ros: _whole for ros, wanted in _TYPES.items() if wanted == COUNT},
 }
 _POSES: Mapping[str, Callable[[Any], Message]] = {STAMPED: _stamped, POSED: _pose}

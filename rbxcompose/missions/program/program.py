@@ -28,6 +28,7 @@ from rbxcompose.missions.program.modifier import Modifier
 from rbxcompose.missions.program.moments import NodeEffects
 from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.possible import Possibility
+from rbxcompose.msgs.entries import ArrayEntries
 
 ROOT = 0  # number of the node under `do`
 RATE = 20.0  # [Hz] for polling conditions that change without a message
@@ -40,6 +41,7 @@ class Skill:
 
     `outcomes` are those besides `success` and `failure`, each with which of the two it counts as. `claims` is what it
     needs exclusively (base, arm, head, voice), empty for nothing. `results` are the types of its result values.
+    `entries` are arguments among which at least one must be given.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Skill:
     pausable: bool = False
     outcomes: Mapping[str, str] = field(default_factory=dict)
     results: Mapping[str, Type] = field(default_factory=dict)
+    entries: ArrayEntries | None = None
 
 
 @dataclass(frozen=True, slots=True)

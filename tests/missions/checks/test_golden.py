@@ -10,9 +10,11 @@ from rbxcompose.check_runner import all_checks
 from rbxcompose.compiler import compile_robot
 from rbxcompose.finding_pages import all_kinds
 from rbxcompose.missions.analysis.check_runner import mission_checks
+from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.rendering.text import render_text
-from rbxcompose.sdk import skill
+from rbxcompose.sdk import ArrayEntries, Component, Config, ServesAction, component, skill
 from rbxcompose.testing.golden import Golden
+from rbxcompose.units import ANGLE, LENGTH
 
 HERE = Path(__file__).parent
 CODES = sorted(
@@ -23,6 +25,18 @@ CODES = sorted(
 @skill("pour", restartable=False)
 def pour() -> None:
     """Pour; twice would be too much."""
+
+
+@component("toy_neck")
+class Neck(Component[Config]):
+    """Turns and lifts a head.
+
+    Example:
+        neck: {type: toy_neck}
+    """
+
+    entries = ArrayEntries("joints", "positions", {"pan_joint": ANGLE, "lift_joint": LENGTH})
+    move = ServesAction(MoveJoints, "neck/move", skill="neck", entries=entries)
 
 
 @pytest.mark.parametrize("code", CODES)
