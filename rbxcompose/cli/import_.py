@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     programs = parser.add_subparsers(dest="program", metavar="PROGRAM", required=True)
     for name, one in importers().items():
-        program = programs.add_parser(name, help=one.about, description=f"Import {one.about}.")
+        program = programs.add_parser(name, help=f"import {one.about}", description=f"Import {one.about}.")
         program.add_argument("files", nargs="+", metavar="FILE", help="its files; together they make one robot")
         program.add_argument("--out", metavar="FILE", help="write the manifest to this new file")
         program.add_argument("--name", metavar="NAME", help="the robot's name (default: that of the first file)")
