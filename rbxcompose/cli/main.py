@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import rbxcompose
 from rbxcompose import cli
-from rbxcompose.cli.verbs import load, parser_of, verbs
+from rbxcompose.cli.verbs import load, module_of, parser_of, verbs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -74,5 +74,5 @@ def _help() -> str:
 
 def _about(name: str) -> str:
     """Return the first line of a verb's docstring, read from its text: importing all verbs would take too long."""
-    with open(os.path.join(cli.__path__[0], f"{name}.py"), encoding="utf-8") as file:
+    with open(os.path.join(cli.__path__[0], f"{module_of(name)}.py"), encoding="utf-8") as file:
         return file.readline().strip().strip('"')

@@ -57,8 +57,13 @@ def read_name(text: str, what: str, taken: Collection[str] = ()) -> str:
 
 
 def _better(text: str) -> str:
-    made = re.sub(r"[^a-z0-9]+", "_", text.lower()).lstrip("_0123456789").rstrip("_")[:LONGEST_NAME]
+    made = name_like(text)
     return f"did you mean '{made}'?" if made else "a name has lower-case letters, digits and underscores"
+
+
+def name_like(text: str) -> str:
+    """Return the name that is most like a text, empty if there is none."""
+    return re.sub(r"[^a-z0-9]+", "_", text.lower()).lstrip("_0123456789").rstrip("_")[:LONGEST_NAME]
 
 
 def read_text(text: str) -> str:

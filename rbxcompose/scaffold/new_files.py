@@ -15,7 +15,8 @@ EXISTS = kind(
     "RBX9101",
     """A file already exists
 
-`new` never overwrites anything. Choose another name, move the file away, or use another folder with `--into`.
+`new` and `import` never overwrite anything. Choose another name, move the file away, or use another folder with
+`--into` or `--out`.
 """,
 )
 NOT_WRITTEN = kind(

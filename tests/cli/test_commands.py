@@ -210,7 +210,7 @@ def test_a_command_to_a_running_robot_imports_nothing_heavy(verb: str) -> None:
 
 def test_each_verb_says_what_it_does_in_one_line() -> None:
     for verb in verbs.verbs():
-        text = (ROOT / "rbxcompose" / "cli" / f"{verb}.py").read_text(encoding="utf-8")
+        text = (ROOT / "rbxcompose" / "cli" / f"{verbs.module_of(verb)}.py").read_text(encoding="utf-8")
         first = (ast.get_docstring(ast.parse(text)) or "").splitlines()[0]
         assert first.endswith(".")
         assert len(first) <= 100

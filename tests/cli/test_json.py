@@ -27,6 +27,7 @@ MISTAKES = {
     "down": "nobody",
     "expand": "nowhere.yaml",
     "explain": "RBX1099",
+    "import arbotix": "nowhere.yaml",
     "logs": "--robot nobody",
     "mission cancel": "",
     "mission explore": "patrl robots/turtlebot",

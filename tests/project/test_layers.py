@@ -51,8 +51,8 @@ ABOVE = {
     "check_runner": "missions.analysis model.robot",
     "checks": "body.model check_runner composition diagnostics.core missions model sdk sections",
     "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
-    "inspection lsp.server mission_tests missions model params plan recording rendering replay runtime scaffold "
-    "schema.documents sdk sections",
+    "importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "
+    "scaffold schema.documents sdk sections",
     "controller_interface": "control sdk",
     "controller_manager": "controller_interface",
     "controller_requests": "",
@@ -66,6 +66,7 @@ ABOVE = {
     "doctor": "bus.graph composition model.robot runtime.folder runtime.processes sdk sections",
     "executive": "missions sdk",
     "finding_pages": "check_runner missions.analysis",
+    "importing": "actuation.servo_models composition.dump scaffold.answers sections",
     "inspection": "body.model bus.names bus.wire composition missions model plan schema sdk sections",
     "lsp": "compiler composition missions model.robot schema sections",
     "mission_tests": "compiler components.mission composition executive missions model plan.model sdk testing.bench",

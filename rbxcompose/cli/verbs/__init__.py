@@ -1,8 +1,12 @@
-"""The verbs: found by the names of their files, and imported only when needed."""
+"""The verbs: found by the names of their files, and imported only when needed.
+
+The file of a verb that is a word of Python ends in an underscore, which is not part of the verb's name.
+"""
 
 from __future__ import annotations
 
 import importlib
+import keyword
 import os
 from typing import TYPE_CHECKING, Protocol, cast
 
@@ -29,12 +33,17 @@ class Verb(Protocol):
 def verbs() -> list[str]:
     """Return the names of all verbs, sorted."""
     names = (name.removesuffix(".py") for name in os.listdir(cli.__path__[0]) if name.endswith(".py"))
-    return sorted(name for name in names if name not in ("__init__", "main"))
+    return sorted(name.removesuffix("_") for name in names if name not in ("__init__", "main"))
+
+
+def module_of(verb: str) -> str:
+    """Return the name of a verb's module in the package `cli`."""
+    return f"{verb}_" if keyword.iskeyword(verb) else verb
 
 
 def load(verb: str) -> Verb:
     """Import a verb."""
-    return cast(Verb, importlib.import_module(f"{cli.__name__}.{verb}"))
+    return cast(Verb, importlib.import_module(f"{cli.__name__}.{module_of(verb)}"))
 
 
 def parser_of(name: str, verb: Verb) -> argparse.ArgumentParser:

@@ -1,0 +1,1 @@
+"""Files of `arbotix_python`, the ROS driver of the ArbotiX board and of Dynamixel servos, become manifests."""

@@ -1,0 +1,1 @@
+"""Importers, one file each, by the name of the program whose files they read."""

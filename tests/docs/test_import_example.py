@@ -1,0 +1,22 @@
+"""The example of an import is what the import makes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.docs.examples import ROOT, blocks_of
+from tests.importing.imports import import_files
+
+PAGE = (ROOT / "docs/how_to.md").read_text(encoding="utf-8")
+SECTION = PAGE.partition("## From ArbotiX files to a robot\n")[2].partition("\n## ")[0]
+
+
+def test_the_page_shows_what_the_import_makes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    old, _, made = (block.text for block in blocks_of(SECTION, "how_to.md"))
+    monkeypatch.chdir(tmp_path)
+    Path("head.yaml").write_text(old, encoding="utf-8")
+    found = import_files([Path("head.yaml")], "head")
+    assert found.text.replace("# body:", "body:") == made
+    assert not found.report.has_errors

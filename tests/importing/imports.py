@@ -1,0 +1,57 @@
+"""Imports of texts and files, as `import` does them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rbxcompose.findings import Report
+from rbxcompose.importing.foreign_files import read_files
+from rbxcompose.importing.importer import imported
+from rbxcompose.manifest.reader import read_text
+from rbxcompose.rendering.text import render_text
+
+FILES = Path(__file__).parent / "arbotix"
+
+
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """What became of some files."""
+
+    text: str
+    report: Report
+    sources: dict[str, str]
+
+    @property
+    def told(self) -> list[tuple[str, int]]:
+        """The codes of the findings with their lines, by place."""
+        return [(one.code, one.span.line if one.span else 0) for one in self.report]
+
+    @property
+    def words(self) -> str:
+        """The findings as a person reads them."""
+        return render_text(self.report, self.sources)
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The manifest as plain data; it has no mistake of YAML."""
+        assert read_text(self.text, "made.yaml")[1] == []
+        found = yaml.safe_load(self.text)
+        assert isinstance(found, dict)
+        return found
+
+
+def import_files(paths: Sequence[Path], name: str = "tried") -> Imported:
+    report, sources = Report(), dict[str, str]()
+    return Imported(imported("arbotix", read_files(paths, report, sources), name, report), report, sources)
+
+
+def import_texts(folder: Path, *texts: str) -> Imported:
+    paths = [folder / f"file_{number}.yaml" for number, _ in enumerate(texts, 1)]
+    for path, text in zip(paths, texts, strict=True):
+        path.write_text(text, encoding="utf-8")
+    return import_files(paths)
