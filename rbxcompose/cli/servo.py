@@ -23,11 +23,12 @@ _ABOUT = {
     "write": "write values of a servo, raw or with a unit",
     "set-id": "give the one servo on the cable another id",
     "reboot": "start servos of protocol 2.0 again, torque off",
-    "relax": "switch torque off",
+    "relax": "switch torque off; the next goal may switch it on",
+    "disable": "switch torque off, so that no goal switches it on",
     "enable": "switch torque on; they hold where they are",
     "identify": "blink the light of a servo",
 }
-_SEVERAL, _GROUPS = ("ping", "reboot", "identify"), ("relax", "enable")
+_SEVERAL, _GROUPS = ("ping", "reboot", "identify"), ("relax", "disable", "enable")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -48,6 +48,7 @@ MISTAKES = {
     "replay": "nowhere.mcap --info",
     "service call": "set_battery_level",
     "service ls": "",
+    "servo disable": "1 --port nowhere",
     "servo enable": "1 --port nowhere",
     "servo identify": "1 --port nowhere",
     "servo info": "1 --port nowhere",
