@@ -52,6 +52,7 @@ MISTAKES = {
     "servo enable": "1 --port nowhere",
     "servo identify": "1 --port nowhere",
     "servo info": "1 --port nowhere",
+    "servo new-robot": "arm --port nowhere",
     "servo ping": "1 --port nowhere",
     "servo read": "1 present_position --port nowhere",
     "servo reboot": "1 --port nowhere",

@@ -74,7 +74,7 @@ ABOVE = {
     "rendering": "",
     "replay": "bus plan.model recording runtime.process_group runtime.records sdk",
     "runtime": "body.transform_errors body.transforms bus missions.program.sources params plan recording sdk",
-    "scaffold": "composition missions sdk",
+    "scaffold": "actuation.servo_models composition missions sdk",
     "schema": "missions sdk sections",
     "sdk": "",
     "sections": "actuation.servo_models body sdk",

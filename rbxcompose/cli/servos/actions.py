@@ -16,9 +16,9 @@ from rbxcompose.cli.bus.entities import table
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.cli.servos import torque
-from rbxcompose.cli.servos.reach import bus_at, elsewhere, known, protocols, written
+from rbxcompose.cli.servos.new_robot import new_robot
+from rbxcompose.cli.servos.reach import bus_at, elsewhere, known, nobody, protocols, written
 from rbxcompose.cli.servos.values import raw_values, shown, unknown_item
-from rbxcompose.printable import plain
 
 _BLINKS, _HALF = 3, 0.3  # times; [s] on and [s] off
 
@@ -45,9 +45,7 @@ def _ping(arguments: argparse.Namespace) -> int:
 def _told(found: list[FoundServo], arguments: argparse.Namespace) -> int:
     """List servos; it is an error if there are none."""
     if not found:
-        rates = " and ".join(map(str, arguments.baud))
-        words = f"no servo answers on {plain(arguments.port)} at {rates} bit/s"
-        return refuse(SILENT.at(None, words, help="check power and cable; try other rates with --baud"))
+        return nobody(arguments)
     if arguments.json:
         tell(json.dumps([{"id": s.id, "protocol": s.protocol, "model": s.name, "baud": s.baud} for s in found]))
     else:
@@ -153,5 +151,6 @@ ACTIONS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "disable": _done(torque.disable),
     "enable": _done(torque.enable),
     "identify": _done(_identify),
+    "new-robot": new_robot,
 }
 """By name."""

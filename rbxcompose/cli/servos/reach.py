@@ -64,3 +64,10 @@ def known(bus: DynamixelBus, id: int, arguments: argparse.Namespace) -> FoundSer
 def elsewhere(arguments: argparse.Namespace) -> str:
     """Return how to look for a silent servo."""
     return f"look for it: rbxcompose servo scan --port {plain(arguments.port)} --baud 57600 115200 1000000 2000000"
+
+
+def nobody(arguments: argparse.Namespace) -> int:
+    """Tell that no servo answers, and return the exit code."""
+    rates = " and ".join(map(str, arguments.baud))
+    words = f"no servo answers on {plain(arguments.port)} at {rates} bit/s"
+    return refuse(SILENT.at(None, words, help="check power and cable; try other rates with --baud"))
