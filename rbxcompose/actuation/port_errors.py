@@ -60,6 +60,28 @@ Bad: a plug that carries the weight of its cable.
 Good: a plug that is screwed or tied down.
 """,
 )
+NO_USB_DEVICE = kind(
+    "RBX2251",
+    """The USB device of a port is not connected
+
+The port names a device by vendor, product and serial number, and none of the devices that are connected has them.
+`lsusb` lists all devices, `udevadm info /dev/ttyUSB0` tells the serial number of one.
+
+Bad: `devices: {adapter: {vendor: 0403, product: 6001}}`, for an adapter with `ID 0403:6014` in `lsusb`.
+Good: `devices: {adapter: {vendor: 0403, product: 6014}}`
+""",
+)
+TWO_USB_DEVICES = kind(
+    "RBX2252",
+    """More than one USB device is meant
+
+Two adapters of one kind differ only by their serial numbers. Those that have none, and adapters with several ports,
+can be told apart by the socket: `/dev/serial/by-path/...`.
+
+Bad: `devices: {adapter: {vendor: 0403, product: 6014}}`, with two such adapters connected.
+Good: `devices: {adapter: {vendor: 0403, product: 6014, serial: FT4THV5C}}`
+""",
+)
 SLOW_ADAPTER = kind(
     "RBX2206",
     """The adapter holds replies back
@@ -79,11 +101,12 @@ class PortError(Exception):
     """Raised when a serial port cannot be used; each cause has its own class, kind of finding and help."""
 
     kind: ClassVar[FindingKind]
-    help: ClassVar[str] = ""
+    help: str = ""
 
-    def __init__(self, path: str, problem: str) -> None:
+    def __init__(self, path: str, problem: str, help: str = "") -> None:
         super().__init__(f"{path} {problem}")
         self.path, self.problem = path, problem
+        self.help = help or self.help
 
     def finding(self, span: Span | None = None) -> Finding:
         """Return what to tell a person."""
@@ -116,6 +139,18 @@ class UnfitPortError(PortError):
 
     kind = UNFIT
     help = "name a serial port, and a baud rate of its adapter"
+
+
+class NoDeviceError(PortError):
+    """Raised when the USB device of a port is not connected."""
+
+    kind = NO_USB_DEVICE
+
+
+class DeviceNotUniqueError(PortError):
+    """Raised when more than one port belongs to a USB device as it is named."""
+
+    kind = TWO_USB_DEVICES
 
 
 class LostPortError(PortError):

@@ -32,7 +32,20 @@ from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.std_msgs import Float64, Header
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
-from rbxcompose.sdk import Component, Config, In, Out, Port, ServedGoal, Serves, ServesAction, component
+from rbxcompose.sdk import (
+    Capability,
+    Component,
+    Config,
+    In,
+    OpensPort,
+    Out,
+    Port,
+    ServedGoal,
+    Serves,
+    ServesAction,
+    Setting,
+    component,
+)
 from rbxcompose.sdk.component import Context
 from rbxcompose.twins.pseudo_terminal import pseudo_terminal
 from rbxcompose.twins.servo_fake import FakeServo
@@ -123,6 +136,11 @@ class ServoBusDriver(Component[ServoBusConfig]):
             action = ServesAction(Follow, f"{name}/follow_joint_trajectory", claims=name, skill=name)
             found[name] = action.named(name)
         return found
+
+    @classmethod
+    def capabilities(cls, config: ServoBusConfig) -> tuple[Capability, ...]:
+        """Return that real servos need their port."""
+        return () if config.twin else (OpensPort(Setting(config.port, "port")),)
 
     def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
         """Give the ports of joints and controllers their methods."""

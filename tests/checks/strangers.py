@@ -25,6 +25,7 @@ from rbxcompose.sdk import (
     In,
     Length,
     Navigates,
+    OpensPort,
     Out,
     PlaceName,
     Ratio,
@@ -126,6 +127,23 @@ class PilotConfig(Config):
     """On the spot."""
     off_by: Length = 0.05
     """How near it comes."""
+
+
+class ScannerConfig(Config):
+    """A device on a serial port."""
+
+    device: str
+    """Its port."""
+
+
+@component("toy_scanner")
+class Scanner(Component[ScannerConfig]):
+    """A device on a serial port."""
+
+    @classmethod
+    def capabilities(cls, config: ScannerConfig) -> tuple[Capability, ...]:
+        """Return which port it opens."""
+        return (OpensPort(Setting(config.device, "device")),)
 
 
 @component("toy_pilot")

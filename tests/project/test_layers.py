@@ -58,7 +58,8 @@ ABOVE = {
     "composition": "body.description sections",
     "control": "",
     "diagnostics": "",
-    "doctor": "bus.graph composition model.robot runtime.folder runtime.processes sdk sections",
+    "doctor": "actuation.port_errors actuation.serial_ports bus.graph composition model.flow model.robot "
+    "runtime.folder runtime.processes sdk sections",
     "executive": "missions sdk",
     "finding_pages": "check_runner missions.analysis",
     "inspection": "body.model bus.names bus.wire composition missions model plan schema sdk sections",
