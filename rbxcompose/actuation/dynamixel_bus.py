@@ -65,7 +65,7 @@ class DynamixelBus:
         self._port: BlockingPort | None = self._opened()
 
     def _opened(self) -> BlockingPort:
-        path = port_path(self.path)  # a device that was plugged in again may have another one
+        self.opened_at = path = port_path(self.path)  # a device that was plugged in again may have another one
         self.latency = latency_of(path)
         self._timeout = self._patience if self.latency is None else max(self._patience, self.latency + _SLACK)
         port = BlockingPort(path, self.baud, timeout=self._timeout, clock=self._clock)

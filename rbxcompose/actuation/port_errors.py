@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import ClassVar
 
 from rbxcompose.findings import Finding, FindingKind, Severity, Span, kind
 from rbxcompose.printable import plain
 
+_RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
 SLOW = 0.001  # [s] of an adapter's latency timer above which it delays every reply
 
 NO_PORT = kind(
@@ -87,10 +89,12 @@ SLOW_ADAPTER = kind(
     """The adapter holds replies back
 
 FTDI adapters collect what comes from the servos for the time of their latency timer, 16 ms as they are sold, so that
-fewer than 60 requests fit into a second. 1 ms is best; a udev rule keeps it.
+fewer than 60 requests fit into a second. 1 ms is best: write it now, and let a udev rule keep it. `doctor` looks at all
+adapters, `up` and `servo` at those that they open.
 
 Bad: `cat /sys/bus/usb-serial/devices/ttyUSB0/latency_timer` shows 16.
-Good: `ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"` in
+Good: `echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer`, and
+`ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"` in
 `/etc/udev/rules.d/99-servos.rules`
 """,
     Severity.WARNING,
@@ -165,5 +169,6 @@ def slow_adapter(path: str, latency: float | None, span: Span | None = None) -> 
     if latency is None or latency <= SLOW:
         return None
     words = f"the adapter of {plain(path)} holds replies back for up to {1000 * latency:.0f} ms"
-    rule = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
-    return SLOW_ADAPTER.at(span, words, help=f"in /etc/udev/rules.d/99-servos.rules: {rule}")
+    timer = f"/sys/bus/usb-serial/devices/{plain(Path(path).resolve().name)}/latency_timer"
+    now = f"echo 1 | sudo tee {timer}"
+    return SLOW_ADAPTER.at(span, words, help=f"{now}; to keep it, in /etc/udev/rules.d/99-servos.rules: {_RULE}")

@@ -124,6 +124,12 @@ def connected(ports: Sequence[SerialPort], what: str) -> str:
     return f"connected: {', '.join(one.shown for one in ports)}"
 
 
+def latency_timers(root: Path = ROOT) -> dict[str, float]:
+    """Return the latency timers of FTDI adapters [s], by the paths of their ports."""
+    ports = (str(root / "dev" / folder.name) for folder in (root / "sys/bus/usb-serial/devices").glob("*"))
+    return {port: seconds for port in sorted(ports) if (seconds := latency_of(port, root)) is not None}
+
+
 def latency_of(path: str, root: Path = ROOT) -> float | None:
     """Return the latency timer of a port's FTDI adapter [s], None if it has none."""
     name = Path(path).resolve().name

@@ -39,7 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="|".join(_ABOUT), required=True)
     for name, text in _ABOUT.items():
         action = actions.add_parser(name, help=text, description=text)
-        action.add_argument("--port", required=True, metavar="PATH", help="the serial port, such as /dev/ttyUSB0")
+        action.add_argument(
+            "--port", required=True, metavar="PATH", help="the serial port: /dev/ttyUSB0, usb:0403:6014"
+        )
         is_survey = name in _SURVEYS
         rates = "rates to look at" if is_survey else "rate of the bus"
         default = list(USUAL) if is_survey else [USUAL[-1]]

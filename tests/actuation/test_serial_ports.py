@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.actuation.port_errors import DeviceNotUniqueError, NoDeviceError
-from rbxcompose.actuation.serial_ports import SerialPort, UsbDevice, port_path, serial_ports
+from rbxcompose.actuation.serial_ports import SerialPort, UsbDevice, latency_timers, port_path, serial_ports
 from tests.actuation.machine_tree import MachineTree
 
 
@@ -32,6 +32,14 @@ def test_ports_are_listed_with_their_devices_and_the_names_that_stay(tmp_path: P
 
 def test_a_machine_without_ports_has_none(tmp_path: Path) -> None:
     assert serial_ports(tmp_path) == []
+
+
+def test_latency_timers_are_read_of_adapters_that_have_one(tmp_path: Path) -> None:
+    tree = MachineTree(tmp_path)
+    tree.plug("ttyACM0")
+    slow, fast = tree.plug("ttyUSB0", latency=16), tree.plug("ttyUSB1", latency=1)
+    assert latency_timers(tmp_path) == {str(slow): 0.016, str(fast): 0.001}
+    assert latency_timers(tmp_path / "nowhere") == {}
 
 
 def test_a_port_is_found_by_its_device_wherever_it_is_now(tmp_path: Path) -> None:

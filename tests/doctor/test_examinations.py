@@ -85,6 +85,19 @@ def test_on_a_machine_that_is_well_nothing_is_wrong() -> None:
     assert not has_errors(answers)
 
 
+def test_an_adapter_that_holds_replies_back_is_told_with_what_helps() -> None:
+    assert told("latency", FINE) == [("ok", "no USB adapter has a latency timer")]
+    some = replace(FINE, latencies={"/dev/ttyUSB0": 0.016, "/dev/ttyUSB1": 0.001})
+    assert told("latency", some) == [
+        ("RBX2206", "the adapter of /dev/ttyUSB0 holds replies back for up to 16 ms"),
+        ("ok", "the adapter of /dev/ttyUSB1 passes replies on after 1 ms"),
+    ]
+    [slow, *_] = EXAMINATIONS["latency"](some)
+    assert isinstance(slow, Finding)
+    assert slow.help.startswith("echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer; ")
+    assert 'DRIVER=="ftdi_sio", ATTR{latency_timer}="1"' in slow.help
+
+
 def test_a_package_that_is_missing_or_another_is_told() -> None:
     wrong = (Version("numpy", None, "2.1"), Version("pyyaml", "6.1", "6.0"), Version("mcap", None, None))
     assert told("versions", replace(FINE, versions=wrong)) == [

@@ -22,7 +22,7 @@ def bus_at(arguments: argparse.Namespace, baud: int) -> Iterator[DynamixelBus]:
     """Open the bus; warn of an adapter that holds replies back."""
     with DynamixelBus(arguments.port, baud=baud, timeout=arguments.timeout) as bus:
         report = Report()
-        if warning := slow_adapter(arguments.port, bus.latency):
+        if warning := slow_adapter(bus.opened_at, bus.latency):
             report.add(warning)
             tell_report(report, {})
         yield bus
