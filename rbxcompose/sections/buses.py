@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -14,10 +14,11 @@ from rbxcompose.manifest.section import Contents, Reading, SetScope
 from rbxcompose.manifest.tree import key_span
 from rbxcompose.manifest.validate import MISSING_KEY
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
-from rbxcompose.references import SERVO_BUS
+from rbxcompose.references import DEVICE_PORT, SERVO_BUS, Refers
 from rbxcompose.sections.actuators import ActuatorModel, actuators
 from rbxcompose.sections.body import body
 from rbxcompose.sections.controllers import controllers
+from rbxcompose.sections.devices import port_name
 from rbxcompose.sections.joints import JointModel, joints
 
 
@@ -26,8 +27,8 @@ class BusOfServosModel(Config):
 
     type: Literal["dynamixel"]
     """What speaks on it."""
-    port: str = ""
-    """The serial port, such as `/dev/ttyUSB0`; simulated servos need none."""
+    port: Annotated[str, Refers(DEVICE_PORT)] = ""
+    """The serial port, such as `/dev/ttyUSB0`, or `dev:NAME` of a device; simulated servos need none."""
     baud: int = Field(1_000_000, gt=0)
     """Bits per second."""
     rate: Frequency = Field(100.0, gt=0, le=1000)
@@ -47,7 +48,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             continue
         known = description.body if description else Body("")
         config = {
-            "port": bus.port,
+            "port": port_name(contents, bus.port),
             "baud": bus.baud,
             "rate": bus.rate,
             "twin": bus.sim if contents.is_simulated else "",

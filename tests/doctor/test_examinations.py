@@ -85,6 +85,25 @@ def test_on_a_machine_that_is_well_nothing_is_wrong() -> None:
     assert not has_errors(answers)
 
 
+def test_a_device_that_a_bus_names_is_looked_for(tmp_path: Path) -> None:
+    lines = (
+        "devices: {adapter: {vendor: 0000, product: 0000, serial: none}}",
+        "body: {urdf: head.urdf}",
+        "buses: {servos: {type: dynamixel, port: 'dev:adapter'}}",
+        "actuators: {pan: {bus: servos, model: AX-12, id: 1}}",
+        "joints: {pan: {actuator: pan}}",
+    )
+    (tmp_path / "head.urdf").write_text(
+        '<robot name="h"><link name="a"/><link name="b"/><joint name="pan" type="continuous">'
+        '<parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>',
+        encoding="utf-8",
+    )
+    robot = robot_of(tmp_path, "\n".join(lines))
+    assert told("devices", replace(FINE, file=robot)) == [
+        ("RBX9411", "'servos': the USB device 0000:0000 none is not connected")
+    ]
+
+
 def test_an_adapter_that_holds_replies_back_is_told_with_what_helps() -> None:
     assert told("latency", FINE) == [("ok", "no USB adapter has a latency timer")]
     some = replace(FINE, latencies={"/dev/ttyUSB0": 0.016, "/dev/ttyUSB1": 0.001})

@@ -78,7 +78,7 @@ ABOVE = {
     "scaffold": "actuation.servo_models composition missions sdk",
     "schema": "missions sdk sections",
     "sdk": "",
-    "sections": "actuation.servo_models body sdk",
+    "sections": "actuation.serial_ports actuation.servo_models body sdk",
     "sim": "",
     "skills": "sdk",
     "twins": "actuation",
