@@ -37,6 +37,7 @@ from rbxcompose.sdk import (
     Component,
     Config,
     In,
+    NeedsExtra,
     OpensPort,
     Out,
     Port,
@@ -139,8 +140,10 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     @classmethod
     def capabilities(cls, config: ServoBusConfig) -> tuple[Capability, ...]:
-        """Return that real servos need their port."""
-        return () if config.twin else (OpensPort(Setting(config.port, "port")),)
+        """Return that servos which speak bytes need the SDK, and real ones their port."""
+        package = NeedsExtra(Setting("dynamixel_sdk"), Setting("servos"))
+        ports = () if config.twin else (OpensPort(Setting(config.port, "port")),)
+        return ports if config.twin == "servo" else (package, *ports)
 
     def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
         """Give the ports of joints and controllers their methods."""

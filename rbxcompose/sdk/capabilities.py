@@ -127,6 +127,16 @@ class OpensPort(Capability):
 
 
 @dataclass(frozen=True, slots=True)
+class NeedsExtra(Capability):
+    """It imports a package that an extra of rbxcompose brings; `up` looks for it before anything starts."""
+
+    module: Setting[str]
+    """What it imports."""
+    extra: Setting[str]
+    """The extra: `pip install 'rbxcompose[servos]'` brings `servos`."""
+
+
+@dataclass(frozen=True, slots=True)
 class RunsMissions(Capability):
     """It runs the robot's missions: its skills are those of the robot, and values may come from outside."""
 

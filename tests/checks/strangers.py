@@ -25,6 +25,7 @@ from rbxcompose.sdk import (
     In,
     Length,
     Navigates,
+    NeedsExtra,
     OpensPort,
     Out,
     PlaceName,
@@ -142,8 +143,8 @@ class Scanner(Component[ScannerConfig]):
 
     @classmethod
     def capabilities(cls, config: ScannerConfig) -> tuple[Capability, ...]:
-        """Return which port it opens."""
-        return (OpensPort(Setting(config.device, "device")),)
+        """Return which port it opens, and by which package."""
+        return OpensPort(Setting(config.device, "device")), NeedsExtra(Setting("toy_scanner_sdk"), Setting("scanners"))
 
 
 @component("toy_pilot")

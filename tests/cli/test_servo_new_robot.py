@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
+from rbxcompose.actuation.serial_ports import SerialPort
 from rbxcompose.cli.main import main
 from rbxcompose.clock import SteppedClock
 from rbxcompose.testing import Golden, check_file
@@ -57,6 +59,15 @@ def test_it_has_no_findings_and_runs_in_simulation(
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "run"))
     (tmp_path / "run").mkdir(mode=0o700)
     assert main(["up", "--rate", "max", "--for", "1s", str(robot)]) == 0
+
+
+def test_its_port_has_the_name_that_stays(made: Making, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = "rbxcompose.cli.servos.new_robot.serial_ports"
+    monkeypatch.setattr(
+        path, lambda: [SerialPort(os.path.realpath(tmp_path / "servos"), ["/dev/serial/by-id/usb-FT4"])]
+    )
+    assert made(FakeServo(AX, 1))[0] == 0
+    assert "    port: /dev/serial/by-id/usb-FT4\n" in (tmp_path / "robots/arm/robot.yaml").read_text(encoding="utf-8")
 
 
 def test_nothing_is_overwritten_and_a_bad_name_is_refused(made: Making, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from rbxcompose.cli.main import main
 from rbxcompose.cli.robots import run_view
+from tests.checks import strangers
 
 BODY = """<robot name="head">
   <link name="base"/>
@@ -58,3 +59,27 @@ def test_neither_a_check_nor_a_simulated_robot_needs_it(tmp_path: Path) -> None:
     for words in (["up", "robot.yaml"], ["up", "--set", "buses.servos.sim=pty", "robot.yaml"]):
         with pytest.raises(AssertionError, match="it was started"):
             main(words)
+
+
+def test_a_driver_whose_package_is_missing_is_told_where_it_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("rbxcompose.cli.robots.this_machine.find_spec", lambda _: None)
+    (tmp_path / "robot.yaml").write_text(ROBOT.replace("PORT", "/dev/null"), encoding="utf-8")
+    for words in (["--real"], ["--set", "buses.servos.sim=pty"]):
+        assert main(["up", *words, "robot.yaml"]) == 1
+        told = capsys.readouterr().err
+        assert "error[RBX2253]: 'servos' needs the package 'dynamixel_sdk', which is not installed" in told
+        assert "  --> robot.yaml:6:3" in told
+        assert "pip install 'rbxcompose[servos]'" in told
+    with pytest.raises(AssertionError, match="it was started"):
+        main(["up", "robot.yaml"])
+
+
+def test_the_drivers_of_others_are_looked_at_like_ours(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scanner = f"  scanner: {{type: {strangers.Scanner.type_name}, device: /nowhere/ttyUSB0}}\n"
+    (tmp_path / "robot.yaml").write_text(f"rbx: 1\nkind: Robot\nname: cart\ncomponents:\n{scanner}", encoding="utf-8")
+    assert main(["up", "robot.yaml"]) == 1
+    told = capsys.readouterr().err
+    assert "error[RBX2253]: 'scanner' needs the package 'toy_scanner_sdk'" in told
+    assert "error[RBX2201]: /nowhere/ttyUSB0 does not exist\n  --> robot.yaml:5:40" in told

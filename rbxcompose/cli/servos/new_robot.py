@@ -8,6 +8,7 @@ import os
 from collections.abc import Sequence
 
 from rbxcompose.actuation.bus import FoundServo
+from rbxcompose.actuation.serial_ports import port_path, serial_ports
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.servos.reach import bus_at, nobody, protocols
 from rbxcompose.cli.servos.survey import Survey, choose, survey
@@ -34,13 +35,20 @@ def new_robot(arguments: argparse.Namespace) -> int:
     if not choice.servos:
         return FINDINGS if report.has_errors else nobody(arguments)
     servos = [NewServo(one.id, one.model) for one in choice.servos if one.model]
-    port = os.path.abspath(arguments.port)
-    files = servo_robot_files(ServoRobotAnswers(name, port, choice.baud, servos))
+    files = servo_robot_files(ServoRobotAnswers(name, _lasting(arguments.port), choice.baud, servos))
     if finding := write_new(arguments.into, files):
         return refuse(finding)
     written = [shown_name(arguments.into / file) for file in files]
     _tell(arguments, written, choice.servos, choice.baud)
     return FINDINGS if report.has_errors else 0
+
+
+def _lasting(name: str) -> str:
+    """Return the name of a port that stays the same, if it has one, else its path."""
+    path = port_path(name)
+    ports = {port.path: port for port in serial_ports()}
+    port = ports.get(os.path.realpath(path))
+    return port.names[0] if port and port.names else os.path.abspath(path)
 
 
 def _surveyed(arguments: argparse.Namespace, baud: int) -> Survey:
