@@ -13,7 +13,10 @@ import pytest
 from rbxcompose.actuation.serial_ports import SerialPort
 from rbxcompose.cli.main import main
 from rbxcompose.clock import SteppedClock
-from rbxcompose.testing import Golden, check_file
+from rbxcompose.msgs.sensor_msgs import JointState
+from rbxcompose.msgs.std_msgs import Float64
+from rbxcompose.qos import Qos
+from rbxcompose.testing import Bench, Golden, check_file
 from rbxcompose.twins.servo_fake import FakeServo
 from rbxcompose.twins.servo_line import FakeLine
 from rbxcompose.twins.servo_port import FakePort
@@ -48,17 +51,22 @@ def test_a_robot_of_all_that_answers_is_written_as_people_would_write_it(
         golden.check(f"servo_new_robot/{name}.txt", text)
 
 
-def test_it_has_no_findings_and_runs_in_simulation(
-    made: Making, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_has_no_findings_and_moves_in_simulation(made: Making, tmp_path: Path) -> None:
     assert made(FakeServo(AX, 1), FakeServo(XL, 3))[0] == 0
     robot = tmp_path / "robots/arm"
     assert main(["check", "--strict", str(robot)]) == 0
     for is_real in (False, True):
         assert check_file(robot / "robot.yaml", real=is_real).text == ""
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "run"))
-    (tmp_path / "run").mkdir(mode=0o700)
-    assert main(["up", "--rate", "max", "--for", "1s", str(robot)]) == 0
+    at: dict[str, float] = {}
+    bench = Bench(plan=check_file(robot / "robot.yaml").plan)
+    bench.bus.subscribe(
+        "me", "/joint_states", JointState, Qos.STATE, lambda one: at.update(zip(one.name, one.position, strict=True))
+    )
+    command = bench.bus.publisher("me", "/joint_3/command", Float64, Qos.COMMAND)
+    bench.advance(0.5)
+    command(Float64(data=0.5))
+    bench.advance(3.0)
+    assert at == pytest.approx({"joint_1": 0.0, "joint_3": 0.5}, abs=0.01)
 
 
 def test_its_port_has_the_name_that_stays(made: Making, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
