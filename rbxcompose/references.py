@@ -20,10 +20,15 @@ PORT = "port"
 LINK, JOINT = "link", "joint"
 """A link or a joint of the body."""
 SERVO_BUS, ACTUATOR, CONTROLLER = "servo bus", "actuator", "controller"
+DEVICE, DEVICE_PORT = "device", "device port"
+"""A device; its port, `dev:NAME`, in a field that takes paths, too."""
 RUNNING = "running"
 """All components: those of the user and those of every robot."""
 TOPIC, FILE, ANYTHING = "topic", "file", "anything"
 """A topic; a path relative to the file that writes it; a word that may be a name of any kind."""
+
+PREFIXED: Mapping[str, tuple[str, str]] = {DEVICE_PORT: ("dev:", DEVICE)}
+"""Kinds of words that are a name behind a prefix, or something else: the prefix, and the kind of the name."""
 
 NAMES = "x-names"
 """The schema keyword that gives the kind of a name."""
@@ -62,8 +67,9 @@ class Refers:
     def _name(self, name: str, info: ValidationInfo) -> str:
         """Return the name if it exists."""
         known: Known = info.context or {}
-        if self.kind in known and name not in known[self.kind]:
-            raise self._unknown(name, known[self.kind])
+        prefix, kind = PREFIXED.get(self.kind, ("", self.kind))
+        if name.startswith(prefix) and kind in known and name.removeprefix(prefix) not in known[kind]:
+            raise self._unknown(name, {f"{prefix}{one}": one for one in known[kind]} if prefix else known[kind])
         return name
 
     def _thing(self, wanted: type[T]) -> Callable[[object, ValidationInfo], object]:
@@ -83,7 +89,8 @@ class Refers:
 
     def _unknown(self, name: str, there: Mapping[str, object]) -> PydanticCustomError:
         valid = there if self.kind in (LINK, JOINT) else list(there)  # theirs are known, others may be being read
-        context = {"kind": self.kind, "name": name, "valid": valid, "what": f"{plural(self.kind)} of this robot"}
+        _, kind = PREFIXED.get(self.kind, ("", self.kind))
+        context = {"kind": kind, "name": name, "valid": valid, "what": f"{plural(kind)} of this robot"}
         return PydanticCustomError(self.kind, "there is no {kind} '{name}'", context)
 
 

@@ -47,6 +47,7 @@ return_delay 5 1 2us u
 min_position 6 2 tick u
 max_position 8 2 tick u
 temperature_limit 11 1 degC u
+max_torque 14 2 0.1% u
 status_return_level 16 1 - u
 shutdown 18 1 - u
 torque_enable 24 1 - u
@@ -75,6 +76,7 @@ min_position 6 2 tick u
 max_position 8 2 tick u
 operating_mode 11 1 - u
 temperature_limit 12 1 degC u
+max_torque 15 2 0.1% u
 status_return_level 17 1 - u
 shutdown 18 1 - u
 torque_enable 24 1 - u

@@ -13,9 +13,10 @@ from dynamixel_sdk import COMM_SUCCESS
 from rbxcompose.actuation.attention import Attention
 from rbxcompose.actuation.bus import FoundServo, ServoReading, ServoStatistics
 from rbxcompose.actuation.dynamixel_packets import Answer, NoAnswer, in_chunks, packets_by_protocol
-from rbxcompose.actuation.dynamixel_port import BlockingPort, latency_of
+from rbxcompose.actuation.dynamixel_port import BlockingPort
 from rbxcompose.actuation.dynamixel_reads import GroupRead, ServoReader, in_other_order
 from rbxcompose.actuation.port_errors import LostPortError
+from rbxcompose.actuation.serial_ports import latency_of, port_path
 from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.actuation.transfers import ReadPlan, Stretch, WritePlan, read_plan, write_plans
 
@@ -28,6 +29,8 @@ _NOBODY = b"\xff\xff\xfe\x04\x83\x00\x01\x79"  # a group write to no servo, for 
 
 class DynamixelBus:
     """A bus on the serial port `path` at `baud` [bit/s], with models of servos by their ids.
+
+    The path may be `usb:VENDOR:PRODUCT:SERIAL`, the name of a device, which is looked up whenever the port is opened.
 
     A reply may be `timeout` [s] later than wire and pauses allow (more if the adapter's latency timer is longer), and
     `return_delay` [s] is the longest pause of any servo before its reply. `retries` is how often a read tries again.
@@ -53,8 +56,7 @@ class DynamixelBus:
         self.is_fast = is_fast
         self.servos = dict(servos or {})
         self.attention = Attention()
-        self.latency = latency_of(path)
-        self._timeout = timeout if self.latency is None else max(timeout, self.latency + _SLACK)
+        self._patience = timeout
         self._clock = clock
         self._packets = packets_by_protocol()
         self._reader = ServoReader(self._packets, clock)
@@ -63,7 +65,10 @@ class DynamixelBus:
         self._port: BlockingPort | None = self._opened()
 
     def _opened(self) -> BlockingPort:
-        port = BlockingPort(self.path, self.baud, timeout=self._timeout, clock=self._clock)
+        self.opened_at = path = port_path(self.path)  # a device that was plugged in again may have another one
+        self.latency = latency_of(path)
+        self._timeout = self._patience if self.latency is None else max(self._patience, self.latency + _SLACK)
+        port = BlockingPort(path, self.baud, timeout=self._timeout, clock=self._clock)
         try:
             port.writePort(_NOBODY)
             port.wait_for(len(_NOBODY))

@@ -12,7 +12,6 @@ import select
 import termios
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import serial
 from dynamixel_sdk import PortHandler
@@ -191,17 +190,3 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     def _lost(self) -> LostPortError:
         return LostPortError(str(self.port_name), "has gone")
-
-
-def latency_of(path: str, root: Path = Path("/sys")) -> float | None:
-    """Return the latency timer of a port's FTDI adapter [s], None if it has none."""
-    name = Path(path).resolve().name
-    for file in (
-        root / "bus/usb-serial/devices" / name / "latency_timer",
-        root / "class/tty" / name / "device/latency_timer",
-    ):
-        try:
-            return int(file.read_text(encoding="ascii")) / 1000
-        except (OSError, ValueError):
-            continue
-    return None

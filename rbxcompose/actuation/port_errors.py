@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import ClassVar
 
 from rbxcompose.findings import Finding, FindingKind, Severity, Span, kind
 from rbxcompose.printable import plain
 
+_RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
 SLOW = 0.001  # [s] of an adapter's latency timer above which it delays every reply
 
 NO_PORT = kind(
@@ -60,15 +62,39 @@ Bad: a plug that carries the weight of its cable.
 Good: a plug that is screwed or tied down.
 """,
 )
+NO_USB_DEVICE = kind(
+    "RBX2251",
+    """The USB device of a port is not connected
+
+The port names a device by vendor, product and serial number, and none of the devices that are connected has them.
+`lsusb` lists all devices, `udevadm info /dev/ttyUSB0` tells the serial number of one.
+
+Bad: `devices: {adapter: {vendor: 0403, product: 6001}}`, for an adapter with `ID 0403:6014` in `lsusb`.
+Good: `devices: {adapter: {vendor: 0403, product: 6014}}`
+""",
+)
+TWO_USB_DEVICES = kind(
+    "RBX2252",
+    """More than one USB device is meant
+
+Two adapters of one kind differ only by their serial numbers. Those that have none, and adapters with several ports,
+can be told apart by the socket: `/dev/serial/by-path/...`.
+
+Bad: `devices: {adapter: {vendor: 0403, product: 6014}}`, with two such adapters connected.
+Good: `devices: {adapter: {vendor: 0403, product: 6014, serial: FT4THV5C}}`
+""",
+)
 SLOW_ADAPTER = kind(
     "RBX2206",
     """The adapter holds replies back
 
 FTDI adapters collect what comes from the servos for the time of their latency timer, 16 ms as they are sold, so that
-fewer than 60 requests fit into a second. 1 ms is best; a udev rule keeps it.
+fewer than 60 requests fit into a second. 1 ms is best: write it now, and let a udev rule keep it. `doctor` looks at all
+adapters, `up` and `servo` at those that they open.
 
 Bad: `cat /sys/bus/usb-serial/devices/ttyUSB0/latency_timer` shows 16.
-Good: `ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"` in
+Good: `echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer`, and
+`ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"` in
 `/etc/udev/rules.d/99-servos.rules`
 """,
     Severity.WARNING,
@@ -79,11 +105,12 @@ class PortError(Exception):
     """Raised when a serial port cannot be used; each cause has its own class, kind of finding and help."""
 
     kind: ClassVar[FindingKind]
-    help: ClassVar[str] = ""
+    help: str = ""
 
-    def __init__(self, path: str, problem: str) -> None:
+    def __init__(self, path: str, problem: str, help: str = "") -> None:
         super().__init__(f"{path} {problem}")
         self.path, self.problem = path, problem
+        self.help = help or self.help
 
     def finding(self, span: Span | None = None) -> Finding:
         """Return what to tell a person."""
@@ -118,6 +145,18 @@ class UnfitPortError(PortError):
     help = "name a serial port, and a baud rate of its adapter"
 
 
+class NoDeviceError(PortError):
+    """Raised when the USB device of a port is not connected."""
+
+    kind = NO_USB_DEVICE
+
+
+class DeviceNotUniqueError(PortError):
+    """Raised when more than one port belongs to a USB device as it is named."""
+
+    kind = TWO_USB_DEVICES
+
+
 class LostPortError(PortError):
     """Raised when an open port has gone."""
 
@@ -130,5 +169,6 @@ def slow_adapter(path: str, latency: float | None, span: Span | None = None) -> 
     if latency is None or latency <= SLOW:
         return None
     words = f"the adapter of {plain(path)} holds replies back for up to {1000 * latency:.0f} ms"
-    rule = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
-    return SLOW_ADAPTER.at(span, words, help=f"in /etc/udev/rules.d/99-servos.rules: {rule}")
+    timer = f"/sys/bus/usb-serial/devices/{plain(Path(path).resolve().name)}/latency_timer"
+    now = f"echo 1 | sudo tee {timer}"
+    return SLOW_ADAPTER.at(span, words, help=f"{now}; to keep it, in /etc/udev/rules.d/99-servos.rules: {_RULE}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rbxcompose.findings import kind
+from rbxcompose.findings import Severity, kind
 
 NOT_INSTALLED = kind(
     "RBX2207",
@@ -66,4 +66,17 @@ It answers, but its model number is in no control table of rbxcompose, so the pl
 Bad: a gripper or a sensor of another make on the bus.
 Good: a model that `rbxcompose servo scan` names.
 """,
+)
+OTHER_RATE = kind(
+    "RBX2250",
+    """A servo has another rate than its bus
+
+A bus has one rate, so a robot has no use for a servo that listens at another one. `rbxcompose servo new-robot` takes
+the rate that most servos have, and leaves the others out. The item `baud` has the rate as a code, and can be written
+while torque is off.
+
+Bad: five servos at 1000000 bit/s, and one at 57600 bit/s as it was sold.
+Good: `rbxcompose servo write 6 baud=3 --port /dev/ttyUSB0 --baud 57600`, for an X servo.
+""",
+    Severity.WARNING,
 )

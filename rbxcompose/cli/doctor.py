@@ -12,6 +12,7 @@ import platform
 import sys
 import time
 
+from rbxcompose.actuation.serial_ports import latency_timers
 from rbxcompose.cli.bus.entities import add_json_option
 from rbxcompose.cli.bus.guest import Guest, HeardMessage
 from rbxcompose.cli.bus.messages import to_json
@@ -60,6 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         listeners=machine.listeners(),
         processes=machine.processes(),
         base=base_folder(),
+        latencies=latency_timers(),
     )
     answers = examine_all(facts)
     tell(to_json([one.to_data() for one in answers]) if arguments.json else _text(answers))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from importlib.util import find_spec
+from pathlib import Path
 
 from rbxcompose.actuation.port_errors import PortError
 from rbxcompose.actuation.servo_findings import NOT_INSTALLED
@@ -23,11 +24,14 @@ _ABOUT = {
     "write": "write values of a servo, raw or with a unit",
     "set-id": "give the one servo on the cable another id",
     "reboot": "start servos of protocol 2.0 again, torque off",
-    "relax": "switch torque off",
+    "relax": "switch torque off; the next goal may switch it on",
+    "disable": "switch torque off, so that no goal switches it on",
     "enable": "switch torque on; they hold where they are",
     "identify": "blink the light of a servo",
+    "new-robot": "write a robot made of the servos that answer, with a joint and a controller for them",
 }
-_SEVERAL, _GROUPS = ("ping", "reboot", "identify"), ("relax", "enable")
+_SURVEYS = ("scan", "new-robot")
+_SEVERAL, _GROUPS = ("ping", "reboot", "identify"), ("relax", "disable", "enable")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,11 +39,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="|".join(_ABOUT), required=True)
     for name, text in _ABOUT.items():
         action = actions.add_parser(name, help=text, description=text)
-        action.add_argument("--port", required=True, metavar="PATH", help="the serial port, such as /dev/ttyUSB0")
-        rates = "rates to look at" if name == "scan" else "rate of the bus"
-        default = list(USUAL) if name == "scan" else [USUAL[-1]]
+        action.add_argument(
+            "--port", required=True, metavar="PATH", help="the serial port: /dev/ttyUSB0, usb:0403:6014"
+        )
+        is_survey = name in _SURVEYS
+        rates = "rates to look at" if is_survey else "rate of the bus"
+        default = list(USUAL) if is_survey else [USUAL[-1]]
         words = f"{rates} [bit/s] (default: {' '.join(map(str, default))})"
-        action.add_argument("--baud", type=count, nargs="+" if name == "scan" else 1, default=default, help=words)
+        action.add_argument("--baud", type=count, nargs="+" if is_survey else 1, default=default, help=words)
         action.add_argument("--protocol", type=int, choices=(1, 2), help="only this one (default: both)")
         add_timeout_option(action, "4ms")
         add_json_option(action)
@@ -48,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_own(action: argparse.ArgumentParser, name: str) -> None:
     """Declare what only some actions have."""
-    if name in ("scan", *_GROUPS):
+    if name in (*_SURVEYS, *_GROUPS):
         action.add_argument("--last", type=servo_id, default=LAST_ID, metavar="ID", help="the last id to look for")
     if name == "set-id":
         action.add_argument("old", type=servo_id, metavar="OLD", help="its present id")
@@ -58,6 +65,11 @@ def _add_own(action: argparse.ArgumentParser, name: str) -> None:
     elif name in _GROUPS:
         action.add_argument("ids", type=servo_id, nargs="*", metavar="ID", help="ids of servos")
         action.add_argument("--all", action="store_true", help="all that answer")
+    elif name == "new-robot":
+        action.add_argument("name", metavar="NAME", help="lower-case letters, digits, underscores")
+        action.add_argument(
+            "--into", metavar="DIR", type=Path, default=Path(), help="the project's folder (default: this one)"
+        )
     elif name != "scan":
         action.add_argument("id", type=servo_id, metavar="ID", help="the servo's id")
     if name == "read":

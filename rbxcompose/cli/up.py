@@ -11,10 +11,11 @@ import math
 import sys
 from pathlib import Path
 
-from rbxcompose.cli.output.console import refuse, tell_report
+from rbxcompose.cli.output.console import FINDINGS, refuse, tell_report
 from rbxcompose.cli.project.robot_options import add_layer_options, compiled, layers_of
 from rbxcompose.cli.robots.live_reload import LiveReload
 from rbxcompose.cli.robots.run_view import run_plan
+from rbxcompose.cli.robots.this_machine import is_fit
 from rbxcompose.compiler import compile_robot
 from rbxcompose.recording.codes import UNWRITABLE
 from rbxcompose.runtime.options import RunOptions
@@ -71,6 +72,8 @@ def run(arguments: argparse.Namespace) -> int:
     if options.is_stepped and options.rate is None and options.duration is None and compilation.plan.start is None:
         sys.stderr.write("rbxcompose up: without 'start:' nothing ends a run at --rate max: give --for\n")
         return USAGE
+    if not is_fit(compilation):
+        return FINDINGS
     reload = LiveReload(lambda: compiled(arguments.path, arguments), compilation) if arguments.watch else None
     return run_plan(compilation.plan, options, reload)
 

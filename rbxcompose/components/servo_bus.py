@@ -30,7 +30,7 @@ from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.requests import Refused, answers
 from rbxcompose.sdk import Component, In, Out, Port, ServedGoal, Serves, ServesAction, component
 from rbxcompose.sdk.bound import ActionServer
-from rbxcompose.sdk.capabilities import Capability
+from rbxcompose.sdk.capabilities import Capability, NeedsExtra, OpensPort, Setting
 from rbxcompose.sdk.component import Context
 from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, mimics_of
 from rbxcompose.twins.pseudo_terminal import pseudo_terminal
@@ -83,9 +83,12 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     @classmethod
     def capabilities(cls, config: ServoBusConfig) -> tuple[Capability, ...]:
-        """Declare what its controllers can do."""
+        """Declare what its controllers can do, that servos which speak bytes need the SDK, and real ones their port."""
         setups = config.controllers.items()
-        return tuple(one for name, each in setups for one in controller_type(each.type).capabilities(name, each.config))
+        led = (one for name, each in setups for one in controller_type(each.type).capabilities(name, each.config))
+        package = NeedsExtra(Setting("dynamixel_sdk"), Setting("servos"))
+        ports = () if config.twin else (OpensPort(Setting(config.port, "port")),)
+        return (*led, *(() if config.twin == "servo" else (package,)), *ports)
 
     def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
         """Give the ports of joints and controllers their methods."""

@@ -16,7 +16,7 @@ from rbxcompose.manifest.registry import naming, section_named, sections
 from rbxcompose.manifest.renamer import RenamedTopic
 from rbxcompose.manifest.section import Section
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, at
-from rbxcompose.references import ANYTHING, COMPONENT, PORT, TOPIC
+from rbxcompose.references import ANYTHING, COMPONENT, PORT, PREFIXED, TOPIC
 
 Rename = Callable[[str], str]
 
@@ -77,6 +77,9 @@ class Renaming:
             return self.topic(name)
         if kind == ANYTHING:
             return self.any_name(name)
+        if kind in PREFIXED:
+            prefix, named = PREFIXED[kind]
+            return f"{prefix}{self.name(named, name.removeprefix(prefix))}" if name.startswith(prefix) else name
         if kind in self.defines:
             return f"{self.prefix}{name}"
         head, dot, rest = name.partition(".") if kind in (PORT, COMPONENT) else (name, "", "")
@@ -88,7 +91,7 @@ class Renaming:
     def any_name(self, name: str) -> str:
         """Return the new form of a word that may name anything in the part: a value given by `with:`."""
         kinds = (one.names for one in sections() if one.is_map and one.is_composed)
-        changed = (self.name(kind, name) for kind in (COMPONENT, *kinds))
+        changed = (self.name(kind, name) for kind in (COMPONENT, *kinds, *PREFIXED))
         return next((one for one in changed if one != name), name)
 
     def values(self, given: MappingNode) -> MappingNode:

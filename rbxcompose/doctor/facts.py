@@ -83,7 +83,10 @@ class Version:
 
 @dataclass(frozen=True, slots=True)
 class HostFacts:
-    """All facts. `file` is the named robot, which need not be up; `processes` are this user's titled processes."""
+    """All facts. `file` is the named robot, which need not be up; `processes` are this user's titled processes.
+
+    `latencies` are the latency timers of USB adapters [s], by the paths of their ports.
+    """
 
     running: Sequence[RunningRobot]
     file: Robot | None
@@ -94,6 +97,7 @@ class HostFacts:
     listeners: Mapping[int, Listener]
     processes: Mapping[Process, str]
     base: Path
+    latencies: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def robots(self) -> list[Robot]:

@@ -12,7 +12,7 @@ from rbxcompose.lsp.document import Document, Spot
 from rbxcompose.lsp.names import SKILL, named_by_key
 from rbxcompose.lsp.variables import fills, variables
 from rbxcompose.missions.language.keys import anywhere
-from rbxcompose.references import PLACE
+from rbxcompose.references import PLACE, PREFIXED
 from rbxcompose.schema.guide import Guide, GuidedValue
 from rbxcompose.schema.scalars import Schema, units_of
 from rbxcompose.units import NUMBER_TEXT, Dimension
@@ -112,8 +112,8 @@ def _of_value(spot: Spot, path: tuple[str | int, ...]) -> Iterator[CompletionIte
         if value.dimension:
             yield from _units(value.dimension, match)
         return
-    replaces = len(before) - len(before.rstrip(_WORD_CHARACTERS))
     kind = value.names
+    replaces = len(before) if kind in PREFIXED else len(before) - len(before.rstrip(_WORD_CHARACTERS))
     for name, about in (spot.known.of(kind, path) if kind else {}).items():
         yield CompletionItem(name, "name", name, replaces, about)
     if spot.document.is_mission and not kind and _is_expression(value):

@@ -11,7 +11,7 @@ from rbxcompose.lsp.variables import variable_span
 from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.registry import naming
 from rbxcompose.manifest.tree import KeyPath, at, key_span
-from rbxcompose.references import COMPONENT, FILE, PLACE, PORT, RUNNING
+from rbxcompose.references import COMPONENT, FILE, PLACE, PORT, PREFIXED, RUNNING
 from rbxcompose.sections.args import args
 
 _FRONT = re.compile(r"[A-Za-z0-9_.]*+(\s*+\{?\$)?+")  # read backwards from the position
@@ -66,6 +66,7 @@ def _named(spot: Spot, word: str) -> Span | None:
 def _of_kind(spot: Spot, kind: str, word: str) -> Span | None:
     if kind == SKILL:
         return _skill(spot, word)
+    _, kind = PREFIXED.get(kind, ("", kind))
     name = word.partition(".")[0] if kind == PORT else word
     paths = ((one.name, *one.at, name) for one in naming(COMPONENT if kind in (PORT, RUNNING) else kind))
     return next((span for path in paths if (span := _own(spot, path))), None)

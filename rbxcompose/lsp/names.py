@@ -14,7 +14,7 @@ from rbxcompose.manifest.shapes import kind_of_keys
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, at
 from rbxcompose.missions.program.program import Skill
 from rbxcompose.model.robot import Robot
-from rbxcompose.references import COMPONENT, PORT, RUNNING, VALUE
+from rbxcompose.references import COMPONENT, PORT, PREFIXED, RUNNING, VALUE
 from rbxcompose.sections.args import args
 from rbxcompose.sections.include import PART_ARGUMENT, include
 from rbxcompose.sections.missions import INPUT
@@ -50,6 +50,9 @@ class KnownNames:
 
     def of(self, kind: str, path: KeyPath = ()) -> dict[str, str]:
         """Return the names of a kind, each with a short description; `path` is where one of them is to be written."""
+        if kind in PREFIXED:
+            prefix, named = PREFIXED[kind]
+            return {f"{prefix}{name}": about for name, about in self.of(named).items()}
         special: dict[str, Callable[[], dict[str, str]]] = {
             PORT: lambda: {**self._in_text(COMPONENT), **dict(self._ports())},
             RUNNING: lambda: {**self._in_text(COMPONENT), **self._parts()},

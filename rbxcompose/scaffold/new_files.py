@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
@@ -29,6 +29,19 @@ leaves nothing behind.
 )
 
 
+def taken(folder: Path, names: Iterable[str]) -> Finding | None:
+    """Return the finding about the first of some paths below `folder` that exists, before work is spent on them."""
+    return next((_exists(folder / name) for name in names if os.path.lexists(folder / name)), None)
+
+
+def _exists(path: Path) -> Finding:
+    return EXISTS.at(
+        None,
+        f"'{plain(shown_name(path))}' already exists; nothing was written",
+        help="choose another name, or another folder with '--into'",
+    )
+
+
 def write_new(folder: Path, files: Mapping[str, str]) -> Finding | None:
     """Write texts by their paths below `folder`; if that fails, leave nothing behind and return the reason."""
     try:
@@ -39,12 +52,7 @@ def write_new(folder: Path, files: Mapping[str, str]) -> Finding | None:
                 undo.callback(path.unlink)
             undo.pop_all()
     except FileExistsError as error:
-        path = Path(error.filename2 or error.filename)
-        return EXISTS.at(
-            None,
-            f"'{plain(shown_name(path))}' already exists; nothing was written",
-            help="choose another name, or another folder with '--into'",
-        )
+        return _exists(Path(error.filename2 or error.filename))
     except OSError as error:
         message = f"'{plain(str(error.filename or folder))}' cannot be written: {error.strerror}"
         return NOT_WRITTEN.at(None, message, help="nothing was written")

@@ -119,6 +119,24 @@ class WritesFrame(Capability):
 
 
 @dataclass(frozen=True, slots=True)
+class OpensPort(Capability):
+    """It opens a serial port of this machine, which `up` looks at before anything starts."""
+
+    port: Setting[str]
+    """A path, or `usb:VENDOR:PRODUCT` with `:SERIAL` behind it if there is one."""
+
+
+@dataclass(frozen=True, slots=True)
+class NeedsExtra(Capability):
+    """It imports a package that an extra of rbxcompose brings; `up` looks for it before anything starts."""
+
+    module: Setting[str]
+    """What it imports."""
+    extra: Setting[str]
+    """The extra: `pip install 'rbxcompose[servos]'` brings `servos`."""
+
+
+@dataclass(frozen=True, slots=True)
 class RunsMissions(Capability):
     """It runs the robot's missions: its skills are those of the robot, and values may come from outside."""
 

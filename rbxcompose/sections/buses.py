@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -16,10 +16,11 @@ from rbxcompose.manifest.tree import key_span
 from rbxcompose.manifest.validate import MISSING_KEY
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.manifest.written import as_written
-from rbxcompose.references import SERVO_BUS
+from rbxcompose.references import DEVICE_PORT, SERVO_BUS, Refers
 from rbxcompose.sections.actuators import ActuatorModel, actuators
 from rbxcompose.sections.body import body
 from rbxcompose.sections.controllers import controllers
+from rbxcompose.sections.devices import port_name
 from rbxcompose.sections.joints import JointModel, joints, table_of
 from rbxcompose.sections.safety import safety
 from rbxcompose.units import Quantity
@@ -30,8 +31,8 @@ class BusOfServosModel(Config):
 
     type: Literal["dynamixel"]
     """What speaks on it."""
-    port: str = ""
-    """The serial port, such as `/dev/ttyUSB0`; simulated servos need none."""
+    port: Annotated[str, Refers(DEVICE_PORT)] = ""
+    """The serial port, such as `/dev/ttyUSB0`, or `dev:NAME` of a device; simulated servos need none."""
     baud: BitRate = Field(1_000_000, gt=0)
     """Bits per second."""
     rate: Frequency = Field(100.0, gt=0, le=1000)
@@ -52,7 +53,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             continue
         config = {
             "name": name,
-            "port": bus.port,
+            "port": port_name(contents, bus.port),
             "baud": round(bus.baud),
             "rate": bus.rate,
             "watchdog": bus.watchdog,

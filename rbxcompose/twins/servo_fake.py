@@ -68,7 +68,8 @@ class FakeServo:
         family = self.model.family
         first = {"model_number": self.model.number, "firmware": 45, "id": id, "return_delay": 250}
         first |= {"baud": self.model.code_of(baud) or 0, "status_return_level": 2, "temperature_limit": 80}
-        first |= {"shutdown": _SHUTDOWN[self.model.protocol], "present_voltage": 120, "torque_limit": 1023}
+        first |= {"shutdown": _SHUTDOWN[self.model.protocol], "present_voltage": 120}
+        first |= {"max_torque": 1023, "torque_limit": 1023}
         first |= {"min_position": 0, "max_position": family.ticks - 1, "goal_position": family.centre}
         if family.table == "P":
             first |= {"min_position": -family.ticks // 2, "max_position": family.ticks // 2}
@@ -102,6 +103,12 @@ class FakeServo:
             return self.get("operating_mode") == modes["velocity"]
         return self.get("min_position") == self.get("max_position") == 0
 
+    @property
+    def has_torque(self) -> bool:
+        """Tell whether its motor may pull: torque is on, and not limited to nothing."""
+        is_limited = "torque_limit" in self.model.items and self.get("torque_limit") == 0
+        return bool(self.get("torque_enable")) and not is_limited
+
     def get(self, item: str) -> int:
         """Return the raw value of an item."""
         where = self.model.item(item)
@@ -126,7 +133,7 @@ class FakeServo:
         """Let `dt` [s] pass until `now` [s]."""
         self._watch(now)
         before = self._position
-        if self.get("torque_enable") and not self.is_jammed:
+        if self.has_torque and not self.is_jammed:
             self._position = self._turned(dt) if self.is_wheel else self._approached(dt)
         self._protect()
         self._show((self._position - before) * self.model.per_tick / dt if dt > 0 else 0.0)

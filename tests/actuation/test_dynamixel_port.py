@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.dynamixel_port import BlockingPort, latency_of
+from rbxcompose.actuation.dynamixel_port import BlockingPort
 from rbxcompose.actuation.port_errors import (
     BusyPortError,
     ForbiddenPortError,
@@ -22,6 +22,7 @@ from rbxcompose.actuation.port_errors import (
     UnfitPortError,
     slow_adapter,
 )
+from rbxcompose.actuation.serial_ports import latency_of
 
 
 class Line:
@@ -160,7 +161,7 @@ def test_a_forbidden_port_names_the_group(monkeypatch: pytest.MonkeyPatch, line:
 
 
 def test_the_latency_timer_of_an_adapter_is_read_and_warned_of(tmp_path: Path) -> None:
-    file = tmp_path / "bus/usb-serial/devices/ttyUSB0/latency_timer"
+    file = tmp_path / "sys/bus/usb-serial/devices/ttyUSB0/latency_timer"
     file.parent.mkdir(parents=True)
     file.write_text("16\n")
     latency = latency_of("/dev/ttyUSB0", tmp_path)

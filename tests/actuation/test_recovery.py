@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+from pathlib import Path
+
 import pytest
 
 from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.port_errors import LostPortError, NoPortError
+from rbxcompose.actuation.port_errors import LostPortError, NoDeviceError, NoPortError
+from rbxcompose.actuation.serial_ports import port_path
 from rbxcompose.actuation.servo_models import servo_models
+from rbxcompose.clock import SteppedClock
 from rbxcompose.twins.servo_fake import FakeServo
+from rbxcompose.twins.servo_line import FakeLine
+from rbxcompose.twins.servo_port import FakePort
 from tests.actuation.conftest import Plugged
+from tests.actuation.machine_tree import MachineTree
 
 MODELS = {1: servo_models()["AX-12"], 2: servo_models()["XL430-W250"], 3: servo_models()["XL430-W250"]}
 
@@ -30,6 +38,30 @@ def test_a_bus_recovers_with_a_new_port_relaxed_and_verified(plugged: Plugged) -
         assert [one and one.name for one in found.values()] == ["AX-12", "XL430-W250", "XM430-W350"]
         assert [port.line[one].get("torque_enable") for one in MODELS] == [0, 0, 0]
         assert bus.read([1, 2], ["present_position"]).keys() == {1, 2}
+
+
+def test_a_bus_that_is_named_by_its_device_is_found_under_another_number(
+    tmp_path: Path, clock: SteppedClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rbxcompose.actuation.dynamixel_bus.port_path", lambda name: port_path(name, tmp_path))
+    first, second = (MachineTree(tmp_path / name) for name in ("a", "b"))
+    paths = [tree.plug(name, serial="FT4") for tree, name in ((first, "ttyUSB0"), (second, "ttyUSB1"))]
+    (tmp_path / "sys").symlink_to(first.root / "sys")
+    (tmp_path / "dev").symlink_to(first.root / "dev")
+    line = FakeLine([FakeServo("XL430-W250", 2)], clock.now)
+    with ExitStack() as stack:
+        port = stack.enter_context(FakePort(line, paths[0]))
+        bus = stack.enter_context(DynamixelBus("usb:0403:6014:FT4", {2: MODELS[2]}, timeout=0.2))
+        port.unplug()
+        for name in ("sys", "dev"):
+            (tmp_path / name).unlink()
+        with pytest.raises(NoDeviceError):
+            bus.reopen()
+        for name in ("sys", "dev"):
+            (tmp_path / name).symlink_to(second.root / name)
+        stack.enter_context(FakePort(line, paths[1]))
+        assert [one and one.name for one in bus.reopen().values()] == ["XL430-W250"]
+        assert bus.opened_at == str(tmp_path / "dev/ttyUSB1")
 
 
 def test_a_bus_may_be_opened_again_without_letting_go(plugged: Plugged) -> None:

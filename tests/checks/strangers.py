@@ -25,6 +25,8 @@ from rbxcompose.sdk import (
     In,
     Length,
     Navigates,
+    NeedsExtra,
+    OpensPort,
     Out,
     PlaceName,
     Ratio,
@@ -126,6 +128,23 @@ class PilotConfig(Config):
     """On the spot."""
     off_by: Length = 0.05
     """How near it comes."""
+
+
+class ScannerConfig(Config):
+    """A device on a serial port."""
+
+    device: str
+    """Its port."""
+
+
+@component("toy_scanner")
+class Scanner(Component[ScannerConfig]):
+    """A device on a serial port."""
+
+    @classmethod
+    def capabilities(cls, config: ScannerConfig) -> tuple[Capability, ...]:
+        """Return which port it opens, and by which package."""
+        return OpensPort(Setting(config.device, "device")), NeedsExtra(Setting("toy_scanner_sdk"), Setting("scanners"))
 
 
 @component("toy_pilot")

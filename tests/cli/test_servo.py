@@ -24,6 +24,9 @@ class Bench:
     def __init__(self, port: FakePort, capsys: pytest.CaptureFixture[str]) -> None:
         self.port, self.line, self._capsys = port, port.line, capsys
 
+    def position(self, id: int) -> int:
+        return self.line[id].get("present_position")
+
     def told(self, *words: str, code: int = 0) -> str:
         action, *rest = words
         assert main(["servo", action, "--port", str(self.port.path), "--timeout", "40ms", *rest]) == code
@@ -99,6 +102,41 @@ def test_torque_is_switched_on_where_servos_are_and_off_for_all(servos: Bench) -
     assert "name ids, or use --all" in servos.told("relax", code=1)
     servos.told("relax", "1", "2")
     assert [servos.line[one].get("torque_enable") for one in (1, 2)] == [0, 0]
+
+
+def test_a_disabled_servo_ignores_goals_until_it_is_enabled(servos: Bench) -> None:
+    servos.told("enable", "1", "2")
+    told = servos.told("disable", "1", "2")
+    assert "the AX-12 at id 1 ignores goals until 'servo enable'" in told
+    assert "the XL430-W250 at id 2 is relaxed: no goal switches its torque on" in told
+    assert [servos.line[one].get("torque_enable") for one in (1, 2)] == [0, 0]
+    before = servos.position(1)
+    servos.told("write", "1", "goal_position=90 deg")
+    assert servos.line[1].get("torque_enable") == 1  # by its firmware
+    servos.line[1].step(1.0, 1.0)
+    assert servos.position(1) == before
+    servos.told("enable", "1")
+    assert servos.line[1].get("torque_limit") == 1023
+    assert servos.position(1) == before
+    servos.told("write", "1", "goal_position=90 deg")
+    servos.line[1].step(1.0, 1.0)
+    assert servos.position(1) != before
+
+
+def test_a_relaxed_servo_of_protocol_1_takes_torque_by_its_next_goal(servos: Bench) -> None:
+    servos.told("relax", "1")
+    servos.told("write", "1", "goal_position=90 deg")
+    servos.line[1].step(1.0, 1.0)
+    assert servos.position(1) == 819
+
+
+def test_a_torque_limit_of_its_owner_survives(servos: Bench) -> None:
+    servos.told("write", "1", "torque_limit=300")
+    servos.told("relax", "1")
+    servos.told("enable", "1")
+    assert servos.line[1].get("torque_limit") == 300
+    told = json.loads(servos.told("disable", "1", "2", "--json"))
+    assert told == {"written": [1, 2], "failed": [], "limited": [1]}
 
 
 def test_all_that_answer_are_relaxed(servos: Bench) -> None:

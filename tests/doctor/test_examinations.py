@@ -85,6 +85,38 @@ def test_on_a_machine_that_is_well_nothing_is_wrong() -> None:
     assert not has_errors(answers)
 
 
+def test_a_device_that_a_bus_names_is_looked_for(tmp_path: Path) -> None:
+    lines = (
+        "devices: {adapter: {vendor: 0000, product: 0000, serial: none}}",
+        "body: {urdf: head.urdf}",
+        "buses: {servos: {type: dynamixel, port: 'dev:adapter'}}",
+        "actuators: {pan: {bus: servos, model: AX-12, id: 1}}",
+        "joints: {pan: {actuator: pan}}",
+    )
+    (tmp_path / "head.urdf").write_text(
+        '<robot name="h"><link name="a"/><link name="b"/><joint name="pan" type="continuous">'
+        '<parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>',
+        encoding="utf-8",
+    )
+    robot = robot_of(tmp_path, "\n".join(lines))
+    assert told("devices", replace(FINE, file=robot)) == [
+        ("RBX9411", "'servos': the USB device 0000:0000 none is not connected")
+    ]
+
+
+def test_an_adapter_that_holds_replies_back_is_told_with_what_helps() -> None:
+    assert told("latency", FINE) == [("ok", "no USB adapter has a latency timer")]
+    some = replace(FINE, latencies={"/dev/ttyUSB0": 0.016, "/dev/ttyUSB1": 0.001})
+    assert told("latency", some) == [
+        ("RBX2206", "the adapter of /dev/ttyUSB0 holds replies back for up to 16 ms"),
+        ("ok", "the adapter of /dev/ttyUSB1 passes replies on after 1 ms"),
+    ]
+    [slow, *_] = EXAMINATIONS["latency"](some)
+    assert isinstance(slow, Finding)
+    assert slow.help.startswith("echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer; ")
+    assert 'DRIVER=="ftdi_sio", ATTR{latency_timer}="1"' in slow.help
+
+
 def test_a_package_that_is_missing_or_another_is_told() -> None:
     wrong = (Version("numpy", None, "2.1"), Version("pyyaml", "6.1", "6.0"), Version("mcap", None, None))
     assert told("versions", replace(FINE, versions=wrong)) == [

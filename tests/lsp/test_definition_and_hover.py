@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.lsp.completion import complete
 from rbxcompose.lsp.definition import define
 from rbxcompose.lsp.document import Document
 from tests.conftest import ROOT
@@ -50,6 +51,15 @@ def test_the_file_of_a_body_is_led_to(tmp_path: Path, monkeypatch: pytest.Monkey
     (tmp_path / "cart.urdf").write_text('<robot><link name="base"/></robot>', encoding="utf-8")
     document = Document(tmp_path / "robot.yaml", "rbx: 1\nkind: Robot\nname: cart\nbody:\n  urdf: cart.urdf\n")
     assert str(define(document, 4, 10)) == "cart.urdf:1:1"
+
+
+def test_the_device_of_a_port_is_proposed_and_led_to(tmp_path: Path) -> None:
+    lines = ["rbx: 1", "kind: Robot", "name: arm", "devices:", "  adapter: {vendor: 0403, product: 6014}"]
+    lines += ["buses:", "  servos:", "    type: dynamixel", "    port: dev:adapter"]
+    document = Document(tmp_path / "robot.yaml", "\n".join(lines))
+    for column, typed in ((10, 0), (16, 6)):
+        assert [(one.text, one.replaces) for one in complete(document, 8, column)] == [("dev:adapter", typed)]
+    assert str(define(document, 8, 16)).endswith("robot.yaml:5:3")
 
 
 def test_what_names_nothing_leads_nowhere(editor: Editor) -> None:

@@ -5,53 +5,37 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 
 from rbxcompose.actuation.bus import FoundServo
 from rbxcompose.actuation.dynamixel_bus import DynamixelBus
 from rbxcompose.actuation.dynamixel_ids import change_id
-from rbxcompose.actuation.port_errors import slow_adapter
-from rbxcompose.actuation.servo_findings import REFUSED, SILENT, UNKNOWN_MODEL
+from rbxcompose.actuation.servo_findings import REFUSED, SILENT
 from rbxcompose.actuation.servo_models import hardware_errors
 from rbxcompose.cli.bus.entities import table
-from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.cli.output.console import FINDINGS, refuse, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.cli.servos import torque
+from rbxcompose.cli.servos.new_robot import new_robot
+from rbxcompose.cli.servos.reach import bus_at, elsewhere, known, nobody, protocols, written
 from rbxcompose.cli.servos.values import raw_values, shown, unknown_item
-from rbxcompose.findings import Report
-from rbxcompose.printable import plain
 
 _BLINKS, _HALF = 3, 0.3  # times; [s] on and [s] off
-
-
-@contextmanager
-def _bus_at(arguments: argparse.Namespace, baud: int) -> Iterator[DynamixelBus]:
-    """Open the bus; warn of an adapter that holds replies back."""
-    with DynamixelBus(arguments.port, baud=baud, timeout=arguments.timeout) as bus:
-        report = Report()
-        if warning := slow_adapter(arguments.port, bus.latency):
-            report.add(warning)
-            tell_report(report, {})
-        yield bus
-
-
-def _protocols(arguments: argparse.Namespace) -> tuple[int, ...]:
-    return (arguments.protocol,) if arguments.protocol else (1, 2)
 
 
 def _scan(arguments: argparse.Namespace) -> int:
     found: list[FoundServo] = []
     for baud in dict.fromkeys(arguments.baud):
-        with _bus_at(arguments, baud) as bus:
-            found += bus.scan(range(arguments.last + 1), _protocols(arguments))
+        with bus_at(arguments, baud) as bus:
+            found += bus.scan(range(arguments.last + 1), protocols(arguments))
     return _told(found, arguments)
 
 
 def _ping(arguments: argparse.Namespace) -> int:
-    with _bus_at(arguments, arguments.baud[0]) as bus:
+    with bus_at(arguments, arguments.baud[0]) as bus:
         answers = {one: bus.ping(one, arguments.protocol) for one in arguments.ids}
     for one in (one for one, found in answers.items() if found is None):
-        refuse(SILENT.at(None, f"no servo answers at id {one}", help=_elsewhere(arguments)))
+        refuse(SILENT.at(None, f"no servo answers at id {one}", help=elsewhere(arguments)))
     found = [one for one in answers.values() if one]
     if found:
         _told(found, arguments)
@@ -61,9 +45,7 @@ def _ping(arguments: argparse.Namespace) -> int:
 def _told(found: list[FoundServo], arguments: argparse.Namespace) -> int:
     """List servos; it is an error if there are none."""
     if not found:
-        rates = " and ".join(map(str, arguments.baud))
-        words = f"no servo answers on {plain(arguments.port)} at {rates} bit/s"
-        return refuse(SILENT.at(None, words, help="check power and cable; try other rates with --baud"))
+        return nobody(arguments)
     if arguments.json:
         tell(json.dumps([{"id": s.id, "protocol": s.protocol, "model": s.name, "baud": s.baud} for s in found]))
     else:
@@ -72,34 +54,15 @@ def _told(found: list[FoundServo], arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _elsewhere(arguments: argparse.Namespace) -> str:
-    return f"look for it: rbxcompose servo scan --port {plain(arguments.port)} --baud 57600 115200 1000000 2000000"
-
-
-def _known(bus: DynamixelBus, id: int, arguments: argparse.Namespace) -> FoundServo:
-    """Return the servo at an id, whose model the bus knows from then on.
-
-    Raises:
-        NotDoneError: if it is silent or of an unknown model.
-    """
-    found = bus.ping(id, arguments.protocol)
-    if found is None:
-        raise NotDoneError(SILENT.at(None, f"no servo answers at id {id}", help=_elsewhere(arguments)))
-    if found.model is None:
-        raise NotDoneError(UNKNOWN_MODEL.at(None, f"the servo at id {id} is {found.name}, which is not known"))
-    bus.servos[id] = found.model
-    return found
-
-
 def _info(arguments: argparse.Namespace) -> int:
-    with _bus_at(arguments, arguments.baud[0]) as bus:
-        found = _known(bus, arguments.id, arguments)
+    with bus_at(arguments, arguments.baud[0]) as bus:
+        found = known(bus, arguments.id, arguments)
         return _tell_values(bus, found, list(bus.servos[arguments.id].items), arguments)
 
 
 def _read(arguments: argparse.Namespace) -> int:
-    with _bus_at(arguments, arguments.baud[0]) as bus:
-        found = _known(bus, arguments.id, arguments)
+    with bus_at(arguments, arguments.baud[0]) as bus:
+        found = known(bus, arguments.id, arguments)
         model = bus.servos[found.id]
         wrong = [name for name in arguments.items if name not in model.items and name != "hardware_error"]
         if wrong:
@@ -129,24 +92,14 @@ def _tell_values(bus: DynamixelBus, found: FoundServo, items: list[str], argumen
 
 
 def _write(arguments: argparse.Namespace) -> int:
-    with _bus_at(arguments, arguments.baud[0]) as bus:
-        _known(bus, arguments.id, arguments)
+    with bus_at(arguments, arguments.baud[0]) as bus:
+        known(bus, arguments.id, arguments)
         values = raw_values(bus.servos[arguments.id], arguments.values)
-        return _written(bus, {arguments.id: values}, arguments)
-
-
-def _written(bus: DynamixelBus, values: Mapping[int, Mapping[str, int]], arguments: argparse.Namespace) -> int:
-    failed = bus.write(values, is_confirmed=True)
-    for one in sorted(failed):
-        words = f"the servo at id {one} has not taken {', '.join(f'{name}={raw}' for name, raw in values[one].items())}"
-        refuse(REFUSED.at(None, words, help="'rbxcompose servo info' shows its limits, and whether torque is on"))
-    if arguments.json:
-        tell(json.dumps({"written": sorted(set(values) - failed), "failed": sorted(failed)}))
-    return FINDINGS if failed else 0
+        return written(bus, {arguments.id: values}, arguments)
 
 
 def _set_id(arguments: argparse.Namespace) -> int:
-    with _bus_at(arguments, arguments.baud[0]) as bus:
+    with bus_at(arguments, arguments.baud[0]) as bus:
         if finding := change_id(bus, arguments.old, arguments.new):
             return refuse(finding)
     tell(json.dumps({"id": arguments.new}) if arguments.json else f"the servo has the id {arguments.new}")
@@ -154,9 +107,9 @@ def _set_id(arguments: argparse.Namespace) -> int:
 
 
 def _reboot(arguments: argparse.Namespace) -> int:
-    with _bus_at(arguments, arguments.baud[0]) as bus:
+    with bus_at(arguments, arguments.baud[0]) as bus:
         for one in arguments.ids:
-            found = _known(bus, one, arguments)
+            found = known(bus, one, arguments)
             if not bus.reboot(one):
                 words = f"the servo at id {one} has not started again"
                 old = "protocol 1.0 has no reboot: switch it off and on" if found.protocol == 1 else ""
@@ -164,30 +117,10 @@ def _reboot(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _torque(arguments: argparse.Namespace, raw: int) -> int:
-    with _bus_at(arguments, arguments.baud[0]) as bus:
-        ids = arguments.ids
-        if arguments.all:
-            ids = [one.id for one in bus.scan(range(arguments.last + 1), _protocols(arguments)) if one.model]
-        if not ids:
-            return refuse(SILENT.at(None, "no servo is named and none answers", help="name ids, or use --all"))
-        for one in ids:
-            _known(bus, one, arguments)
-        if raw:
-            _hold(bus, ids)
-        return _written(bus, {one: {"torque_enable": raw} for one in ids}, arguments)
-
-
-def _hold(bus: DynamixelBus, ids: list[int]) -> None:
-    """Let the goals be the present positions, so that torque moves nothing."""
-    now = bus.read(ids, ["present_position"])
-    bus.write({one: {"goal_position": reading.values["present_position"]} for one, reading in now.items()})
-
-
 def _identify(arguments: argparse.Namespace) -> int:
-    with _bus_at(arguments, arguments.baud[0]) as bus:
+    with bus_at(arguments, arguments.baud[0]) as bus:
         for one in arguments.ids:
-            _known(bus, one, arguments)
+            known(bus, one, arguments)
         for blink in range(2 * _BLINKS):
             bus.write({one: {"led": 1 - blink % 2} for one in arguments.ids}, is_confirmed=True)
             time.sleep(_HALF)
@@ -214,8 +147,10 @@ ACTIONS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "write": _done(_write),
     "set-id": _set_id,
     "reboot": _done(_reboot),
-    "relax": _done(lambda arguments: _torque(arguments, 0)),
-    "enable": _done(lambda arguments: _torque(arguments, 1)),
+    "relax": _done(torque.relax),
+    "disable": _done(torque.disable),
+    "enable": _done(torque.enable),
     "identify": _done(_identify),
+    "new-robot": new_robot,
 }
 """By name."""

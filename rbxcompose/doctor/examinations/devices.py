@@ -8,13 +8,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from rbxcompose.actuation.port_errors import PortError
+from rbxcompose.actuation.serial_ports import port_path
 from rbxcompose.doctor.facts import HostFacts
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, kind
 from rbxcompose.model.robot import Robot
 from rbxcompose.printable import plain
 
-_PREFIX = "/dev/"
+_PREFIXES = "/dev/", "usb:"
 
 NO_DEVICE = kind(
     "RBX9411",
@@ -35,7 +37,11 @@ def devices(facts: HostFacts) -> Iterator[str | Finding]:
     named = {device: (robot, component) for robot in facts.robots for component, device in _named(robot)}
     for device, (robot, component) in sorted(named.items()):
         place = robot.component_span(component)
-        path, shown = Path(device), plain(device)
+        try:
+            path, shown = Path(port_path(device)), plain(device)
+        except PortError as error:
+            yield NO_DEVICE.at(place, f"'{component}': {plain(str(error))}", help=error.help)
+            continue
         if not path.exists():
             yield NO_DEVICE.at(
                 place, f"'{component}' names {shown}, which does not exist", help="plug it in, or look below /dev"
@@ -55,7 +61,7 @@ def _named(robot: Robot) -> Iterator[tuple[str, str]]:
     for component in robot.components.values():
         for name in type(component.config).model_fields:
             yield from (
-                (component.name, text) for text in _texts(getattr(component.config, name)) if text.startswith(_PREFIX)
+                (component.name, text) for text in _texts(getattr(component.config, name)) if text.startswith(_PREFIXES)
             )
 
 

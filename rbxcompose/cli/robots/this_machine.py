@@ -1,0 +1,44 @@
+"""What `up` looks at on this machine before anything starts; `check` does not, since it may run elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.util import find_spec
+
+from rbxcompose.actuation.serial_ports import serial_ports
+from rbxcompose.cli.output.console import tell_report
+from rbxcompose.compiler import Compilation
+from rbxcompose.doctor.serial_ports import look_at, port_findings
+from rbxcompose.findings import Finding, Report, kind
+from rbxcompose.model.robot import Robot
+from rbxcompose.sdk.capabilities import NeedsExtra
+
+NO_EXTRA = kind(
+    "RBX2253",
+    """A component needs a package that is not installed
+
+Some drivers need packages that robots without them do without. They come with an extra of rbxcompose; simulated
+devices often need none.
+
+Bad: `pip install rbxcompose`, then `rbxcompose up --real` of a robot with servos.
+Good: `pip install 'rbxcompose[servos]'`
+""",
+)
+
+
+def is_fit(compilation: Compilation) -> bool:
+    """Tell what is wrong with this machine for a robot, and return whether it may start."""
+    report = Report()
+    if compilation.robot is not None:
+        report.extend([*missing_extras(compilation.robot), *port_findings(compilation.robot, serial_ports(), look_at)])
+    tell_report(report, compilation.sources)
+    return not report.has_errors
+
+
+def missing_extras(robot: Robot) -> Iterator[Finding]:
+    """Yield a finding for each component whose extra is not installed."""
+    for component, needed in robot.declared(NeedsExtra):
+        if find_spec(needed.module.value) is None:
+            message = f"'{component.name}' needs the package '{needed.module.value}', which is not installed"
+            help_text = f"pip install 'rbxcompose[{needed.extra.value}]'"
+            yield NO_EXTRA.at(robot.component_span(component.name), message, help=help_text)

@@ -1,0 +1,19 @@
+"""How long USB adapters of servos hold replies back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.actuation.port_errors import slow_adapter
+from rbxcompose.doctor.facts import HostFacts
+from rbxcompose.doctor.registry import examination
+from rbxcompose.findings import Finding
+
+
+@examination
+def latency(facts: HostFacts) -> Iterator[str | Finding]:
+    """Check the latency timer of each adapter that has one."""
+    for path, seconds in sorted(facts.latencies.items()):
+        yield slow_adapter(path, seconds) or f"the adapter of {path} passes replies on after {1000 * seconds:.0f} ms"
+    if not facts.latencies:
+        yield "no USB adapter has a latency timer"
