@@ -83,7 +83,7 @@ class ServoBusConfig(Config):
     """Bits per second."""
     rate: float = 100.0
     """Cycles per second."""
-    twin: Literal["", "servo", "pty"] = ""
+    twin: Literal["", "ideal", "servo", "pty"] = ""
     """How its servos are simulated, if they are."""
     on_shutdown: Literal["relax", "hold"] = "relax"
     """What happens to torque at the end."""
@@ -153,8 +153,10 @@ class ServoBusDriver(Component[ServoBusConfig]):
     def opened(self, joints: list[ServoJoint]) -> Bus:
         """Return the bus: that of the port, or simulated servos."""
         models = {joint.id: joint.model for joint in joints}
-        if self.config.twin == "servo":
-            return TwinBus([FakeServo(one.name, id_) for id_, one in models.items()], lambda: self.now)
+        if self.config.twin in ("ideal", "servo"):
+            is_ideal = self.config.twin == "ideal"
+            servos = [FakeServo(one.name, id_, is_ideal=is_ideal) for id_, one in models.items()]
+            return TwinBus(servos, lambda: self.now)
         path = self.config.port
         if self.config.twin == "pty":
             path = self.at_end.enter_context(pseudo_terminal({id_: one.name for id_, one in models.items()}))

@@ -32,8 +32,9 @@ class BusOfServosModel(Config):
     """Bits per second."""
     rate: Frequency = Field(100.0, gt=0, le=1000)
     """How often all joints are read and written."""
-    sim: Literal["servo", "pty"] = "servo"
-    """How simulated servos answer: at once, or by bytes on a pseudo-terminal, through the driver of real ones."""
+    sim: Literal["ideal", "servo", "pty"] = "servo"
+    """How true simulated servos are: `ideal` ones are at their goals at once, `servo` has motors; with `pty` they also
+    answer by bytes on a pseudo-terminal, through the driver of real ones."""
     on_shutdown: Literal["relax", "hold"] = "relax"
     """What happens to torque when the robot goes down."""
 

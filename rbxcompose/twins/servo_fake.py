@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 from rbxcompose.actuation.control_items import ControlItem
 from rbxcompose.actuation.servo_models import ONE_ERRORS, ServoModel, servo_models
+from rbxcompose.twins.servo_motor import IdealMotor, ServoMotor
 
 FASTEST = 6.0  # [rad/s] without a limit of the speed
-VOLTAGE, TEMPERATURE, OVERHEATED, OVERLOAD = 1, 30, 4, 32  # bits of errors; [degC]
+VOLTAGE, OVERHEATED, OVERLOAD = 1, 4, 32  # bits of errors
 _SHUTDOWN = {1: 36, 2: 52}  # masks of the bits that switch torque off
 _SIZE = 1024  # [B] of memory
 _RIGHT, _FAILED, _RANGE, _LIMIT, _ACCESS = 0, 1, 4, 6, 7  # results in protocol 2.0
@@ -46,11 +47,15 @@ class ServoFaults:
 class FakeServo:
     """One servo of a model, at `id`, at rest in the middle of its range, with torque off.
 
+    An ideal one is at its goal at once, without heat or load.
+
     Raises:
         KeyError: if there is no such model.
     """
 
-    def __init__(self, model: str, id: int, *, baud: int = 1_000_000, holds_on_enable: bool = True) -> None:
+    def __init__(
+        self, model: str, id: int, *, baud: int = 1_000_000, holds_on_enable: bool = True, is_ideal: bool = False
+    ) -> None:
         self.model: ServoModel = servo_models()[model]
         self.memory = bytearray(_SIZE)
         self.faults = ServoFaults()
@@ -58,8 +63,8 @@ class FakeServo:
         self.load = 0.0  # of the most, which the outside puts on it
         self.heard = 0.0  # [s], time of the last instruction
         self.is_jammed = False
-        self._position = float(self.model.items["present_position"].centre)  # [ticks]
-        self._heat = float(TEMPERATURE)  # [degC]
+        centre = float(self.model.items["present_position"].centre)
+        self.motor = IdealMotor(centre) if is_ideal else ServoMotor(centre)
         self._errors = 0
         self._is_shut_down = False
         self._prepare(id, baud)
@@ -76,7 +81,7 @@ class FakeServo:
             first["operating_mode"] = family.modes["position"]
         for name, raw in first.items():
             self.set(name, raw)
-        self._show(0.0)
+        self._show()
 
     @property
     def id(self) -> int:
@@ -115,21 +120,25 @@ class FakeServo:
 
     def heat_to(self, temperature: float) -> None:
         """Set its temperature [degC]."""
-        self._heat = temperature
+        self.motor.temperature = temperature
 
     def move_to(self, raw: int) -> None:
         """Turn it by hand [ticks]."""
-        self._position = float(raw)
-        self._show(0.0)
+        self.motor.put(float(raw))
+        self._show()
 
     def step(self, dt: float, now: float) -> None:
         """Let `dt` [s] pass until `now` [s]."""
         self._watch(now)
-        before = self._position
-        if self.get("torque_enable") and not self.is_jammed:
-            self._position = self._turned(dt) if self.is_wheel else self._approached(dt)
+        if not self.get("torque_enable") or self.is_jammed:
+            self.motor.rest(dt)
+        elif self.is_wheel:
+            self._turn(dt)
+        else:
+            speed = self.model.to_si("goal_speed", self.get("goal_speed")) or FASTEST
+            self.motor.approach(self.get("goal_position"), speed / self.model.per_tick, dt)
         self._protect()
-        self._show((self._position - before) * self.model.per_tick / dt if dt > 0 else 0.0)
+        self._show()
 
     def _watch(self, now: float) -> None:
         """Stop when the bus has been silent for longer than the watchdog allows."""
@@ -139,20 +148,16 @@ class FakeServo:
         if limit > 0 and now - self.heard > self.model.to_si("bus_watchdog", limit):
             self.set("bus_watchdog", -1)
             self.set("goal_velocity", 0)
-            self.set("goal_position", round(self._position))
+            self.set("goal_position", round(self.motor.position))
 
-    def _turned(self, dt: float) -> float:
-        speed = self.model.to_si("goal_velocity", self.get("goal_velocity"))
-        turned = self._position + speed * dt / self.model.per_tick
-        return turned if self.model.protocol == 2 else turned % self.model.family.ticks
-
-    def _approached(self, dt: float) -> float:
-        speed = self.model.to_si("goal_speed", self.get("goal_speed")) or FASTEST
-        most = speed * dt / self.model.per_tick  # [ticks]
-        return self._position + max(-most, min(most, self.get("goal_position") - self._position))
+    def _turn(self, dt: float) -> None:
+        motor, speed = self.motor, self.model.to_si("goal_velocity", self.get("goal_velocity"))
+        motor.turn(speed / self.model.per_tick, dt)
+        if self.model.protocol == 1:
+            motor.position %= self.model.family.ticks
 
     def _protect(self) -> None:
-        found = OVERHEATED if self._heat > self.get("temperature_limit") else 0
+        found = OVERHEATED if self.motor.temperature > self.get("temperature_limit") else 0
         found |= OVERLOAD if abs(self.load) > 1.0 and (self.get("torque_enable") or self._is_shut_down) else 0
         found |= 0 if 60 <= self.get("present_voltage") <= 280 else VOLTAGE
         self._errors = found | (self._errors if self.model.protocol == 2 else 0)  # which keeps them until it reboots
@@ -162,16 +167,17 @@ class FakeServo:
         elif self.model.protocol == 1:
             self._is_shut_down = False
 
-    def _show(self, speed: float) -> None:
-        """Write what it measures into its memory; the speed is in [rad/s]."""
+    def _show(self) -> None:
+        """Write what it measures into its memory."""
+        speed = self.motor.velocity * self.model.per_tick
         at = self.model.items["present_position"]
         aim = self.get("goal_position")
-        self.set("present_position", max(at.least, min(at.most, round(self._position))))
+        self.set("present_position", max(at.least, min(at.most, round(self.motor.position))))
         self.set("present_speed", self._fitted("present_speed", self.model.to_raw("present_speed", speed)))
         self.set("present_load", self._fitted("present_load", round(1000 * self.load)))
-        self.set("present_temperature", round(self._heat))
+        self.set("present_temperature", round(self.motor.temperature))
         self.set("hardware_error", self._errors if self.model.protocol == 2 else 0)
-        is_going = bool(self.get("torque_enable")) and not self.is_wheel and abs(aim - self._position) > 1
+        is_going = bool(self.get("torque_enable")) and not self.is_wheel and abs(aim - self.motor.position) > 1
         self.set("moving", int(is_going or abs(speed) > 1e-3))
 
     def _fitted(self, item: str, raw: int) -> int:
@@ -225,7 +231,9 @@ class FakeServo:
             self.set("torque_enable", 1)
         elif "torque_enable" in written and not was_on and self.get("torque_enable") and self.holds_on_enable:
             at = self.model.items["goal_position"]
-            self.set("goal_position", max(at.least, min(at.most, round(self._position))))
+            self.set("goal_position", max(at.least, min(at.most, round(self.motor.position))))
+        if self.motor.is_ideal:
+            self.step(0.0, self.heard)
 
     def reboot(self) -> None:
         """Start again: torque off, errors forgotten unless their cause is still there."""

@@ -67,9 +67,9 @@ class Head:
         self.robot.advance(0.1)
 
 
-@pytest.fixture(params=["servo"])
-def head() -> Head:
-    return Head()
+@pytest.fixture(params=["servo", "ideal"])
+def head(request: pytest.FixtureRequest) -> Head:
+    return Head(twin=request.param)
 
 
 def test_a_trajectory_ends_within_a_tick(head: Head) -> None:
