@@ -85,6 +85,10 @@ class ServoBusConfig(Config):
     """Cycles per second."""
     twin: Literal["", "ideal", "servo", "pty"] = ""
     """How its servos are simulated, if they are."""
+    noise: float = 0.0
+    """Standard deviation of the positions that simulated servos measure [rad]."""
+    seed: int = 0
+    """Repeats the noise."""
     on_shutdown: Literal["relax", "hold"] = "relax"
     """What happens to torque at the end."""
     joints: dict[str, DrivenJointConfig] = {}
@@ -152,14 +156,16 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     def opened(self, joints: list[ServoJoint]) -> Bus:
         """Return the bus: that of the port, or simulated servos."""
-        models = {joint.id: joint.model for joint in joints}
-        if self.config.twin in ("ideal", "servo"):
-            is_ideal = self.config.twin == "ideal"
-            servos = [FakeServo(one.name, id_, is_ideal=is_ideal) for id_, one in models.items()]
-            return TwinBus(servos, lambda: self.now)
-        path = self.config.port
-        if self.config.twin == "pty":
-            path = self.at_end.enter_context(pseudo_terminal({id_: one.name for id_, one in models.items()}))
+        config, models, path = self.config, {joint.id: joint.model for joint in joints}, self.config.port
+        if config.twin:
+            ideal = config.twin == "ideal"
+            servos = [
+                FakeServo(one.name, id_, is_ideal=ideal, noise=config.noise / one.per_tick, seed=config.seed)
+                for id_, one in models.items()
+            ]
+            if config.twin != "pty":
+                return TwinBus(servos, lambda: self.now)
+            path = str(self.at_end.enter_context(pseudo_terminal(servos)).path)
         from rbxcompose.actuation.dynamixel_bus import DynamixelBus
 
         bus = DynamixelBus(path, models, baud=self.config.baud, clock=lambda: self.now)

@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from rbxcompose.body.model import Body, BodyJoint
-from rbxcompose.config import Config, Frequency
+from rbxcompose.config import Angle, Config, Frequency
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, SetScope
 from rbxcompose.manifest.tree import key_span
@@ -19,6 +19,15 @@ from rbxcompose.sections.actuators import ActuatorModel, actuators
 from rbxcompose.sections.body import body
 from rbxcompose.sections.controllers import controllers
 from rbxcompose.sections.joints import JointModel, joints
+
+
+class TwinModel(Config):
+    """What simulated servos measure."""
+
+    noise: Angle = Field(0.0, ge=0)
+    """Standard deviation of measured positions."""
+    seed: int = 0
+    """Another seed gives other noise, the same one gives the same."""
 
 
 class BusOfServosModel(Config):
@@ -35,6 +44,8 @@ class BusOfServosModel(Config):
     sim: Literal["ideal", "servo", "pty"] = "servo"
     """How true simulated servos are: `ideal` ones are at their goals at once, `servo` has motors; with `pty` they also
     answer by bytes on a pseudo-terminal, through the driver of real ones."""
+    twin: TwinModel = TwinModel()
+    """What simulated servos measure."""
     on_shutdown: Literal["relax", "hold"] = "relax"
     """What happens to torque when the robot goes down."""
 
@@ -52,6 +63,8 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             "baud": bus.baud,
             "rate": bus.rate,
             "twin": bus.sim if contents.is_simulated else "",
+            "noise": bus.twin.noise,
+            "seed": bus.twin.seed,
             "on_shutdown": bus.on_shutdown,
             "joints": {joint: _joint(known.joints.get(joint), one, servos[one.actuator]) for joint, one in own.items()},
             "controllers": {

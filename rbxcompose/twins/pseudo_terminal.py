@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -14,8 +14,8 @@ from rbxcompose.twins.servo_port import FakePort
 
 
 @contextmanager
-def pseudo_terminal(models: Mapping[int, str]) -> Iterator[str]:
-    """Lend the path of a terminal behind which servos of these models answer at their ids, in real time."""
-    line = FakeLine([FakeServo(model, id_) for id_, model in models.items()], time.monotonic)
+def pseudo_terminal(servos: Iterable[FakeServo]) -> Iterator[FakePort]:
+    """Lend a terminal behind which these servos answer, in real time; its `path` is that of a serial port."""
+    line = FakeLine(servos, time.monotonic)
     with tempfile.TemporaryDirectory() as folder, FakePort(line, Path(folder) / "servos", has_wire_time=True) as port:
-        yield str(port.path)
+        yield port

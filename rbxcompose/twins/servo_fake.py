@@ -1,4 +1,4 @@
-"""A servo for tests: the memory of a control table, a motor that moves, heat, load and shutdown. It knows no bytes.
+"""A simulated servo: the memory of a control table around a motor, and shutdown. It knows no bytes.
 
 It follows the e-manual where that is clear. Where servos differ from each other, the test chooses: `holds_on_enable`
 tells whether torque keeps the present position or snaps to an old goal.
@@ -6,14 +6,16 @@ tells whether torque keeps the present position or snaps to an old goal.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
+from random import Random
 
 from rbxcompose.actuation.control_items import ControlItem
 from rbxcompose.actuation.servo_models import ONE_ERRORS, ServoModel, servo_models
-from rbxcompose.twins.servo_motor import IdealMotor, ServoMotor
+from rbxcompose.twins.servo_motor import IdealMotor, MotorTraits, ServoMotor
 
-FASTEST = 6.0  # [rad/s] without a limit of the speed
+FASTEST = MotorTraits().fastest  # [rad/s] without a limit of the speed
 VOLTAGE, OVERHEATED, OVERLOAD = 1, 4, 32  # bits of errors
 _SHUTDOWN = {1: 36, 2: 52}  # masks of the bits that switch torque off
 _SIZE = 1024  # [B] of memory
@@ -44,17 +46,41 @@ class ServoFaults:
     """How often each reply is sent."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Orders:
+    """What the memory orders: positions in ticks, speeds in ticks/s."""
+
+    has_torque: bool
+    is_wheel: bool
+    goal: int
+    speed: float
+    fastest: float
+    acceleration: float
+    hottest: int
+    shutdown: int
+    patience: float | None
+
+
 class FakeServo:
     """One servo of a model, at `id`, at rest in the middle of its range, with torque off.
 
-    An ideal one is at its goal at once, without heat or load.
+    An ideal one is at its goal at once, without heat or load. `noise` [ticks] is the standard deviation of measured
+    positions, which `seed` repeats.
 
     Raises:
         KeyError: if there is no such model.
     """
 
     def __init__(
-        self, model: str, id: int, *, baud: int = 1_000_000, holds_on_enable: bool = True, is_ideal: bool = False
+        self,
+        model: str,
+        id: int,
+        *,
+        baud: int = 1_000_000,
+        holds_on_enable: bool = True,
+        is_ideal: bool = False,
+        noise: float = 0.0,
+        seed: int = 0,
     ) -> None:
         self.model: ServoModel = servo_models()[model]
         self.memory = bytearray(_SIZE)
@@ -64,7 +90,11 @@ class FakeServo:
         self.heard = 0.0  # [s], time of the last instruction
         self.is_jammed = False
         centre = float(self.model.items["present_position"].centre)
-        self.motor = IdealMotor(centre) if is_ideal else ServoMotor(centre)
+        self.motor = (IdealMotor if is_ideal else ServoMotor)(centre, self.model.per_tick)
+        self.noise = noise
+        self._random = Random(f"{seed}/{id}")  # noqa: S311 - no secret, and must be repeatable
+        self._known: _Orders | None = None  # what the memory orders, until it changes
+        self._shown: dict[str, int] = {}
         self._errors = 0
         self._is_shut_down = False
         self._prepare(id, baud)
@@ -73,7 +103,7 @@ class FakeServo:
         family = self.model.family
         first = {"model_number": self.model.number, "firmware": 45, "id": id, "return_delay": 250}
         first |= {"baud": self.model.code_of(baud) or 0, "status_return_level": 2, "temperature_limit": 80}
-        first |= {"shutdown": _SHUTDOWN[self.model.protocol], "present_voltage": 120, "torque_limit": 1023}
+        first |= {"shutdown": _SHUTDOWN[self.model.protocol], "torque_limit": 1023}
         first |= {"min_position": 0, "max_position": family.ticks - 1, "goal_position": family.centre}
         if family.table == "P":
             first |= {"min_position": -family.ticks // 2, "max_position": family.ticks // 2}
@@ -117,6 +147,29 @@ class FakeServo:
         where = self.model.items.get(item)
         if where:
             self.memory[where.address : where.end] = where.encode(raw)
+            self._known = None
+            self._shown.pop(item, None)
+
+    @property
+    def _orders(self) -> _Orders:
+        if self._known is None:
+            per_tick = self.model.per_tick
+            has_watchdog = "bus_watchdog" in self.model.items and self.get("bus_watchdog") > 0
+            self._known = _Orders(
+                bool(self.get("torque_enable")),
+                self.is_wheel,
+                self.get("goal_position"),
+                self._si("goal_velocity") / per_tick,
+                self._si("goal_speed") / per_tick,
+                self._si("profile_acceleration") / per_tick,
+                self.get("temperature_limit"),
+                self.get("shutdown"),
+                self._si("bus_watchdog") if has_watchdog else None,
+            )
+        return self._known
+
+    def _si(self, item: str) -> float:
+        return self.model.to_si(item, self.get(item)) if item in self.model.items else 0.0
 
     def heat_to(self, temperature: float) -> None:
         """Set its temperature [degC]."""
@@ -130,59 +183,76 @@ class FakeServo:
     def step(self, dt: float, now: float) -> None:
         """Let `dt` [s] pass until `now` [s]."""
         self._watch(now)
-        if not self.get("torque_enable") or self.is_jammed:
-            self.motor.rest(dt)
-        elif self.is_wheel:
-            self._turn(dt)
-        else:
-            speed = self.model.to_si("goal_speed", self.get("goal_speed")) or FASTEST
-            self.motor.approach(self.get("goal_position"), speed / self.model.per_tick, dt)
+        self._move(dt)
+        self.motor.warm(self._load, dt)
         self._protect()
         self._show()
 
     def _watch(self, now: float) -> None:
         """Stop when the bus has been silent for longer than the watchdog allows."""
-        if "bus_watchdog" not in self.model.items:
-            return
-        limit = self.get("bus_watchdog")
-        if limit > 0 and now - self.heard > self.model.to_si("bus_watchdog", limit):
+        patience = self._orders.patience
+        if patience is not None and now - self.heard > patience:
             self.set("bus_watchdog", -1)
             self.set("goal_velocity", 0)
             self.set("goal_position", round(self.motor.position))
 
-    def _turn(self, dt: float) -> None:
-        motor, speed = self.motor, self.model.to_si("goal_velocity", self.get("goal_velocity"))
-        motor.turn(speed / self.model.per_tick, dt)
-        if self.model.protocol == 1:
-            motor.position %= self.model.family.ticks
+    def _move(self, dt: float) -> None:
+        orders, motor = self._orders, self.motor
+        if not orders.has_torque:
+            motor.push(0.0)
+        elif self.is_jammed:
+            wanted = orders.speed if orders.is_wheel else orders.goal - motor.position
+            motor.push(math.copysign(1.0, wanted) if wanted else 0.0)
+        elif not orders.is_wheel:
+            motor.approach(orders.goal, orders.fastest, orders.acceleration, dt)
+        else:
+            circle = self.model.family.ticks if self.model.protocol == 1 else 0
+            motor.turn(orders.speed, orders.acceleration, dt, circle)
+
+    @property
+    def _load(self) -> float:
+        """Return its load, of the most: what is put on it, and what the motor needs to move."""
+        return max(-1.0, min(1.0, self.load + self.motor.effort))
+
+    @property
+    def _voltage(self) -> float:
+        """Return what is left of the supply under its load [V]."""
+        return self.motor.traits.supply - self.motor.traits.sag * abs(self._load)
 
     def _protect(self) -> None:
-        found = OVERHEATED if self.motor.temperature > self.get("temperature_limit") else 0
-        found |= OVERLOAD if abs(self.load) > 1.0 and (self.get("torque_enable") or self._is_shut_down) else 0
-        found |= 0 if 60 <= self.get("present_voltage") <= 280 else VOLTAGE
+        orders = self._orders
+        found = OVERHEATED if self.motor.temperature > orders.hottest else 0
+        found |= OVERLOAD if abs(self.load) > 1.0 and (orders.has_torque or self._is_shut_down) else 0
+        found |= 0 if 6.0 <= self._voltage <= 28.0 else VOLTAGE
         self._errors = found | (self._errors if self.model.protocol == 2 else 0)  # which keeps them until it reboots
-        if self._errors & self.get("shutdown"):
+        if self._errors & orders.shutdown:
             self._is_shut_down = True
-            self.set("torque_enable", 0)
+            if orders.has_torque:
+                self.set("torque_enable", 0)
         elif self.model.protocol == 1:
             self._is_shut_down = False
 
     def _show(self) -> None:
         """Write what it measures into its memory."""
-        speed = self.motor.velocity * self.model.per_tick
-        at = self.model.items["present_position"]
-        aim = self.get("goal_position")
-        self.set("present_position", max(at.least, min(at.most, round(self.motor.position))))
-        self.set("present_speed", self._fitted("present_speed", self.model.to_raw("present_speed", speed)))
-        self.set("present_load", self._fitted("present_load", round(1000 * self.load)))
-        self.set("present_temperature", round(self.motor.temperature))
-        self.set("hardware_error", self._errors if self.model.protocol == 2 else 0)
-        is_going = bool(self.get("torque_enable")) and not self.is_wheel and abs(aim - self.motor.position) > 1
-        self.set("moving", int(is_going or abs(speed) > 1e-3))
+        motor, orders = self.motor, self._orders
+        speed = motor.velocity * self.model.per_tick
+        measured = motor.position + (self._random.gauss(0.0, self.noise) if self.noise else 0.0)
+        is_going = orders.has_torque and not orders.is_wheel and abs(orders.goal - motor.position) > 1
+        self._tell("present_position", round(measured))
+        self._tell("present_speed", self.model.to_raw("present_speed", speed))
+        self._tell("present_load", round(1000 * self._load))
+        self._tell("present_voltage", round(10 * self._voltage))
+        self._tell("present_temperature", round(motor.temperature))
+        self._tell("hardware_error", self._errors if self.model.protocol == 2 else 0)
+        self._tell("moving", int(is_going or abs(speed) > 1e-3))
 
-    def _fitted(self, item: str, raw: int) -> int:
-        where = self.model.items[item]
-        return max(where.least, min(where.most, raw))
+    def _tell(self, item: str, raw: int) -> None:
+        """Write a measured value, as far as its item can hold it."""
+        if self._shown.get(item) == raw:
+            return
+        self._shown[item] = raw
+        if (where := self.model.items.get(item)) is not None:
+            self.memory[where.address : where.end] = where.encode(max(where.least, min(where.most, raw)))
 
     def read(self, address: int, length: int) -> bytes | None:
         """Return memory, None if there is none."""
@@ -198,6 +268,7 @@ class FakeServo:
         if result == _RIGHT:
             was_on = bool(self.get("torque_enable"))
             self.memory[address:end] = data
+            self._known = None
             self._follow({item.name for item in touched}, was_on)
         return result if self.model.protocol == 2 else _ONE_RESULTS[result]
 

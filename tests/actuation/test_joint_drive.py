@@ -102,7 +102,7 @@ def test_whatever_is_asked_the_goal_keeps_to_the_limits(asked: list[list[MoveTo 
 
 def test_the_same_cycle_drives_servos_by_bytes() -> None:
     one = joint()
-    with pseudo_terminal({1: "AX-12"}) as path, DynamixelBus(path, {1: one.model}) as bus:
+    with pseudo_terminal([FakeServo("AX-12", 1)]) as port, DynamixelBus(str(port.path), {1: one.model}) as bus:
         drive = JointDrive(one, JointPolicy(cycle=PERIOD))
         cycle = ServoCycle(bus, {"pan": drive})
         begin = time.monotonic()

@@ -167,6 +167,19 @@ def test_a_canceled_trajectory_comes_to_rest(head: Head) -> None:
     assert head.at == there
 
 
+def test_noise_is_in_what_is_measured_and_its_seed_repeats_it() -> None:
+    told = []
+    for seed in (1, 1, 2):
+        head, seen = Head(noise=2 * TICK, seed=seed), []
+        for _ in range(50):
+            head.robot.advance(0.02)
+            seen.append(head.at["pan"])
+        told.append(seen)
+    assert told[0] == told[1]
+    assert told[0] != told[2]
+    assert 0 < max(map(abs, told[0])) < 10 * TICK
+
+
 class Gone:
     """A bus whose port is not there."""
 

@@ -78,6 +78,13 @@ def test_a_bus_drives_its_joints_within_the_tighter_limits(tmp_path: Path) -> No
     assert (tilt.lower, tilt.upper, tilt.velocity, tilt.invert) == (-1.0, 1.0, 2.0, True)
 
 
+def test_how_true_simulated_servos_are_is_told_at_the_bus(tmp_path: Path) -> None:
+    text = SERVOS.replace("rate: 50 Hz}", "sim: ideal, twin: {noise: 0.5 deg, seed: 3}}")
+    config = driver_of(check(tmp_path, text))
+    assert (config.twin, config.seed) == ("ideal", 3)
+    assert config.noise == pytest.approx(0.0087266, abs=1e-6)
+
+
 def test_two_instances_of_a_part_bring_their_joints_to_one_bus(tmp_path: Path) -> None:
     robot = (
         "rbx: 1\nkind: Robot\nname: two\nbuses: {servos: {type: dynamixel}}\ninclude:\n  left: part.yaml\n"
