@@ -13,6 +13,7 @@ from random import Random
 
 from rbxcompose.actuation.control_items import ControlItem
 from rbxcompose.actuation.servo_models import ONE_ERRORS, ServoModel, servo_models
+from rbxcompose.twins.servo_faults import ServoFaults
 from rbxcompose.twins.servo_motor import IdealMotor, MotorTraits, ServoMotor
 
 FASTEST = MotorTraits().fastest  # [rad/s] without a limit of the speed
@@ -23,27 +24,6 @@ _RIGHT, _FAILED, _RANGE, _LIMIT, _ACCESS = 0, 1, 4, 6, 7  # results in protocol 
 _ONE_RESULTS = {_RIGHT: 0, _FAILED: 0, _RANGE: 8, _LIMIT: 2, _ACCESS: 8}  # the nearest of protocol 1.0
 _GOALS = ("goal_position", "goal_speed", "goal_velocity", "goal_current")
 _READ_ONLY = ("model_number", "firmware", "moving", "hardware_error")
-
-
-@dataclass(slots=True)
-class ServoFaults:
-    """What goes wrong with a servo's replies until it is set back."""
-
-    is_mute: bool = False
-    silences_next: bool = False
-    """While mute, those after it in a group keep waiting for its reply, too."""
-    delay: float = 0.0
-    """How much later each reply is [s]."""
-    garbage: bytes = b""
-    """Stands before each reply."""
-    corrupts: bool = False
-    """Flips a bit of each reply."""
-    cuts: int = 0
-    """How many bytes at the end of each reply are missing."""
-    id: int | None = None
-    """Replies carry this id."""
-    repeats: int = 1
-    """How often each reply is sent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +68,6 @@ class FakeServo:
         self.holds_on_enable = holds_on_enable
         self.load = 0.0  # of the most, which the outside puts on it
         self.heard = 0.0  # [s], time of the last instruction
-        self.is_jammed = False
         centre = float(self.model.items["present_position"].centre)
         self.motor = (IdealMotor if is_ideal else ServoMotor)(centre, self.model.per_tick)
         self.noise = noise
@@ -182,9 +161,13 @@ class FakeServo:
 
     def step(self, dt: float, now: float) -> None:
         """Let `dt` [s] pass until `now` [s]."""
+        if self.faults.is_off:
+            self.reboot()
         self._watch(now)
         self._move(dt)
         self.motor.warm(self._load, dt)
+        if self.faults.is_hot:
+            self.motor.temperature = self._orders.hottest
         self._protect()
         self._show()
 
@@ -200,7 +183,7 @@ class FakeServo:
         orders, motor = self._orders, self.motor
         if not orders.has_torque:
             motor.push(0.0)
-        elif self.is_jammed:
+        elif self.faults.is_jammed:
             wanted = orders.speed if orders.is_wheel else orders.goal - motor.position
             motor.push(math.copysign(1.0, wanted) if wanted else 0.0)
         elif not orders.is_wheel:
@@ -210,19 +193,25 @@ class FakeServo:
             motor.turn(orders.speed, orders.acceleration, dt, circle)
 
     @property
+    def _outer(self) -> float:
+        """Return what is put on it from outside, of the most."""
+        return self.load + self.faults.load
+
+    @property
     def _load(self) -> float:
         """Return its load, of the most: what is put on it, and what the motor needs to move."""
-        return max(-1.0, min(1.0, self.load + self.motor.effort))
+        return max(-1.0, min(1.0, self._outer + self.motor.effort))
 
     @property
     def _voltage(self) -> float:
         """Return what is left of the supply under its load [V]."""
-        return self.motor.traits.supply - self.motor.traits.sag * abs(self._load)
+        traits = self.motor.traits
+        return traits.supply - self.faults.missing - traits.sag * abs(self._load)
 
     def _protect(self) -> None:
         orders = self._orders
         found = OVERHEATED if self.motor.temperature > orders.hottest else 0
-        found |= OVERLOAD if abs(self.load) > 1.0 and (orders.has_torque or self._is_shut_down) else 0
+        found |= OVERLOAD if abs(self._outer) > 1.0 and (orders.has_torque or self._is_shut_down) else 0
         found |= 0 if 6.0 <= self._voltage <= 28.0 else VOLTAGE
         self._errors = found | (self._errors if self.model.protocol == 2 else 0)  # which keeps them until it reboots
         if self._errors & orders.shutdown:
