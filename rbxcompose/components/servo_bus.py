@@ -32,10 +32,11 @@ from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.std_msgs import Float64, Header
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
+from rbxcompose.requests import Refused, answers
 from rbxcompose.sdk import Component, Config, In, Out, Port, ServedGoal, Serves, ServesAction, component
 from rbxcompose.sdk.component import Context
-from rbxcompose.twins.pseudo_terminal import pseudo_terminal
-from rbxcompose.twins.servo_fake import FakeServo
+from rbxcompose.twins.fault_script import FaultScript, InjectFault, TwinFault
+from rbxcompose.twins.servo_stage import twin_of, twin_servos
 from rbxcompose.twins.servo_twin import TwinBus
 
 Follow = FollowJointTrajectory
@@ -89,6 +90,8 @@ class ServoBusConfig(Config):
     """Standard deviation of the positions that simulated servos measure [rad]."""
     seed: int = 0
     """Repeats the noise."""
+    faults: dict[str, TwinFault] = {}
+    """What goes wrong with simulated servos, by names."""
     on_shutdown: Literal["relax", "hold"] = "relax"
     """What happens to torque at the end."""
     joints: dict[str, DrivenJointConfig] = {}
@@ -141,6 +144,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Open the bus, real or simulated; nothing moves."""
         config, self.at_end = self.config, ExitStack()
         joints = {name: servo_joint(name, one) for name, one in config.joints.items()}
+        self.faults: FaultScript | None = None
         self.period = 1.0 / config.rate
         policy = JointPolicy(cycle=self.period)
         rules = {name: JointRules(one.limits, one.is_continuous) for name, one in joints.items()}
@@ -158,14 +162,12 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Return the bus: that of the port, or simulated servos."""
         config, models, path = self.config, {joint.id: joint.model for joint in joints}, self.config.port
         if config.twin:
-            ideal = config.twin == "ideal"
-            servos = [
-                FakeServo(one.name, id_, is_ideal=ideal, noise=config.noise / one.per_tick, seed=config.seed)
-                for id_, one in models.items()
-            ]
-            if config.twin != "pty":
-                return TwinBus(servos, lambda: self.now)
-            path = str(self.at_end.enter_context(pseudo_terminal(servos)).path)
+            servos = twin_servos(joints, is_ideal=config.twin == "ideal", noise=config.noise, seed=config.seed)
+            twin = self.at_end.enter_context(twin_of(servos, lambda: self.now, has_bytes=config.twin == "pty"))
+            self.faults = FaultScript(config.faults.values(), servos, twin)
+            if isinstance(twin, TwinBus):
+                return twin
+            path = str(twin.path)
         from rbxcompose.actuation.dynamixel_bus import DynamixelBus
 
         bus = DynamixelBus(path, models, baud=self.config.baud, clock=lambda: self.now)
@@ -174,11 +176,15 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     def activate(self) -> None:
         """Begin the cycles."""
+        if self.faults is not None:
+            self.faults.start(self.now)
         self.wake()
 
     def wake(self) -> None:
         """Run one cycle, and prepare the next, on a grid."""
         self.context.wake_at((math.floor(self.now / self.period + 1e-6) + 1) * self.period)
+        if self.faults is not None:
+            self.faults.play(self.now)
         try:
             self.run_cycle()
         except PortError as error:
@@ -195,7 +201,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.cycle.bus.reopen()
             for drive in self.cycle.drives.values():  # their servos have no torque now, and may be elsewhere
                 drive.ask(Relax())
-            self.info(f"the port '{self.config.port}' is back")
+            self.info("the bus of servos is back")
             self.lost_at = -math.inf
         for name in self.goals:
             self.take(name)
@@ -260,6 +266,13 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Enable a joint; while it is disabled, it has no torque and commands are refused."""
         self.cycle.drives[name].ask(Enable(request.data))
         return SetBool.Response(success=True)
+
+    @answers(InjectFault)
+    def inject(self, request: InjectFault) -> str:
+        """Let something go wrong with simulated servos."""
+        if self.faults is None:
+            raise Refused("real servos have their own faults")
+        return self.faults.inject(request, self.now)
 
     def publish(self) -> None:
         """Publish where the joints are."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from rbxcompose.config import Config
 from rbxcompose.requests import Command, Refused
 from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_faults import FAULTS, UNPLUG, servo_faults
+from rbxcompose.twins.servo_faults import FAULTS, UNPLUG, FaultName, servo_faults
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,14 +28,21 @@ class InjectFault(Command):
         return f"{self.fault} of {self.joint or 'the bus'}{lasting}"
 
 
-@dataclass(frozen=True, slots=True)
-class TwinFault:
-    """A fault of a joint, or without one of the bus, from one time until another [s]."""
+class TwinFault(Config):
+    """Something that goes wrong with simulated servos."""
 
-    fault: str
-    joint: str
-    begin: float
-    end: float = math.inf
+    at: float
+    """When it begins [s]; in a script, counted from the activation."""
+    fault: FaultName
+    """What goes wrong."""
+    joint: str = ""
+    """The joint; without it the bus as a whole."""
+    lasts: float | None = None
+    """How long it lasts [s]; without it for good."""
+
+    def is_present(self, now: float) -> bool:
+        """Return whether it is there at a time [s]."""
+        return self.at <= now and (self.lasts is None or now < self.at + self.lasts)
 
 
 class Plug(Protocol):
@@ -51,14 +58,19 @@ class Plug(Protocol):
 
 
 class FaultScript:
-    """Lets faults begin and end: those of a script, with times since the beginning, and those of requests.
+    """Lets faults begin and end: those of a script, whose times count from `start`, and those of requests.
 
     `servos` are those of each joint.
     """
 
     def __init__(self, faults: Iterable[TwinFault], servos: Mapping[str, Sequence[FakeServo]], plug: Plug) -> None:
-        self._faults, self._servos, self._plug = list(faults), servos, plug
+        self._script, self._servos, self._plug = tuple(faults), servos, plug
+        self._faults = list(self._script)
         self._present: list[TwinFault] = []
+
+    def start(self, now: float) -> None:
+        """Let the script begin at a time [s]."""
+        self._faults = [one.model_copy(update={"at": one.at + now}) for one in self._script]
 
     def inject(self, request: InjectFault, now: float) -> str:
         """Let a fault begin now [s]; return that it does.
@@ -70,13 +82,12 @@ class FaultScript:
             raise Refused(f"no fault is called '{request.fault}'")
         if request.joint and (request.joint not in self._servos or request.fault == UNPLUG):
             raise Refused(f"'{request.joint}' is no joint that can have the fault '{request.fault}'")
-        end = math.inf if request.lasts is None else now + request.lasts
-        self._faults.append(TwinFault(request.fault, request.joint, now, end))
+        self._faults.append(TwinFault(at=now, fault=request.fault, joint=request.joint, lasts=request.lasts))
         return f"{request.words} begins"
 
     def play(self, now: float) -> None:
         """Let begin and end what is due at a time [s]."""
-        present = [one for one in self._faults if one.begin <= now < one.end]
+        present = [one for one in self._faults if one.is_present(now)]
         if present == self._present:
             return
         was_out, is_out = (any(one.fault == UNPLUG for one in each) for each in (self._present, present))

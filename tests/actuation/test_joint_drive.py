@@ -16,8 +16,8 @@ from rbxcompose.actuation.servo_cycle import ServoCycle
 from rbxcompose.actuation.servo_models import model_named, servo_models
 from rbxcompose.control.joint_states import Enable, JointMode, JointPolicy, MoveTo, Relax
 from rbxcompose.control.limits import MotionLimits
-from rbxcompose.twins.pseudo_terminal import pseudo_terminal
 from rbxcompose.twins.servo_fake import FakeServo
+from rbxcompose.twins.servo_stage import pseudo_terminal
 from rbxcompose.twins.servo_twin import TwinBus
 
 PERIOD = 0.01

@@ -27,6 +27,10 @@ SILENT = {"power_off", "mute", "late", "corrupt", "wrong_id"}
 HEALTHY = servo_faults([])
 
 
+def fault(name: str, joint: str, at: float, lasts: float | None = None) -> TwinFault:
+    return TwinFault.model_validate({"fault": name, "joint": joint, "at": at, "lasts": lasts})
+
+
 class Broken:
     """Servos as a bus, in stepped time, and a script of faults for them; the joints have the names of ids."""
 
@@ -70,7 +74,7 @@ def test_a_servo_answers_by_bytes_just_when_it_does_as_memory(name: str, tmp_pat
         for one in servos[:2]:
             one.faults = servo_faults([])
         assert set(bus.read(list(MODELS), ["present_position"])) == set(MODELS)
-    broken = Broken(TwinFault(name, "1", 1.0, 2.0), TwinFault(name, "2", 1.0, 2.0))
+    broken = Broken(fault(name, "1", 1.0, 1.0), fault(name, "2", 1.0, 1.0))
     assert broken.at(0.9) == set(MODELS)
     assert broken.at(1.5) == found
     assert broken.at(2.1) == set(MODELS)
@@ -78,7 +82,7 @@ def test_a_servo_answers_by_bytes_just_when_it_does_as_memory(name: str, tmp_pat
 
 
 def test_a_hot_servo_cools_down_after_the_fault() -> None:
-    broken = Broken(TwinFault("overheat", "1", 0.0, 5.0))
+    broken = Broken(fault("overheat", "1", 0.0, 5.0))
     broken.at(4.0)
     servo = broken.bus.line[1]
     assert servo.get("present_temperature") == servo.get("temperature_limit")
@@ -88,20 +92,20 @@ def test_a_hot_servo_cools_down_after_the_fault() -> None:
 
 
 def test_an_overload_and_a_low_supply_are_told_and_a_shutdown_outlives_them_in_protocol_2() -> None:
-    broken = Broken(TwinFault("overload", "1", 0.0, 1.0), TwinFault("overload", "2", 0.0, 1.0))
+    broken = Broken(fault("overload", "1", 0.0, 1.0), fault("overload", "2", 0.0, 1.0))
     broken.bus.write({id_: {"torque_enable": 1} for id_ in MODELS})
     broken.at(0.5)
     assert [broken.bus.line[id_].get("torque_enable") for id_ in MODELS] == [0, 0, 1, 1]
     assert (broken.bus.line[1].alert, broken.bus.line[2].get("hardware_error")) == (32, 32)
     broken.at(1.5)
     assert (broken.bus.line[1].alert, broken.bus.line[2].get("hardware_error")) == (0, 32)
-    weak = Broken(TwinFault("undervoltage", "2", 0.0))
+    weak = Broken(fault("undervoltage", "2", 0.0))
     weak.at(0.5)
     assert (weak.bus.line[2].get("present_voltage"), weak.bus.line[2].get("hardware_error")) == (50, 1)
 
 
 def test_a_jammed_servo_pushes_and_warms_up_and_moves_on_afterwards() -> None:
-    broken = Broken(TwinFault("jam", "2", 0.0, 5.0))
+    broken = Broken(fault("jam", "2", 0.0, 5.0))
     broken.at(0.1)
     broken.bus.write({2: {"torque_enable": 1}})
     broken.bus.write({2: {"goal_position": 1500}})
@@ -114,7 +118,7 @@ def test_a_jammed_servo_pushes_and_warms_up_and_moves_on_afterwards() -> None:
 
 
 def test_a_servo_without_power_forgets_its_torque_and_stays_where_it_is() -> None:
-    broken = Broken(TwinFault("power_off", "2", 1.0, 2.0))
+    broken = Broken(fault("power_off", "2", 1.0, 1.0))
     broken.bus.write({2: {"torque_enable": 1, "goal_position": 3500, "goal_speed": 5}})
     broken.at(1.5)
     at = broken.bus.line[2].get("present_position")
@@ -125,14 +129,14 @@ def test_a_servo_without_power_forgets_its_torque_and_stays_where_it_is() -> Non
 
 
 def test_a_mute_servo_obeys() -> None:
-    broken = Broken(TwinFault("mute", "2", 0.0))
+    broken = Broken(fault("mute", "2", 0.0))
     broken.at(0.1)
     assert broken.bus.write({2: {"led": 1}}, is_confirmed=True) == {2}
     assert broken.bus.line[2].get("led") == 1
 
 
 def test_a_bus_that_is_unplugged_is_gone_until_it_is_not() -> None:
-    broken = Broken(TwinFault(UNPLUG, "", 1.0, 2.0))
+    broken = Broken(fault(UNPLUG, "", 1.0, 1.0))
     assert broken.at(0.9) == set(MODELS)
     with pytest.raises(LostPortError):
         broken.at(1.5)
@@ -142,7 +146,7 @@ def test_a_bus_that_is_unplugged_is_gone_until_it_is_not() -> None:
 
 
 def test_faults_of_one_joint_add_up_and_end_each_for_itself() -> None:
-    broken = Broken(TwinFault("mute", "1", 0.0, 2.0), TwinFault("jam", "1", 1.0, 3.0))
+    broken = Broken(fault("mute", "1", 0.0, 2.0), fault("jam", "1", 1.0, 2.0))
     seen = []
     for time in (0.5, 1.5, 2.5, 3.5):
         broken.at(time)
@@ -166,7 +170,7 @@ def test_a_request_begins_at_once_and_what_makes_no_sense_is_refused() -> None:
     st.lists(st.tuples(st.sampled_from([*FAULTS]), st.sampled_from(["1", "2", ""]), st.floats(0, 1), st.floats(0, 1)))
 )
 def test_all_faults_end_with_their_times(script: list[tuple[str, str, float, float]]) -> None:
-    broken = Broken(*(TwinFault(name, joint, begin, begin + lasts) for name, joint, begin, lasts in script))
+    broken = Broken(*(fault(name, joint, begin, lasts) for name, joint, begin, lasts in script))
     broken.at(0.7)
     broken.at(2.1)
     assert broken.answering() == set(MODELS)
