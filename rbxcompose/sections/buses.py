@@ -18,6 +18,7 @@ from rbxcompose.references import SERVO_BUS
 from rbxcompose.sections.actuators import ActuatorModel, actuators
 from rbxcompose.sections.body import body
 from rbxcompose.sections.controllers import controllers
+from rbxcompose.sections.faults import faults_of
 from rbxcompose.sections.joints import JointModel, joints
 
 
@@ -45,7 +46,7 @@ class BusOfServosModel(Config):
     """How true simulated servos are: `ideal` ones are at their goals at once, `servo` has motors; with `pty` they also
     answer by bytes on a pseudo-terminal, through the driver of real ones."""
     twin: TwinModel = TwinModel()
-    """What simulated servos measure."""
+    """How what simulated servos measure differs from what is."""
     on_shutdown: Literal["relax", "hold"] = "relax"
     """What happens to torque when the robot goes down."""
 
@@ -65,6 +66,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             "twin": bus.sim if contents.is_simulated else "",
             "noise": bus.twin.noise,
             "seed": bus.twin.seed,
+            "faults": faults_of(contents, name),
             "on_shutdown": bus.on_shutdown,
             "joints": {joint: _joint(known.joints.get(joint), one, servos[one.actuator]) for joint, one in own.items()},
             "controllers": {

@@ -77,7 +77,7 @@ ABOVE = {
     "scaffold": "composition missions sdk",
     "schema": "missions sdk sections",
     "sdk": "",
-    "sections": "actuation.servo_models body sdk",
+    "sections": "actuation.servo_models body sdk twins.servo_faults",
     "sim": "",
     "skills": "sdk",
     "twins": "actuation",

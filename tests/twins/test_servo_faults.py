@@ -20,6 +20,7 @@ from rbxcompose.twins.servo_fake import FakeServo
 from rbxcompose.twins.servo_faults import FAULTS, UNPLUG, FaultName, servo_faults
 from rbxcompose.twins.servo_line import FakeLine
 from rbxcompose.twins.servo_port import FakePort
+from rbxcompose.twins.servo_stage import twin_of
 from rbxcompose.twins.servo_twin import TwinBus
 
 MODELS = {1: "AX-12", 2: "XL430-W250", 3: "AX-12", 4: "XL430-W250"}
@@ -79,6 +80,23 @@ def test_a_servo_answers_by_bytes_just_when_it_does_as_memory(name: str, tmp_pat
     assert broken.at(1.5) == found
     assert broken.at(2.1) == set(MODELS)
     assert all(one.faults == HEALTHY for one in broken.bus.line.servos)
+
+
+def test_a_script_acts_on_servos_behind_a_pseudo_terminal(tmp_path: Path) -> None:
+    servos = {str(id_): [FakeServo(model, id_)] for id_, model in MODELS.items()}
+    models = {id_: servos[str(id_)][0].model for id_ in MODELS}
+    with twin_of(servos, SteppedClock().now, has_bytes=True) as port:
+        assert isinstance(port, FakePort)
+        script = FaultScript([fault("mute", "1", 1.0, 1.0), fault(UNPLUG, "", 3.0, 1.0)], servos, port)
+        with DynamixelBus(str(port.path), models, timeout=0.03) as bus:
+            for time, found in ((0.5, {1, 2, 3, 4}), (1.5, {2, 3, 4}), (2.5, {1, 2, 3, 4})):
+                script.play(time)
+                assert set(bus.read(list(MODELS), ["present_position"])) == found
+            script.play(3.5)
+            with pytest.raises(LostPortError):
+                bus.read(list(MODELS), ["present_position"])
+            script.play(4.5)
+            assert all(bus.reopen().values())
 
 
 def test_a_hot_servo_cools_down_after_the_fault() -> None:
