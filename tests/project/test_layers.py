@@ -63,7 +63,8 @@ ABOVE = {
     "finding_pages": "check_runner missions.analysis",
     "inspection": "body.model bus.names bus.wire composition missions model plan schema sdk sections",
     "lsp": "compiler composition missions model.robot schema sections",
-    "mission_tests": "compiler components.mission composition executive missions model plan.model sdk testing.bench",
+    "mission_tests": "compiler components.mission composition executive missions model plan.model sdk sections.faults "
+    "testing.bench twins.fault_script twins.servo_faults",
     "missions": "",
     "model": "composition missions sdk sections",
     "mux": "",
