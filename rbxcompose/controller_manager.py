@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
-from rbxcompose.controller_interface import Controller, ControllerConfig
+from rbxcompose.controller_interface import Controller, ControllerConfig, LedJoint
+from rbxcompose.sdk.bound import ActionServer, ServedGoal
+from rbxcompose.sdk.component import Component
 
 
 class ControllerManager:
@@ -56,3 +59,38 @@ class ControllerManager:
             if name not in self._active:
                 self._active.add(name)
                 yield f"controller '{name}' is active"
+
+
+class ControllerSeat:
+    """What a controller uses of its bus: see `ControllerSite`."""
+
+    def __init__(self, bus: Component[Any], name: str, joints: Mapping[str, LedJoint]) -> None:
+        self._bus, self._name = bus, name
+        self.joints = joints
+
+    @property
+    def now(self) -> float:
+        """Return robot time [s]."""
+        return self._bus.now
+
+    @property
+    def stamp(self) -> int:
+        """Return the time for message headers [ns]."""
+        return self._bus.stamp
+
+    def action(self, port: str) -> ActionServer[Any, Any, Any]:
+        """Return the action at one of the controller's ports."""
+        server: ActionServer[Any, Any, Any] = self._bus.bound[f"{self._name}_{port}"]
+        return server
+
+    def goal(self, port: str) -> ServedGoal[Any, Any, Any] | None:
+        """Return the current goal at one of the controller's ports."""
+        return self.action(port).current
+
+    def send(self, port: str, message: Any) -> None:
+        """Publish at one of the controller's ports."""
+        self._bus.bound[f"{self._name}_{port}"](message)
+
+    def warn(self, text: str) -> None:
+        """Log something that a person should look at."""
+        self._bus.warn(f"controller '{self._name}': {text}")

@@ -17,6 +17,7 @@ from rbxcompose.control.joint_states import JointPolicy, ThermalPolicy
 from rbxcompose.control.limits import MotionLimits
 from rbxcompose.control.transmission import Gear, Measured
 from rbxcompose.controller_interface import ControllerConfig, controller_type
+from rbxcompose.twins.fault_script import TwinFault
 
 
 class JointServoConfig(Config):
@@ -107,8 +108,14 @@ class ServoBusConfig(Config):
     """Cycles per second."""
     watchdog: float = 0.2
     """Silence of the bus after which servos stop by themselves, if they can [s]; 0 is never."""
-    twin: Literal["", "servo", "pty"] = ""
+    twin: Literal["", "ideal", "servo", "pty"] = ""
     """How its servos are simulated, if they are."""
+    noise: float = 0.0
+    """Standard deviation of the positions that simulated servos measure [rad]."""
+    seed: int = 0
+    """Repeats the noise."""
+    faults: dict[str, TwinFault] = {}
+    """What goes wrong with simulated servos, by names."""
     on_start: Literal["relax", "hold"] = "relax"
     """Whether joints have torque from the start."""
     on_shutdown: Literal["relax", "hold", "park"] = "relax"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -16,10 +15,11 @@ from rbxcompose.actuation.port_errors import PortError
 from rbxcompose.actuation.position_drive import PositionDrive
 from rbxcompose.actuation.preparation import prepare, with_torque
 from rbxcompose.actuation.servo_cycle import ServoCycle
-from rbxcompose.actuation.servo_models import servo_models
+from rbxcompose.actuation.servo_joint import ServoJoint
+from rbxcompose.clock import MonotonicClock
 from rbxcompose.control.joint_states import Enable, Hold, JointMode, MoveTo
-from rbxcompose.controller_interface import LedJoint, controller_type
-from rbxcompose.controller_manager import ControllerManager
+from rbxcompose.controller_interface import controller_type
+from rbxcompose.controller_manager import ControllerManager, ControllerSeat
 from rbxcompose.controller_requests import ControllerState, ListControllers, SwitchControllers
 from rbxcompose.levels import Level
 from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
@@ -28,13 +28,12 @@ from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Float64, Header
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.requests import Refused, answers
-from rbxcompose.sdk import Component, In, Out, Port, ServedGoal, Serves, ServesAction, component
-from rbxcompose.sdk.bound import ActionServer
+from rbxcompose.sdk import Component, In, Out, Port, Serves, ServesAction, component
 from rbxcompose.sdk.capabilities import Capability, NeedsExtra, OpensPort, Setting
 from rbxcompose.sdk.component import Context
 from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, mimics_of
-from rbxcompose.twins.pseudo_terminal import pseudo_terminal
-from rbxcompose.twins.servo_fake import FakeServo
+from rbxcompose.twins.fault_script import FaultScript, InjectFault
+from rbxcompose.twins.servo_stage import twin_of, twin_servos
 from rbxcompose.twins.servo_twin import TwinBus
 
 GONE = "the bus of servos has gone"
@@ -110,29 +109,37 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Open the bus, real or simulated; nothing moves."""
         config, self.at_end = self.config, ExitStack()
         self.period = 1.0 / config.rate
+        self.faults: FaultScript | None = None
         drives, mimics = drives_of(config), mimics_of(config.joints)
-        self.cycle = ServoCycle(self.opened(), drives, mimics, config.watchdog, config.thermal.scope == "bus")
+        bus = self.opened([one.joint for one in drives.values()])
+        self.cycle = ServoCycle(bus, drives, mimics, config.watchdog, config.thermal.scope == "bus")
+        seats = {
+            name: ControllerSeat(self, name, {joint: drives[joint] for joint in one.config.led})
+            for name, one in config.controllers.items()
+        }
         self.controllers = ControllerManager(
-            {
-                name: controller_type(one.type)(name, one.config, ControllerSeat(self, name, one.config.led))
-                for name, one in config.controllers.items()
-            }
+            {name: controller_type(one.type)(name, one.config, seats[name]) for name, one in config.controllers.items()}
         )
         self.is_stopped, self.lost_at = self.context.is_stopped, -math.inf
         self.told_at, self.published_at = -math.inf, -math.inf
         self.is_parking = False
 
-    def opened(self) -> Bus:
+    def opened(self, joints: list[ServoJoint]) -> Bus:
         """Return the bus: that of the port, or simulated servos."""
-        models = self.config.models
-        if self.config.twin == "servo":
-            return TwinBus([FakeServo(model, id_) for id_, model in models.items()], lambda: self.now)
-        path = self.config.port
-        if self.config.twin == "pty":
-            path = self.at_end.enter_context(pseudo_terminal(models))
+        config, path = self.config, self.config.port
+        if config.twin:
+            has_bytes = config.twin == "pty" and isinstance(self.context.clock, MonotonicClock)
+            if config.twin == "pty" and not has_bytes:
+                self.warn("bytes need real time, so servos are simulated without them")
+            servos = twin_servos(joints, is_ideal=config.twin == "ideal", noise=config.noise, seed=config.seed)
+            twin = self.at_end.enter_context(twin_of(servos, lambda: self.now, has_bytes=has_bytes))
+            self.faults = FaultScript(config.faults.values(), servos, twin)
+            if isinstance(twin, TwinBus):
+                return twin
+            path = str(twin.path)
         from rbxcompose.actuation.dynamixel_bus import DynamixelBus
 
-        known = {id_: servo_models()[name] for id_, name in models.items()}
+        known = {servo.id: servo.model for joint in joints for servo in joint.servos}
         bus = DynamixelBus(path, known, baud=self.config.baud, clock=lambda: self.now)
         self.at_end.callback(bus.close)
         return bus
@@ -153,11 +160,15 @@ class ServoBusDriver(Component[ServoBusConfig]):
                     drive.policy = replace(drive.policy, on_start="hold")
         except PortError as error:
             self.lose(error)
+        if self.faults is not None:
+            self.faults.start(self.now)
         self.wake()
 
     def wake(self) -> None:
         """Run one cycle, and prepare the next, on a grid."""
         self.context.wake_at((math.floor(self.now / self.period + 1e-6) + 1) * self.period)
+        if self.faults is not None:
+            self.faults.play(self.now)
         try:
             self.run_cycle()
         except PortError as error:
@@ -175,7 +186,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
             for drive in self.cycle.drives.values():  # their servos have no torque now, and may be elsewhere
                 drive.relax()
             self.prepare()
-            self.info(f"the port '{self.config.port}' is back")
+            self.info("the bus of servos is back")
             self.lost_at = -math.inf
         self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.active)
         if self.now - self.published_at >= 1 / PUBLISHED - 1e-9:
@@ -270,6 +281,13 @@ class ServoBusDriver(Component[ServoBusConfig]):
         clamped = f"its limit is {fastest:g}" if request.speed > fastest else ""
         return SetSpeed.Response(success=True, message=clamped)
 
+    @answers(InjectFault)
+    def inject(self, request: InjectFault) -> str:
+        """Let something go wrong with simulated servos."""
+        if self.faults is None:
+            raise Refused("real servos have their own faults")
+        return self.faults.inject(request, self.now)
+
     # What is told
 
     def publish(self) -> None:
@@ -353,38 +371,3 @@ class ServoBusDriver(Component[ServoBusConfig]):
         except PortError as error:
             self.warn(f"the joints could not be relaxed: {error}")
         self.at_end.close()
-
-
-class ControllerSeat:
-    """What a controller uses of its bus: see `ControllerSite`."""
-
-    def __init__(self, bus: ServoBusDriver, name: str, joints: tuple[str, ...]) -> None:
-        self._bus, self._name = bus, name
-        self.joints: Mapping[str, LedJoint] = {joint: bus.cycle.drives[joint] for joint in joints}
-
-    @property
-    def now(self) -> float:
-        """Return robot time [s]."""
-        return self._bus.now
-
-    @property
-    def stamp(self) -> int:
-        """Return the time for message headers [ns]."""
-        return self._bus.stamp
-
-    def action(self, port: str) -> ActionServer[Any, Any, Any]:
-        """Return the action at one of the controller's ports."""
-        server: ActionServer[Any, Any, Any] = self._bus.bound[f"{self._name}_{port}"]
-        return server
-
-    def goal(self, port: str) -> ServedGoal[Any, Any, Any] | None:
-        """Return the current goal at one of the controller's ports."""
-        return self.action(port).current
-
-    def send(self, port: str, message: Any) -> None:
-        """Publish at one of the controller's ports."""
-        self._bus.bound[f"{self._name}_{port}"](message)
-
-    def warn(self, text: str) -> None:
-        """Log something that a person should look at."""
-        self._bus.warn(f"controller '{self._name}': {text}")

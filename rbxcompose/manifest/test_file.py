@@ -70,6 +70,19 @@ class SentModel(Config):
     """Its fields; a single value sets the only field."""
 
 
+class InjectedModel(Config):
+    """A fault of simulated servos."""
+
+    fault: Name
+    """What goes wrong: `overheat`, `jam`, `mute`, ..."""
+    joint: str | None = None
+    """The joint whose servo has it."""
+    bus: Name | None = None
+    """The bus all of whose servos have it, instead of a joint; `unplug` is of a bus."""
+    for_: Time | None = Field(None, gt=0, alias="for")
+    """How long it lasts; without it for good."""
+
+
 class EventModel(Config):
     """Something that happens to the robot; simultaneous events happen in the order of the text."""
 
@@ -79,6 +92,8 @@ class EventModel(Config):
     """Values that get this value now, and keep it until the test sets them again."""
     publish: SentModel | None = None
     """A message that comes from outside."""
+    fault: InjectedModel | None = None
+    """Something that goes wrong with simulated servos, as in `faults` of a robot."""
     stop: TrueOnly = False
     """The robot is stopped, and its mission paused."""
     release: TrueOnly = False

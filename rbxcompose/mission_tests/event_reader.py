@@ -10,6 +10,7 @@ from rbxcompose.manifest import test_file as trials
 from rbxcompose.manifest.tree import KeyPath, SequenceNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.mission_tests import codes
+from rbxcompose.mission_tests.fault_reader import FAULT, read_fault
 from rbxcompose.mission_tests.model import EventDeed, TrialEvent
 from rbxcompose.mission_tests.sections import TrialContext, entries_of
 from rbxcompose.model.wires import resolve
@@ -40,6 +41,8 @@ def _deed(context: TrialContext, word: str, node: TreeNode, model: trials.EventM
         return EventDeed(SET, context.settings(at(node, (SET,)), {}))
     if word == PUBLISH and model.publish:
         return _published(context, node, model.publish)
+    if word == FAULT and model.fault:
+        return read_fault(context, node, model.fault)
     return EventDeed(word)
 
 

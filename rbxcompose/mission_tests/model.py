@@ -11,6 +11,7 @@ from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SUCCESS
 from rbxcompose.msgs.types import Message
 from rbxcompose.plan.model import Plan
+from rbxcompose.requests import Command
 
 SUCCEEDS, FAILS, RUNS = NAMES[SUCCESS], NAMES[FAILURE], NAMES[RUNNING]
 HALTED, SKIPPED = "halted", "skipped"
@@ -49,12 +50,14 @@ class Mock:
 
 @dataclass(frozen=True, slots=True)
 class EventDeed:
-    """One action of an event: a word of the file, with its values."""
+    """One action of an event: a word of the file, with its values; a `request` is sent to a component."""
 
     word: str
     settings: Mapping[str, ValueSetting] = field(default_factory=dict)
     topic: str = ""
     message: Message | None = None
+    component: str = ""
+    request: Command | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, vali
 from rbxcompose.mission_tests import codes
 from rbxcompose.mission_tests.event_reader import PUBLISH, read_events
 from rbxcompose.mission_tests.expectation_reader import read_expect
+from rbxcompose.mission_tests.fault_reader import FAULT
 from rbxcompose.mission_tests.mission_facts import MissionFacts
 from rbxcompose.mission_tests.mock_reader import read_mocks
 from rbxcompose.mission_tests.model import Mock, Trial, TrialEvent
@@ -156,6 +157,9 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
         return None
     expect = read_expect(context, root.get("expect"), model)
     _look_at_times(events, expect.until, report)
+    is_complete = _is_complete(context.facts, mocks, events)
+    if is_complete:
+        report.extend(_faults_of_nothing(events))
     header = {key: value.text for key in ("name", "about") if isinstance(value := root.get(key), ScalarNode)}
     return Trial(
         header.get("name", ""),
@@ -171,8 +175,16 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
         mocks,
         events,
         expect,
-        _is_complete(context.facts, mocks, events),
+        is_complete,
     )
+
+
+def _faults_of_nothing(events: tuple[TrialEvent, ...]) -> Iterator[Finding]:
+    """Yield a finding for each fault of a test that needs no robot."""
+    for event in events:
+        if any(deed.word == FAULT for deed in event.deeds):
+            message = "the test answers all that the mission needs, so no servo runs that could have a fault"
+            yield codes.NEVER.at(event.span, message, help="leave a skill, a service or a value to the robot")
 
 
 def _is_complete(facts: MissionFacts, mocks: Mapping[str, Mock], events: tuple[TrialEvent, ...]) -> bool:

@@ -111,6 +111,9 @@ class RobotRun:
             case "publish" if deed.message is not None:
                 self.record.note(f"the test publishes on {deed.topic}")
                 self.bench.bus.publisher(OWNER, deed.topic, type(deed.message), Qos.COMMAND)(deed.message)
+            case "fault" if deed.request is not None:
+                self.record.note(f"the test brings a fault: {deed.request.words}")
+                self.bench.host.ask(deed.component, deed.request)
             case word:
                 self.record.note(f"the test {word}s the mission")
                 self.bench.host.ask(self.name, _COMMANDS[word](self.trial.mission))

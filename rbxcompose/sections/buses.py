@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from rbxcompose.body.model import Body, BodyJoint
-from rbxcompose.config import BitRate, Config, Frequency, Time
+from rbxcompose.config import Angle, BitRate, Config, Frequency, Time
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, SetScope
 from rbxcompose.manifest.tree import key_span
@@ -21,9 +21,19 @@ from rbxcompose.sections.actuators import ActuatorModel, actuators
 from rbxcompose.sections.body import body
 from rbxcompose.sections.controllers import controllers
 from rbxcompose.sections.devices import port_name
+from rbxcompose.sections.faults import buses_of_joints, faults_of
 from rbxcompose.sections.joints import JointModel, joints, table_of
 from rbxcompose.sections.safety import safety
 from rbxcompose.units import Quantity
+
+
+class TwinModel(Config):
+    """What simulated servos measure."""
+
+    noise: Angle = Field(0.0, ge=0)
+    """Standard deviation of measured positions."""
+    seed: int = 0
+    """Another seed gives other noise, the same one gives the same."""
 
 
 class BusOfServosModel(Config):
@@ -39,16 +49,20 @@ class BusOfServosModel(Config):
     """How often all joints are read and written."""
     watchdog: Time = Field(0.2, ge=0)
     """Silence after which servos stop by themselves, if their model can; 0 is never."""
-    sim: Literal["servo", "pty"] = "servo"
-    """How simulated servos answer: at once, or by bytes on a pseudo-terminal, through the driver of real ones."""
+    sim: Literal["ideal", "servo", "pty"] = "servo"
+    """How true simulated servos are: `ideal` ones are at their goals at once, `servo` has motors; with `pty` they also
+    answer by bytes on a pseudo-terminal, through the driver of real ones."""
+    twin: TwinModel = TwinModel()
+    """How what simulated servos measure differs from what is."""
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     """Yield the component that drives the joints of each bus."""
     description, driven, servos = contents.of(body), contents.of(joints), contents.of(actuators)
     known, care = description.body if description else Body(""), contents.of(safety)
+    places = buses_of_joints(contents)
     for name, bus in contents.of(buses).items():
-        own = {joint: one for joint, one in driven.items() if _bus_of(one, servos) == name}
+        own = {joint: one for joint, one in driven.items() if places.get(joint) == name}
         if not own:
             continue
         config = {
@@ -58,6 +72,9 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             "rate": bus.rate,
             "watchdog": bus.watchdog,
             "twin": bus.sim if contents.is_simulated else "",
+            "noise": bus.twin.noise,
+            "seed": bus.twin.seed,
+            "faults": faults_of(contents, name),
             "on_start": care.on_start,
             "on_shutdown": care.on_shutdown,
             "park": {joint: one.value for joint, one in care.park.items() if joint in own},
@@ -79,11 +96,6 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             },
         }
         yield WantedComponent(name, "servo_bus", config, ("buses", name))
-
-
-def _bus_of(joint: JointModel, servos: Mapping[str, ActuatorModel]) -> str:
-    """Return the bus of a joint's servos; empty if one of them has mistakes."""
-    return servos[joint.servos[0]].bus if all(one in servos for one in joint.servos) else ""
 
 
 def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorModel]) -> dict[str, object]:

@@ -5,7 +5,8 @@ from rbxcompose.testing.clocks import clock_uses
 from rbxcompose.testing.golden import Golden
 from rbxcompose.testing.manifests import Checked, check_file, check_text
 from rbxcompose.testing.robots import Ran, run_robot
-from rbxcompose.twins.servo_fake import FakeServo, ServoFaults
+from rbxcompose.twins.servo_fake import FakeServo
+from rbxcompose.twins.servo_faults import ServoFaults
 from rbxcompose.twins.servo_line import FakeLine
 from rbxcompose.twins.servo_port import FakePort
 

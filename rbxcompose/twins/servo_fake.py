@@ -1,4 +1,4 @@
-"""A servo for tests: the memory of a control table, a motor that moves, heat, load and shutdown. It knows no bytes.
+"""A simulated servo: the memory of a control table around a motor, and shutdown. It knows no bytes.
 
 It follows the e-manual where that is clear. Where servos differ from each other, the test chooses: `holds_on_enable`
 tells whether torque keeps the present position or snaps to an old goal.
@@ -6,14 +6,18 @@ tells whether torque keeps the present position or snaps to an old goal.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
+from random import Random
 
 from rbxcompose.actuation.control_items import ControlItem
 from rbxcompose.actuation.servo_models import ONE_ERRORS, ServoModel, servo_models
+from rbxcompose.twins.servo_faults import ServoFaults
+from rbxcompose.twins.servo_motor import IdealMotor, MotorTraits, ServoMotor
 
-FASTEST = 6.0  # [rad/s] without a limit of the speed
-VOLTAGE, TEMPERATURE, OVERHEATED, OVERLOAD = 1, 30, 4, 32  # bits of errors; [degC]
+FASTEST = MotorTraits().fastest  # [rad/s] without a limit of the speed
+VOLTAGE, OVERHEATED, OVERLOAD = 1, 4, 32  # bits of errors
 _SHUTDOWN = {1: 36, 2: 52}  # masks of the bits that switch torque off
 _SIZE = 1024  # [B] of memory
 _RIGHT, _FAILED, _RANGE, _LIMIT, _ACCESS = 0, 1, 4, 6, 7  # results in protocol 2.0
@@ -22,44 +26,54 @@ _GOALS = ("goal_position", "goal_speed", "goal_velocity", "goal_current")
 _READ_ONLY = ("model_number", "firmware", "moving", "hardware_error")
 
 
-@dataclass(slots=True)
-class ServoFaults:
-    """What goes wrong with a servo's replies until it is set back."""
+@dataclass(frozen=True, slots=True)
+class _Orders:
+    """What the memory orders: positions in ticks, speeds in ticks/s."""
 
-    is_mute: bool = False
-    silences_next: bool = False
-    """While mute, those after it in a group keep waiting for its reply, too."""
-    delay: float = 0.0
-    """How much later each reply is [s]."""
-    garbage: bytes = b""
-    """Stands before each reply."""
-    corrupts: bool = False
-    """Flips a bit of each reply."""
-    cuts: int = 0
-    """How many bytes at the end of each reply are missing."""
-    id: int | None = None
-    """Replies carry this id."""
-    repeats: int = 1
-    """How often each reply is sent."""
+    has_torque: bool
+    is_wheel: bool
+    goal: int
+    speed: float
+    fastest: float
+    acceleration: float
+    hottest: int
+    shutdown: int
+    patience: float | None
 
 
 class FakeServo:
     """One servo of a model, at `id`, at rest in the middle of its range, with torque off.
 
+    An ideal one is at its goal at once, without heat or load. `noise` [ticks] is the standard deviation of measured
+    positions, which `seed` repeats.
+
     Raises:
         KeyError: if there is no such model.
     """
 
-    def __init__(self, model: str, id: int, *, baud: int = 1_000_000, holds_on_enable: bool = True) -> None:
+    def __init__(
+        self,
+        model: str,
+        id: int,
+        *,
+        baud: int = 1_000_000,
+        holds_on_enable: bool = True,
+        is_ideal: bool = False,
+        noise: float = 0.0,
+        seed: int = 0,
+    ) -> None:
         self.model: ServoModel = servo_models()[model]
         self.memory = bytearray(_SIZE)
         self.faults = ServoFaults()
         self.holds_on_enable = holds_on_enable
         self.load = 0.0  # of the most, which the outside puts on it
         self.heard = 0.0  # [s], time of the last instruction
-        self.is_jammed = False
-        self._position = float(self.model.items["present_position"].centre)  # [ticks]
-        self._heat = float(TEMPERATURE)  # [degC]
+        centre = float(self.model.items["present_position"].centre)
+        self.motor = (IdealMotor if is_ideal else ServoMotor)(centre, self.model.per_tick)
+        self.noise = noise
+        self._random = Random(f"{seed}/{id}")  # noqa: S311 - no secret, and must be repeatable
+        self._known: _Orders | None = None  # what the memory orders, until it changes
+        self._shown: dict[str, int] = {}
         self._errors = 0
         self._is_shut_down = False
         self._prepare(id, baud)
@@ -68,7 +82,7 @@ class FakeServo:
         family = self.model.family
         first = {"model_number": self.model.number, "firmware": 45, "id": id, "return_delay": 250}
         first |= {"baud": self.model.code_of(baud) or 0, "status_return_level": 2, "temperature_limit": 80}
-        first |= {"shutdown": _SHUTDOWN[self.model.protocol], "present_voltage": 120}
+        first |= {"shutdown": _SHUTDOWN[self.model.protocol]}
         first |= {"max_torque": 1023, "torque_limit": 1023}
         first |= {"min_position": 0, "max_position": family.ticks - 1, "goal_position": family.centre}
         if family.table == "P":
@@ -77,7 +91,7 @@ class FakeServo:
             first["operating_mode"] = family.modes["position"]
         for name, raw in first.items():
             self.set(name, raw)
-        self._show(0.0)
+        self._show()
 
     @property
     def id(self) -> int:
@@ -119,71 +133,122 @@ class FakeServo:
         where = self.model.items.get(item)
         if where:
             self.memory[where.address : where.end] = where.encode(raw)
+            self._known = None
+            self._shown.pop(item, None)
+
+    @property
+    def _orders(self) -> _Orders:
+        if self._known is None:
+            per_tick = self.model.per_tick
+            has_watchdog = "bus_watchdog" in self.model.items and self.get("bus_watchdog") > 0
+            self._known = _Orders(
+                self.has_torque,
+                self.is_wheel,
+                self.get("goal_position"),
+                self._si("goal_velocity") / per_tick,
+                self._si("goal_speed") / per_tick,
+                self._si("profile_acceleration") / per_tick,
+                self.get("temperature_limit"),
+                self.get("shutdown"),
+                self._si("bus_watchdog") if has_watchdog else None,
+            )
+        return self._known
+
+    def _si(self, item: str) -> float:
+        return self.model.to_si(item, self.get(item)) if item in self.model.items else 0.0
 
     def heat_to(self, temperature: float) -> None:
         """Set its temperature [degC]."""
-        self._heat = temperature
+        self.motor.temperature = temperature
 
     def move_to(self, raw: int) -> None:
         """Turn it by hand [ticks]."""
-        self._position = float(raw)
-        self._show(0.0)
+        self.motor.put(float(raw))
+        self._show()
 
     def step(self, dt: float, now: float) -> None:
         """Let `dt` [s] pass until `now` [s]."""
+        if self.faults.is_off:
+            self.reboot()
         self._watch(now)
-        before = self._position
-        if self.has_torque and not self.is_jammed:
-            self._position = self._turned(dt) if self.is_wheel else self._approached(dt)
+        self._move(dt)
+        self.motor.warm(self._load, dt)
+        if self.faults.is_hot:
+            self.motor.temperature = self._orders.hottest
         self._protect()
-        self._show((self._position - before) * self.model.per_tick / dt if dt > 0 else 0.0)
+        self._show()
 
     def _watch(self, now: float) -> None:
         """Stop when the bus has been silent for longer than the watchdog allows."""
-        if "bus_watchdog" not in self.model.items:
-            return
-        limit = self.get("bus_watchdog")
-        if limit > 0 and now - self.heard > self.model.to_si("bus_watchdog", limit):
+        patience = self._orders.patience
+        if patience is not None and now - self.heard > patience:
             self.set("bus_watchdog", -1)
             self.set("goal_velocity", 0)
-            self.set("goal_position", round(self._position))
+            self.set("goal_position", round(self.motor.position))
 
-    def _turned(self, dt: float) -> float:
-        speed = self.model.to_si("goal_velocity", self.get("goal_velocity"))
-        turned = self._position + speed * dt / self.model.per_tick
-        return turned if self.model.protocol == 2 else turned % self.model.family.ticks
+    def _move(self, dt: float) -> None:
+        orders, motor = self._orders, self.motor
+        if not orders.has_torque:
+            motor.push(0.0)
+        elif self.faults.is_jammed:
+            wanted = orders.speed if orders.is_wheel else orders.goal - motor.position
+            motor.push(math.copysign(1.0, wanted) if wanted else 0.0)
+        elif not orders.is_wheel:
+            motor.approach(orders.goal, orders.fastest, orders.acceleration, dt)
+        else:
+            circle = self.model.family.ticks if self.model.protocol == 1 else 0
+            motor.turn(orders.speed, orders.acceleration, dt, circle)
 
-    def _approached(self, dt: float) -> float:
-        speed = self.model.to_si("goal_speed", self.get("goal_speed")) or FASTEST
-        most = speed * dt / self.model.per_tick  # [ticks]
-        return self._position + max(-most, min(most, self.get("goal_position") - self._position))
+    @property
+    def _outer(self) -> float:
+        """Return what is put on it from outside, of the most."""
+        return self.load + self.faults.load
+
+    @property
+    def _load(self) -> float:
+        """Return its load, of the most: what is put on it, and what the motor needs to move."""
+        return max(-1.0, min(1.0, self._outer + self.motor.effort))
+
+    @property
+    def _voltage(self) -> float:
+        """Return what is left of the supply under its load [V]."""
+        traits = self.motor.traits
+        return traits.supply - self.faults.missing - traits.sag * abs(self._load)
 
     def _protect(self) -> None:
-        found = OVERHEATED if self._heat > self.get("temperature_limit") else 0
-        found |= OVERLOAD if abs(self.load) > 1.0 and (self.get("torque_enable") or self._is_shut_down) else 0
-        found |= 0 if 60 <= self.get("present_voltage") <= 280 else VOLTAGE
+        orders = self._orders
+        found = OVERHEATED if self.motor.temperature > orders.hottest else 0
+        found |= OVERLOAD if abs(self._outer) > 1.0 and (orders.has_torque or self._is_shut_down) else 0
+        found |= 0 if 6.0 <= self._voltage <= 28.0 else VOLTAGE
         self._errors = found | (self._errors if self.model.protocol == 2 else 0)  # which keeps them until it reboots
-        if self._errors & self.get("shutdown"):
+        if self._errors & orders.shutdown:
             self._is_shut_down = True
-            self.set("torque_enable", 0)
+            if orders.has_torque:
+                self.set("torque_enable", 0)
         elif self.model.protocol == 1:
             self._is_shut_down = False
 
-    def _show(self, speed: float) -> None:
-        """Write what it measures into its memory; the speed is in [rad/s]."""
-        at = self.model.items["present_position"]
-        aim = self.get("goal_position")
-        self.set("present_position", max(at.least, min(at.most, round(self._position))))
-        self.set("present_speed", self._fitted("present_speed", self.model.to_raw("present_speed", speed)))
-        self.set("present_load", self._fitted("present_load", round(1000 * self.load)))
-        self.set("present_temperature", round(self._heat))
-        self.set("hardware_error", self._errors if self.model.protocol == 2 else 0)
-        is_going = bool(self.get("torque_enable")) and not self.is_wheel and abs(aim - self._position) > 1
-        self.set("moving", int(is_going or abs(speed) > 1e-3))
+    def _show(self) -> None:
+        """Write what it measures into its memory."""
+        motor, orders = self.motor, self._orders
+        speed = motor.velocity * self.model.per_tick
+        measured = motor.position + (self._random.gauss(0.0, self.noise) if self.noise else 0.0)
+        is_going = orders.has_torque and not orders.is_wheel and abs(orders.goal - motor.position) > 1
+        self._tell("present_position", round(measured))
+        self._tell("present_speed", self.model.to_raw("present_speed", speed))
+        self._tell("present_load", round(1000 * self._load))
+        self._tell("present_voltage", round(10 * self._voltage))
+        self._tell("present_temperature", round(motor.temperature))
+        self._tell("hardware_error", self._errors if self.model.protocol == 2 else 0)
+        self._tell("moving", int(is_going or abs(speed) > 1e-3))
 
-    def _fitted(self, item: str, raw: int) -> int:
-        where = self.model.items[item]
-        return max(where.least, min(where.most, raw))
+    def _tell(self, item: str, raw: int) -> None:
+        """Write a measured value, as far as its item can hold it."""
+        if self._shown.get(item) == raw:
+            return
+        self._shown[item] = raw
+        if (where := self.model.items.get(item)) is not None:
+            self.memory[where.address : where.end] = where.encode(max(where.least, min(where.most, raw)))
 
     def read(self, address: int, length: int) -> bytes | None:
         """Return memory, None if there is none."""
@@ -199,6 +264,7 @@ class FakeServo:
         if result == _RIGHT:
             was_on = bool(self.get("torque_enable"))
             self.memory[address:end] = data
+            self._known = None
             self._follow({item.name for item in touched}, was_on)
         return result if self.model.protocol == 2 else _ONE_RESULTS[result]
 
@@ -232,7 +298,9 @@ class FakeServo:
             self.set("torque_enable", 1)
         elif "torque_enable" in written and not was_on and self.get("torque_enable") and self.holds_on_enable:
             at = self.model.items["goal_position"]
-            self.set("goal_position", max(at.least, min(at.most, round(self._position))))
+            self.set("goal_position", max(at.least, min(at.most, round(self.motor.position))))
+        if self.motor.is_ideal:
+            self.step(0.0, self.heard)
 
     def reboot(self) -> None:
         """Start again: torque off, errors forgotten unless their cause is still there."""

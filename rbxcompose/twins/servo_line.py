@@ -63,7 +63,8 @@ class FakeLine:
             return replies
 
     def _listening(self, protocol: int, baud: int | None) -> list[FakeServo]:
-        found = [one for one in self.servos if baud is None or abs(one.baud - baud) <= _TOLERANCE * baud]
+        powered = (one for one in self.servos if not one.faults.is_off)
+        found = [one for one in powered if baud is None or abs(one.baud - baud) <= _TOLERANCE * baud]
         for one in found:
             one.heard = self._now
         return [one for one in found if one.model.protocol == protocol]

@@ -5,35 +5,66 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from rbxcompose.actuation.bus import FoundServo, ServoReading, ServoStatistics
+from rbxcompose.actuation.port_errors import LostPortError
 from rbxcompose.twins.servo_fake import FakeServo
 from rbxcompose.twins.servo_line import FakeLine
 
+PATIENCE = 0.002  # [s] after which a driver gives a reply up
+
 
 class TwinBus:
-    """A bus whose servos answer at once; those that are mute do not."""
+    """A bus whose servos answer at once; those whose replies a driver could not use do not."""
 
     def __init__(self, servos: Iterable[FakeServo], clock: Callable[[], float]) -> None:
         self.line = FakeLine(servos, clock)
         self._clock = clock
         self._statistics = {servo.id: ServoStatistics() for servo in self.line.servos}
+        self._is_out = False
+
+    def unplug(self) -> None:
+        """Take the bus away."""
+        self._is_out = True
+
+    def replug(self) -> None:
+        """Bring it back."""
+        self._is_out = False
 
     @property
     def statistics(self) -> Mapping[int, ServoStatistics]:
         """Return how well each servo answers, by id."""
         return self._statistics
 
-    def _answering(self, ids: Iterable[int]) -> Iterator[FakeServo]:
+    def _asked(self, ids: Iterable[int]) -> Iterator[FakeServo]:
+        """Yield the servos of a request; those with power hear it, and obey also if they do not answer."""
+        if self._is_out:
+            raise LostPortError("the simulated bus", "is unplugged")
         self.line.advance()
-        wanted = set(ids)
+        wanted, now = set(ids), self._clock()
         for servo in self.line.servos:
             if servo.id in wanted:
-                servo.heard = self._clock()
-                statistics = self._statistics[servo.id]
-                if servo.faults.is_mute:
-                    statistics.timeouts, statistics.misses = statistics.timeouts + 1, statistics.misses + 1
-                    continue
-                statistics.misses, statistics.last_seen = 0, self._clock()
+                if not servo.faults.is_off:
+                    servo.heard = now
                 yield servo
+
+    def _answering(self, ids: Iterable[int]) -> Iterator[FakeServo]:
+        now = self._clock()
+        for servo in self._asked(ids):
+            if self._is_understood(servo):
+                statistics = self._statistics[servo.id]
+                statistics.misses, statistics.last_seen = 0, now
+                yield servo
+
+    def _is_understood(self, servo: FakeServo) -> bool:
+        """Tell whether a driver would understand the reply of a servo; count it if not."""
+        faults = servo.faults
+        is_missing = faults.is_off or faults.is_mute or faults.delay > PATIENCE or faults.id is not None
+        is_spoilt = faults.corrupts or faults.cuts > 0
+        if is_missing or is_spoilt:
+            statistics = self._statistics[servo.id]
+            statistics.misses += 1
+            statistics.timeouts += is_missing
+            statistics.errors += not is_missing
+        return not (is_missing or is_spoilt)
 
     def ping(self, id: int) -> FoundServo | None:
         """Return the servo at an id, None if it is silent."""
@@ -55,19 +86,21 @@ class TwinBus:
     def write(self, values: Mapping[int, Mapping[str, int]], *, is_confirmed: bool = False) -> set[int]:
         """Write raw values, by id and item; return the ids that failed."""
         failed = set(values)
-        for servo in self._answering(values):
+        for servo in self._asked(values):
+            if servo.faults.is_off:
+                continue
             items = ((servo.model.item(name), raw) for name, raw in values[servo.id].items())
             results = [servo.write(item.address, item.encode(raw)) for item, raw in items]
-            if not any(results):
+            if not any(results) and (not is_confirmed or self._is_understood(servo)):
                 failed.discard(servo.id)
         return failed if is_confirmed else set()
 
     def reboot(self, id: int) -> bool:
         """Start a servo again, torque off."""
-        servos = list(self._answering([id]))
-        for servo in servos:
+        found = list(self._asked([id]))
+        for servo in found:
             servo.reboot()
-        return bool(servos)
+        return any(map(self._is_understood, found))
 
     def reopen(self, *, is_relaxed: bool = True) -> dict[int, FoundServo | None]:
         """Return who answers at each id, relaxed."""

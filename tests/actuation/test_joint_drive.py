@@ -17,8 +17,8 @@ from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
 from rbxcompose.actuation.servo_models import model_named, servo_models
 from rbxcompose.control.joint_states import Enable, JointMode, JointPolicy, MoveTo, Relax
 from rbxcompose.control.limits import MotionLimits
-from rbxcompose.twins.pseudo_terminal import pseudo_terminal
 from rbxcompose.twins.servo_fake import FakeServo
+from rbxcompose.twins.servo_stage import pseudo_terminal
 from rbxcompose.twins.servo_twin import TwinBus
 
 PERIOD = 0.01
@@ -106,7 +106,7 @@ def test_whatever_is_asked_the_goal_keeps_to_the_limits(asked: list[list[MoveTo 
 
 def test_the_same_cycle_drives_servos_by_bytes() -> None:
     one = joint()
-    with pseudo_terminal({1: "AX-12"}) as path, DynamixelBus(path, {1: one.servo(1).model}) as bus:
+    with pseudo_terminal([FakeServo("AX-12", 1)]) as port, DynamixelBus(str(port.path), {1: one.servo(1).model}) as bus:
         drive = PositionDrive(one, JointPolicy(cycle=PERIOD))
         cycle = ServoCycle(bus, {"pan": drive})
         begin = time.monotonic()

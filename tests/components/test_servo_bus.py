@@ -101,9 +101,9 @@ class Head:
         self.robot.advance(0.1)
 
 
-@pytest.fixture(params=["servo"])
-def head() -> Head:
-    return Head()
+@pytest.fixture(params=["servo", "ideal"])
+def head(request: pytest.FixtureRequest) -> Head:
+    return Head(twin=request.param)
 
 
 def test_a_trajectory_ends_within_a_tick(head: Head) -> None:
@@ -314,6 +314,19 @@ def test_a_canceled_trajectory_comes_to_rest(head: Head) -> None:
     assert 0.1 < there["pan"] < 1.4
     head.robot.advance(1.0)
     assert head.at == there
+
+
+def test_noise_is_in_what_is_measured_and_its_seed_repeats_it() -> None:
+    told = []
+    for seed in (1, 1, 2):
+        head, seen = Head(noise=2 * TICK, seed=seed), []
+        for _ in range(50):
+            head.robot.advance(0.02)
+            seen.append(head.at["pan"])
+        told.append(seen)
+    assert told[0] == told[1]
+    assert told[0] != told[2]
+    assert 0 < max(map(abs, told[0])) < 10 * TICK
 
 
 class Gone:

@@ -54,7 +54,7 @@ ABOVE = {
     "importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "
     "scaffold schema.documents sdk sections",
     "controller_interface": "control sdk",
-    "controller_manager": "controller_interface",
+    "controller_manager": "controller_interface sdk",
     "controller_requests": "",
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
@@ -70,7 +70,8 @@ ABOVE = {
     "importing": "actuation.servo_models composition.dump scaffold.answers sections",
     "inspection": "body.model bus.names bus.wire composition missions model plan schema sdk sections",
     "lsp": "compiler composition missions model.robot schema sections",
-    "mission_tests": "compiler components.mission composition executive missions model plan.model sdk testing.bench",
+    "mission_tests": "compiler components.mission composition executive missions model plan.model sdk sections.faults "
+    "testing.bench twins.fault_script twins.servo_faults",
     "missions": "",
     "model": "composition missions sdk sections",
     "mux": "",
@@ -84,8 +85,9 @@ ABOVE = {
     "scaffold": "actuation.servo_models composition missions sdk",
     "schema": "controller_interface missions sdk sections",
     "sdk": "",
-    "sections": "actuation.serial_ports actuation.servo_models body control.calibration controller_interface sdk",
-    "servo_bus_config": "actuation control controller_interface",
+    "sections": "actuation.serial_ports actuation.servo_models body control.calibration controller_interface sdk "
+    "twins.servo_faults",
+    "servo_bus_config": "actuation control controller_interface twins.fault_script",
     "sim": "",
     "skills": "sdk",
     "twins": "actuation",

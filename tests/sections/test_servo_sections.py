@@ -53,6 +53,17 @@ WRONG = {
     "an unknown model": SERVOS.replace("AX-12", "AX-21"),
     "one id twice": SERVOS.replace("id: 2", "id: 1"),
     "a bus that does not exist": SERVOS.replace("{bus: servos, model: AX", "{bus: servoes, model: AX"),
+    "faults of nothing": SERVOS
+    + "faults:\n  one: {at: 1 s, fault: mute}\n  two: {at: 1 s, fault: mute, joint: pan_joint, bus: servos}\n",
+    "a misspelt joint of a fault": SERVOS + "faults:\n  one: {at: 1 s, fault: mute, joint: pan_jiont}\n",
+    "a fault of a joint that no servo drives": SERVOS.replace("  tilt_joint: {actuator: tilt}\n", "").replace(
+        ", tilt_joint]", "]"
+    )
+    + "faults:\n  one: {at: 1 s, fault: mute, joint: tilt_joint}\n",
+    "a fault of a bus without joints": SERVOS.replace("  servos: {", "  more: {type: dynamixel}\n  servos: {")
+    + "faults:\n  one: {at: 1 s, fault: unplug, bus: more}\n",
+    "a misspelt fault": SERVOS + "faults:\n  one: {at: 1 s, fault: overheet, joint: pan_joint}\n",
+    "a joint that is unplugged": SERVOS + "faults:\n  one: {at: 1 s, fault: unplug, joint: pan_joint}\n",
     "two buses": SERVOS.replace("  servos: {", "  more: {type: dynamixel}\n  servos: {").replace(
         "{bus: servos, model: XL", "{bus: more, model: XL"
     ),
@@ -76,6 +87,49 @@ def test_a_bus_drives_its_joints_within_the_tighter_limits(tmp_path: Path) -> No
     pan, tilt = config.joints["pan_joint"], config.joints["tilt_joint"]
     assert (pan.lower, pan.upper, pan.velocity) == pytest.approx((-1.0, 0.5236, 1.0472), abs=1e-4)
     assert (tilt.lower, tilt.upper, tilt.velocity, tilt.servos[0].invert) == (-1.0, 1.0, 2.0, True)
+
+
+def test_how_true_simulated_servos_are_is_told_at_the_bus(tmp_path: Path) -> None:
+    text = SERVOS.replace("rate: 50 Hz}", "sim: ideal, twin: {noise: 0.5 deg, seed: 3}}")
+    config = driver_of(check(tmp_path, text))
+    assert (config.twin, config.seed) == ("ideal", 3)
+    assert config.noise == pytest.approx(0.0087266, abs=1e-6)
+
+
+FAULTS = """faults:
+  hot: {at: 3 s, joint: pan_joint, fault: overheat, for: 10 s}
+  pulled: {at: 5 s, bus: servos, fault: unplug}
+"""
+
+
+def test_faults_reach_the_driver_of_their_bus(tmp_path: Path) -> None:
+    more = SERVOS.replace("  servos: {", "  more: {type: dynamixel}\n  servos: {").replace(
+        "servos, model: XL", "more, model: XL"
+    )
+    checked = check(tmp_path, more.partition("controllers")[0] + FAULTS)
+    assert checked.codes == []
+    configs: dict[str, Any] = {one.name: one.config for one in checked.plan.instances if one.type == "servo_bus"}
+    assert configs["more"].faults == {}
+    faults = configs["servos"].faults
+    assert {name: (one.at, one.joint, one.fault, one.lasts) for name, one in faults.items()} == {
+        "hot": (3.0, "pan_joint", "overheat", 10.0),
+        "pulled": (5.0, "", "unplug", None),
+    }
+
+
+def test_faults_do_nothing_to_real_servos_which_is_a_warning(tmp_path: Path) -> None:
+    robot = HEAD + SERVOS.replace("rate: 50 Hz", "port: /dev/ttyUSB0") + FAULTS
+    checked = check_text(robot, tmp_path, others={"head.urdf": BODY}, real=True)
+    assert checked.codes == ["RBX2272"]
+    assert driver_of(checked).faults == {}
+
+
+def test_faults_of_a_part_are_of_its_joints(tmp_path: Path) -> None:
+    part = PART + "faults:\n  hot: {at: 1 s, joint: pan_joint, fault: overheat}\n"
+    robot = "rbx: 1\nkind: Robot\nname: one\nbuses: {servos: {type: dynamixel}}\ninclude:\n  left: part.yaml\n"
+    checked = check_text(robot, tmp_path, others={"head.urdf": BODY, "part.yaml": part})
+    assert checked.codes == []
+    assert {name: one.joint for name, one in driver_of(checked).faults.items()} == {"left_hot": "left_pan_joint"}
 
 
 def test_two_instances_of_a_part_bring_their_joints_to_one_bus(tmp_path: Path) -> None:

@@ -1,0 +1,130 @@
+"""The section `faults`: what goes wrong with simulated servos, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import Field
+
+from rbxcompose.config import Config, JointName, Name, Time
+from rbxcompose.findings import Finding, Severity, kind
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.section import Contents, Reading
+from rbxcompose.manifest.tree import key_span, value_span
+from rbxcompose.references import FAULT, SERVO_BUS, Refers
+from rbxcompose.sections.actuators import actuators
+from rbxcompose.sections.joints import joints
+from rbxcompose.twins.servo_faults import UNPLUG, FaultName
+
+NO_SERVO = kind(
+    "RBX2270",
+    """A fault of a joint or a bus without a servo
+
+Only servos can fail: a joint that `joints:` does not have is not driven, and a bus without driven joints does not run.
+
+Bad: a fault of `tilt_joint`, which `joints:` does not have.
+Good: `tilt_joint: {actuator: tilt_servo}` under `joints:`.
+""",
+)
+OF_WHAT = kind(
+    "RBX2271",
+    """A fault that is not of one joint or one bus
+
+A fault has either `joint` or `bus`; then all servos of the bus have it. Only a bus can be unplugged.
+
+Bad: `{at: 3 s, fault: unplug, joint: pan_joint}`
+Good: `{at: 3 s, fault: unplug, bus: servos}`
+""",
+)
+REAL = kind(
+    "RBX2272",
+    """Faults do nothing to real servos
+
+They are made in simulation. With `--real`, the robot runs without them.
+
+Bad: `rbxcompose up --real` of a robot with `faults:`.
+Good: the faults in a profile of their own, which is not chosen with `--real`.
+""",
+    Severity.WARNING,
+)
+
+
+class FaultModel(Config):
+    """Something that goes wrong with simulated servos."""
+
+    at: Time = Field(ge=0)
+    """When it begins, counted from the start of the robot."""
+    fault: FaultName
+    """What goes wrong: `overheat`, `jam`, `mute`, ..."""
+    joint: JointName | None = None
+    """The joint whose servo has it."""
+    bus: Annotated[Name, Refers(SERVO_BUS)] | None = None
+    """The bus all of whose servos have it, instead of a joint; `unplug` is of a bus."""
+    for_: Time | None = Field(None, gt=0, alias="for")
+    """How long it lasts; without it for good."""
+
+
+def buses_of_joints(contents: Contents) -> Mapping[str, str]:
+    """Return the bus that drives each joint."""
+    servos = contents.of(actuators)
+    return {
+        name: servos[one.servos[0]].bus
+        for name, one in contents.of(joints).items()
+        if all(each in servos for each in one.servos)
+    }
+
+
+def faults_of(contents: Contents, bus: str) -> dict[str, Mapping[str, object]]:
+    """Return the faults of a bus and its joints as its driver takes them; real servos have none."""
+    driven = buses_of_joints(contents)
+    return {
+        name: {"at": one.at, "fault": one.fault, "joint": one.joint or "", "lasts": one.for_}
+        for name, one in (contents.of(faults) if contents.is_simulated else {}).items()
+        if bus in (one.bus, driven.get(one.joint or ""))
+    }
+
+
+@section("faults", FaultModel, order=35, names=FAULT, entry="fault")
+def faults(reading: Reading[FaultModel]) -> dict[str, FaultModel]:
+    """What goes wrong with simulated servos, and when; for tests of what the robot does then.
+
+    Example:
+        body:
+          urdf: robot.urdf
+        buses:
+          servos:
+            type: dynamixel
+        actuators:
+          pan_servo: {bus: servos, model: AX-12, id: 1}
+        joints:
+          pan_joint: {actuator: pan_servo}
+        faults:
+          hot: {at: 3 s, joint: pan_joint, fault: overheat, for: 10 s}
+          pulled: {at: 20 s, bus: servos, fault: unplug, for: 2 s}
+    """
+    found = reading.entries()
+    wrong = {name: finding for name, one in found.items() if (finding := _mistake(reading, name, one))}
+    reading.report.extend(wrong.values())
+    if found and not reading.contents.is_simulated:
+        span = key_span(reading.contents.root, ("faults",))
+        reading.report.add(REAL.at(span, "the servos are real, so nothing of this happens"))
+    return {name: one for name, one in found.items() if name not in wrong}
+
+
+def _mistake(reading: Reading[FaultModel], name: str, one: FaultModel) -> Finding | None:
+    root, driven = reading.contents.root, buses_of_joints(reading.contents)
+    if (one.joint is None) == (one.bus is None):
+        words = "neither a joint nor a bus" if one.joint is None else "a joint and a bus"
+        return OF_WHAT.at(key_span(root, ("faults", name)), f"the fault '{name}' is of {words}")
+    if one.joint is not None and one.fault == UNPLUG:
+        span = value_span(root, ("faults", name, "joint"))
+        return OF_WHAT.at(span, f"'{one.joint}' cannot be unplugged", help="give 'bus' instead of 'joint'")
+    if not driven and "joints" in root:
+        return None  # they have mistakes, which are told
+    if one.joint is not None and one.joint not in driven:
+        message, span = f"no servo drives '{one.joint}'", value_span(root, ("faults", name, "joint"))
+        return NO_SERVO.misspelt(span, message, one.joint, driven, "joints with a servo")
+    if one.bus is not None and one.bus not in driven.values():
+        return NO_SERVO.at(value_span(root, ("faults", name, "bus")), f"no joint is driven by the bus '{one.bus}'")
+    return None

@@ -1,0 +1,129 @@
+"""What the driver of servos does when something goes wrong with them, by configuration and by request."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rbxcompose.components.servo_bus import ServoBusDriver
+from rbxcompose.control.joint_states import JointMode
+from rbxcompose.msgs.sensor_msgs import JointState
+from rbxcompose.msgs.std_msgs import Float64
+from rbxcompose.qos import Qos
+from rbxcompose.requests import Refused
+from rbxcompose.testing import Bench, instance
+from rbxcompose.twins.fault_script import InjectFault
+
+LIMITS = {"lower": -2.0, "upper": 2.0, "velocity": 1.5, "acceleration": 8.0}
+CONFIG: dict[str, Any] = {
+    "joints": {
+        name: {**LIMITS, "servos": [{"id": id_, "model": "AX-12"}]} for id_, name in enumerate(("pan", "tilt"), 1)
+    }
+}
+
+
+class Head:
+    """Two joints on a twin, with faults by name: when, what, of which joint, how long."""
+
+    def __init__(self, *faults: tuple[float, str, str, float | None], twin: str = "servo") -> None:
+        named = {
+            f"fault_{index}": {"at": at, "fault": fault, "joint": joint, "lasts": lasts}
+            for index, (at, fault, joint, lasts) in enumerate(faults)
+        }
+        self.robot = Bench(instance("servos", "servo_bus", {**CONFIG, "twin": twin, "faults": named}), start=False)
+        self.states = self.robot.collect("/joint_states", JointState)
+        driver = self.robot.component("servos")
+        assert isinstance(driver, ServoBusDriver)
+        self.driver = driver
+
+    def modes(self) -> list[str]:
+        return [str(drive.mode) for drive in self.driver.cycle.drives.values()]
+
+    def go(self, joint: str, position: float) -> None:
+        self.robot.bus.publisher("me", f"/{joint}/command", Float64, Qos.COMMAND)(Float64(data=position))
+        self.robot.advance(0.02)
+
+
+@pytest.mark.parametrize("twin", ["servo", "ideal"])
+def test_a_hot_joint_rests_and_can_be_used_again_when_it_has_cooled_down(twin: str) -> None:
+    head = Head((1.0, "overheat", "pan", 10.0), twin=twin)
+    head.robot.advance(0.5)
+    head.go("pan", 1.0)
+    head.robot.advance(1.5)
+    assert head.modes() == [JointMode.RESTING, JointMode.RELAXED]
+    head.robot.advance(110.0)
+    assert head.modes() == [JointMode.RELAXED, JointMode.RELAXED]
+    head.go("pan", 0.3)
+    head.robot.advance(2.0)
+    assert head.states[-1].position[0] == pytest.approx(0.3, abs=0.006)
+
+
+@pytest.mark.parametrize("fault", ["mute", "late", "corrupt", "wrong_id", "power_off"])
+def test_a_joint_that_is_not_heard_is_a_fault_and_comes_back_without_torque(fault: str) -> None:
+    head = Head((1.0, fault, "tilt", 2.0))
+    head.robot.advance(0.5)
+    head.go("tilt", 1.0)
+    head.robot.advance(2.0)
+    assert head.modes() == [JointMode.RELAXED, JointMode.FAULT]
+    head.robot.advance(1.0)
+    assert head.modes() == [JointMode.RELAXED, JointMode.RELAXED]
+
+
+@pytest.mark.parametrize("fault", ["overload", "undervoltage"])
+def test_an_error_of_the_hardware_keeps_a_joint_disabled(fault: str) -> None:
+    head = Head((1.0, fault, "pan", 2.0))
+    head.robot.advance(0.5)
+    head.go("pan", 1.0)
+    head.robot.advance(4.0)
+    assert head.modes() == [JointMode.FAULT, JointMode.RELAXED]
+
+
+def test_a_jammed_joint_stays_and_goes_on_afterwards() -> None:
+    head = Head((0.0, "jam", "pan", 3.0))
+    head.robot.advance(0.5)
+    head.go("pan", 1.0)
+    head.robot.advance(2.0)
+    assert head.states[-1].position[0] == 0.0
+    head.robot.advance(3.0)
+    assert head.states[-1].position[0] == pytest.approx(1.0, abs=0.006)
+
+
+def test_a_bus_that_is_unplugged_recovers_by_itself_relaxed() -> None:
+    head = Head((1.0, "unplug", "", 2.0))
+    head.robot.advance(0.5)
+    head.go("pan", 1.0)
+    head.robot.advance(1.0)
+    told = len(head.states)
+    head.robot.advance(1.0)
+    assert len(head.states) == told
+    head.robot.advance(1.5)
+    assert head.modes() == [JointMode.RELAXED, JointMode.RELAXED]
+    assert any("is back" in text for text in head.robot.texts())
+    head.go("pan", 0.5)
+    head.robot.advance(2.0)
+    assert head.states[-1].position[0] == pytest.approx(0.5, abs=0.006)
+
+
+def test_a_request_lets_something_go_wrong_now() -> None:
+    head = Head()
+    head.robot.advance(1.0)
+    assert "mute of pan" in head.robot.host.ask("servos", InjectFault("mute", "pan", 1.0))
+    head.robot.advance(0.9)
+    assert head.modes() == [JointMode.FAULT, JointMode.RELAXED]
+    head.robot.advance(0.5)
+    assert head.modes() == [JointMode.RELAXED, JointMode.RELAXED]
+    with pytest.raises(Refused, match="nobody"):
+        head.robot.host.ask("servos", InjectFault("mute", "nobody"))
+
+
+def test_servos_without_faults_and_those_whose_faults_are_over_move_alike() -> None:
+    moved = []
+    for faults in ((), ((0.5, "garbage", "pan", 0.5), (0.5, "twice", "tilt", 0.5))):
+        head = Head(*faults)
+        head.robot.advance(0.2)
+        head.go("pan", 1.0)
+        head.robot.advance(3.0)
+        moved.append(np.array([state.position for state in head.states]))
+    assert np.array_equal(moved[0], moved[1])

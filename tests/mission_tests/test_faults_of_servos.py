@@ -1,0 +1,112 @@
+"""Tests of missions in which something goes wrong with the servos of the robot."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.mission_tests.reader import TrialReader
+from rbxcompose.mission_tests.runner import run_trial
+from rbxcompose.rendering.text import render_text
+from rbxcompose.testing.golden import Golden
+
+ROBOT = """
+buses:
+  servos: {type: dynamixel}
+include:
+  head: {part: rbx:parts/pan_tilt.yaml, with: {bus: servos}}
+diagnostics:
+  analyzers:
+    motion: {match: [servos]}
+values:
+  motion: diagnostics.motion
+missions:
+  watch: watch.yaml
+"""
+MISSION = """
+do:
+  - wait_for: $motion == error
+    timeout: 20 s
+  - log: It has stopped
+  - wait_for: $motion == ok
+    timeout: 20 s
+"""
+FAULTY = """
+    events:
+      - at: 3 s
+        fault: {joint: head_pan_joint, fault: power_off, for: 5 s}
+    expect:
+      outcome: success
+      reports: [It has stopped]
+"""
+PULLED = FAULTY.replace("joint: head_pan_joint, fault: power_off", "bus: servos, fault: unplug")
+WRONG = """
+    events:
+      - at: 1 s
+        fault: {joint: head_pan_jiont, fault: mute}
+      - at: 2 s
+        fault: {joint: head_pan_joint, fault: overheet}
+      - at: 3 s
+        fault: {fault: mute}
+      - at: 4 s
+        fault: {joint: head_pan_joint, fault: unplug}
+      - at: 5 s
+        fault: {bus: wheels, fault: unplug}
+    expect:
+      outcome: success
+"""
+ALONE = """
+    events:
+      - at: 1 s
+        set: {motion: error}
+        fault: {joint: head_pan_joint, fault: mute}
+    expect:
+      outcome: failure
+"""
+
+
+class Watched:
+    """A robot with two servos, and a mission that watches them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.reader = folder, TrialReader({})
+        (folder / "robot.yaml").write_text(f"rbx: 1\nkind: Robot\nname: head\n{ROBOT}", encoding="utf-8")
+        (folder / "watch.yaml").write_text(f"rbx: 1\nkind: Mission\nname: watch\n{MISSION}", encoding="utf-8")
+
+    def written(self, text: str) -> Path:
+        path = self.folder / "tried.test.yaml"
+        head = "rbx: 1\nkind: Test\nname: tried\nrobot: robot.yaml\nmission: watch\n"
+        path.write_text(head + textwrap.dedent(text), encoding="utf-8")
+        return path
+
+    def problems(self, text: str) -> list[str]:
+        trial, report = self.reader.read(self.written(text))
+        assert trial is not None, render_text(report, self.reader.sources)
+        verdict = run_trial(trial)
+        return [one.message for one in verdict.problems]
+
+    def findings(self, text: str) -> str:
+        return render_text(self.reader.read(self.written(text))[1], self.reader.sources)
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory: pytest.TempPathFactory) -> Watched:
+    return Watched(tmp_path_factory.mktemp("head"))
+
+
+@pytest.mark.parametrize("text", [FAULTY, PULLED], ids=["a servo without power", "a bus that is unplugged"])
+def test_a_mission_notices_the_fault_and_its_end(watched: Watched, text: str) -> None:
+    assert watched.problems(text) == []
+
+
+def test_without_the_fault_nothing_happens(watched: Watched) -> None:
+    assert "failure" in " ".join(watched.problems("expect: {outcome: success}"))
+
+
+def test_faults_of_what_is_not_there_are_told(
+    watched: Watched, monkeypatch: pytest.MonkeyPatch, golden: Golden
+) -> None:
+    monkeypatch.chdir(watched.folder)
+    golden.check("faults_of_servos.txt", f"{watched.findings(WRONG)}\n{watched.findings(ALONE)}")
