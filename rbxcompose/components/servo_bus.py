@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from rbxcompose.actuation.bus import ServoBus as Bus
+from rbxcompose.actuation.periods import Periods
 from rbxcompose.actuation.port_errors import PortError
 from rbxcompose.actuation.position_drive import PositionDrive
 from rbxcompose.actuation.preparation import prepare, with_torque
+from rbxcompose.actuation.priority import be_prompt
 from rbxcompose.actuation.servo_cycle import ServoCycle
 from rbxcompose.actuation.servo_joint import ServoJoint
 from rbxcompose.clock import MonotonicClock
@@ -109,6 +111,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Open the bus, real or simulated; nothing moves."""
         config, self.at_end = self.config, ExitStack()
         self.period = 1.0 / config.rate
+        self.periods = Periods(self.period)
         self.faults: FaultScript | None = None
         drives, mimics = drives_of(config), mimics_of(config.joints)
         bus = self.opened([one.joint for one in drives.values()])
@@ -162,6 +165,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.lose(error)
         if self.faults is not None:
             self.faults.start(self.now)
+        if not self.config.twin and (reason := be_prompt()):
+            self.info(f"cycles may be late on a busy machine: no real-time priority ({reason})")
         self.wake()
 
     def wake(self) -> None:
@@ -188,6 +193,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.prepare()
             self.info("the bus of servos is back")
             self.lost_at = -math.inf
+        self.periods.begin(self.now)
         self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.active)
         if self.now - self.published_at >= 1 / PUBLISHED - 1e-9:
             self.published_at = self.now
@@ -315,7 +321,11 @@ class ServoBusDriver(Component[ServoBusConfig]):
         bad = [name for name, one in drives.items() if one.mode in (JointMode.FAULT, JointMode.RESTING)]
         level = Level.ERROR if bad or self.lost_at > -math.inf else Level.WARN if notes else Level.OK
         message = "; ".join(f"{name}: {words}" for name, words in notes.items()) or f"{len(drives)} joints"
-        self.status(level, message, **{name: one.mode for name, one in drives.items()})
+        kept = {
+            "periods_met": f"{100 * self.periods.share_met:.2f} %",
+            "late": f"{1e3 * self.periods.late(0.99):.1f} ms",
+        }
+        self.status(level, message, **{name: one.mode for name, one in drives.items()}, **kept)
 
     # Stopping
 
@@ -324,6 +334,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         if self.lost_at == -math.inf:
             self.warn(str(error))
         self.lost_at = self.now
+        self.periods.pause()
         self.halt(GONE)
 
     def halt(self, reason: str) -> None:
