@@ -171,6 +171,10 @@ class Controller(ABC, Generic[C]):
     def halt(self, now: float, reason: str) -> None:
         """End what it does; its joints come to rest within their limits."""
 
+    def let_go(self, joint: str, now: float, reason: str) -> None:
+        """Leave a joint alone, which has lost its torque; the others come to rest."""
+        self.halt(now, reason)
+
     @property
     def leads(self) -> bool:
         """Return whether it moves its joints now, so that they take no single commands."""

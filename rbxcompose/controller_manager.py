@@ -30,6 +30,12 @@ class ControllerManager:
         """Return the active controller that moves a joint now, or nothing."""
         return next((one.name for one in self.active if joint in one.config.led and one.leads), "")
 
+    def let_go(self, joint: str, now: float, reason: str) -> None:
+        """Have a joint left alone, which has lost its torque."""
+        for one in self.active:
+            if joint in one.config.led:
+                one.let_go(joint, now, reason)
+
     def objection(self, on: Iterable[str], off: Iterable[str]) -> str:
         """Return why controllers cannot be switched on and off, or nothing."""
         on, off = list(on), list(off)

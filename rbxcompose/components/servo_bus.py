@@ -255,8 +255,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     def let_go(self, name: str) -> None:
         """Relax a joint; a controller that leads it ends what it does, or it would have torque again at once."""
-        if leader := self.controllers.leader(name):
-            self.controllers.controllers[leader].halt(self.now, f"joint '{name}' was relaxed")
+        self.controllers.let_go(name, self.now, f"joint '{name}' was relaxed")
         self.cycle.drives[name].relax()
 
     def on_relax_all(self, request: Trigger.Request) -> Trigger.Response:
