@@ -28,7 +28,7 @@ from rbxcompose.msgs.std_msgs import Float64, Header
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.requests import Refused, answers
 from rbxcompose.sdk import Component, In, Out, Port, ServedGoal, Serves, ServesAction, component
-from rbxcompose.sdk.capabilities import Capability
+from rbxcompose.sdk.capabilities import Capability, within
 from rbxcompose.sdk.component import Context
 from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, mimics_of
 from rbxcompose.twins.pseudo_terminal import pseudo_terminal
@@ -77,8 +77,11 @@ class ServoBusDriver(Component[ServoBusConfig]):
     @classmethod
     def capabilities(cls, config: ServoBusConfig) -> tuple[Capability, ...]:
         """Declare what its controllers can do."""
-        setups = config.controllers.items()
-        return tuple(one for name, each in setups for one in controller_type(each.type).capabilities(name, each.config))
+        return tuple(
+            within(one, f"{name}_", f"controllers.{name}.")
+            for name, each in config.controllers.items()
+            for one in controller_type(each.type).capabilities(name, each.config)
+        )
 
     def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
         """Give the ports of joints and controllers their methods."""
@@ -160,7 +163,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.prepare()
             self.info(f"the port '{self.config.port}' is back")
             self.lost_at = -math.inf
-        self.cycle.run(self.now, self.period, self.controllers.active)
+        self.cycle.run(self.now, self.period, self.controllers.leading)
         if self.now - self.published_at >= 1 / PUBLISHED - 1e-9:
             self.published_at = self.now
             self.publish()
@@ -268,7 +271,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
                     effort=np.array([one.effort for one in known]),
                 )
             )
-        for controller in self.controllers.active:
+        for controller in self.controllers.leading:
             controller.publish()
 
     def tell(self) -> None:

@@ -14,6 +14,7 @@ from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
 from rbxcompose.plugins import BROKEN, BrokenPluginError
 from rbxcompose.references import CONTROLLER
 from rbxcompose.sections.actuators import actuators
+from rbxcompose.sections.body import body
 from rbxcompose.sections.joints import joints
 
 NOT_DRIVEN = kind(
@@ -56,6 +57,17 @@ base without an extent.
 
 Bad: `hand: {type: gripper, ..., finger_length: 2 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
 Good: `hand: {type: gripper, ..., finger_length: 6 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
+""",
+)
+WRONG_KIND = kind(
+    "RBX2285",
+    """A controller leads a joint of another kind than it can
+
+A wheel turns without an end: in the URDF its joint is `continuous`. What a `linear` controller drives up and down
+slides: its joint is `prismatic`.
+
+Bad: `wheels: {type: diff_drive, left: left_wheel, ...}`, where `left_wheel` has `type="revolute"`.
+Good: the same, where the URDF has `<joint name="left_wheel" type="continuous">`.
 """,
 )
 
@@ -140,6 +152,7 @@ def _mistakes(
     root = reading.contents.root
     here, cls = key_span(root, ("controllers", name)), controller_type(one.type)
     yield from _undriven(reading, name, one)
+    yield from _unfit(reading, name, one)
     if name in reading.contents.of(joints):
         yield NAME_OF_JOINT.at(here, f"'{name}' is a joint and a controller")
     if (mistake := cls.mistake(one)) is not None:
@@ -176,6 +189,18 @@ def _undriven(reading: Reading[ControllerConfig], name: str, one: ControllerConf
             yield NOT_DRIVEN.at(
                 span, f"the joints of the controller '{name}' are on two buses: {', '.join(sorted(buses))}"
             )
+
+
+def _unfit(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield a finding for each joint whose kind the controller cannot lead."""
+    description, wanted = reading.contents.of(body), controller_type(one.type).kinds
+    known = description.body.joints if description else {}
+    for joint in one.led if wanted else ():
+        if joint in known and known[joint].kind not in wanted:
+            kinds = " or ".join(sorted(wanted))
+            message = f"'{joint}' is {known[joint].kind} in the body, and '{name}' leads joints that are {kinds}"
+            related = [Related(known[joint].span, "the joint")]
+            yield WRONG_KIND.at(_place(reading, name, joint), message, related=related)
 
 
 _PLURAL = {"position": "positions", "velocity": "velocities"}
