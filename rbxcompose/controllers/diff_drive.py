@@ -148,6 +148,8 @@ class DiffDriveController(Controller[DiffDriveConfig]):
             Setting(told.child, "odometry.child"),
         )
         frame = WritesFrame("tf", Setting(told.frame, "odometry.frame"), Setting(told.child, "odometry.child"))
+        if config.start == "inactive":
+            return (wheels,)  # another one drives, which may have the same commands and frames
         return (base, wheels, frame) if told.tf else (base, wheels)
 
     @classmethod

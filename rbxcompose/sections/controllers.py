@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
+from rbxcompose.actuation.servo_models import model_named
 from rbxcompose.config import Config
 from rbxcompose.controller_interface import ControllerConfig, controller_names, controller_type
 from rbxcompose.findings import Finding, Related, Span, kind
@@ -57,6 +59,17 @@ base without an extent.
 
 Bad: `hand: {type: gripper, ..., finger_length: 2 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
 Good: `hand: {type: gripper, ..., finger_length: 6 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
+""",
+)
+NO_WHOLE_TURN = kind(
+    "RBX2280",
+    """A servo that does not see a whole turn is to be a wheel or a spindle
+
+Servos of the families AX, RX, EX and the XL-320 turn without an end, but they do not tell where they are in a part of
+each turn. So nobody knows the way of a wheel, or the height of a lift.
+
+Bad: `left_servo: {bus: servos, model: AX-12, id: 1, mode: velocity}` for a wheel of a `diff_drive`.
+Good: `left_servo: {bus: servos, model: XL430-W250, id: 1, mode: velocity}`
 """,
 )
 WRONG_KIND = kind(
@@ -153,6 +166,7 @@ def _mistakes(
     here, cls = key_span(root, ("controllers", name)), controller_type(one.type)
     yield from _undriven(reading, name, one)
     yield from _unfit(reading, name, one)
+    yield from _blind(reading, name, one)
     if name in reading.contents.of(joints):
         yield NAME_OF_JOINT.at(here, f"'{name}' is a joint and a controller")
     if (mistake := cls.mistake(one)) is not None:
@@ -201,6 +215,22 @@ def _unfit(reading: Reading[ControllerConfig], name: str, one: ControllerConfig)
             message = f"'{joint}' is {known[joint].kind} in the body, and '{name}' leads joints that are {kinds}"
             related = [Related(known[joint].span, "the joint")]
             yield WRONG_KIND.at(_place(reading, name, joint), message, related=related)
+
+
+def _blind(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield a finding for each servo that cannot tell how far its joint turns."""
+    driven, servos = reading.contents.of(joints), reading.contents.of(actuators)
+    if controller_type(one.type).interface != "velocity":
+        return
+    for servo in (each for joint in one.led if joint in driven for each in driven[joint].servos if each in servos):
+        model = model_named(servos[servo].model)
+        if model is not None and model.family.span < math.tau - model.per_tick:
+            degrees = round(math.degrees(model.family.span))
+            message = f"'{name}' needs to know how far '{servo}' turns, and an {model.name} tells {degrees} of 360 deg"
+            span = value_span(reading.contents.root, ("actuators", servo, "model"))
+            help_text = "take a model that sees the whole turn, such as XL430-W250 or MX-28"
+            here = Related(key_span(reading.contents.root, ("controllers", name)), "the controller")
+            yield NO_WHOLE_TURN.at(span, message, help=help_text, related=[here])
 
 
 _PLURAL = {"position": "positions", "velocity": "velocities"}

@@ -70,7 +70,7 @@ ABOVE = {
     "lsp": "compiler composition missions model.robot schema sections",
     "mission_tests": "compiler components.mission composition executive missions model plan.model sdk testing.bench",
     "missions": "",
-    "model": "composition missions sdk sections",
+    "model": "body.model composition missions sdk sections",
     "mux": "",
     "navigation": "",
     "params": "",
