@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.model.base_wheels import BodyWheel, rolling_bases
 from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.rolling import BodyWheel, rolling_bases
 from rbxcompose.sdk.capabilities import Drives, Setting
 from rbxcompose.sections.joints import joints
 from rbxcompose.units import ANGULAR_SPEED, SPEED, Dimension, format_quantity

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.model.base_wheels import rolling_bases
 from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.rolling import rolling_bases
 from rbxcompose.units import LENGTH, format_quantity
 
 TOLERANCE = 0.02  # of a length, within which two count as the same

@@ -63,7 +63,8 @@ class WheelOdometry:
             return None
         dt = now - before[2]
         wheels = WheelSpeeds(self._difference(left, before[0]) / dt, self._difference(right, before[1]) / dt)
-        speed = max(abs(wheels.left), abs(wheels.right)) * self.geometry.metres_per_unit
+        way = max(abs(wheels.left), abs(wheels.right)) * self.geometry.metres_per_unit * dt
+        speed = way / max(dt, self.policy.window)  # readings come late at times, and the next one soon after
         if speed > self.policy.greatest_speed:
             self.jumps += 1
             return f"a wheel has jumped: it would have moved at {speed:.3g} m/s"

@@ -39,7 +39,7 @@ from rbxcompose.sdk import (
 )
 
 AVERAGED = 0.1  # [s], over which velocities are told
-JUMP = 4.0  # times the largest speed of a wheel: a servo that has started again counts from elsewhere
+JUMP = 2.0  # times the largest speed of a wheel: a servo that has started again counts from elsewhere
 STALE = 3.0  # cycles after which nobody knows where a wheel is
 UNKNOWN = 1e6  # variance of what wheels cannot tell: height, roll, pitch
 PLANAR = (0, 1, 5)  # x, y, and the turn about z, of the six that a covariance has

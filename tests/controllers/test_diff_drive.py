@@ -133,8 +133,8 @@ def test_a_timeout_of_zero_is_none() -> None:
     assert rover.is_still
 
 
-@settings(max_examples=25, deadline=None)
-@given(st.lists(commands, min_size=1, max_size=12))
+@settings(max_examples=20, deadline=None)
+@given(st.lists(commands, min_size=1, max_size=8))
 def test_no_sequence_of_commands_is_too_fast_for_a_wheel(asked: list[tuple[float, float, float]]) -> None:
     rover = Rover(max_speed=0.3, acceleration=0.6, joint={"velocity": 6.0, "acceleration": 20.0})
     for linear, angular, seconds in asked:
@@ -142,7 +142,7 @@ def test_no_sequence_of_commands_is_too_fast_for_a_wheel(asked: list[tuple[float
         rover.advance(seconds)
     rover.advance(2.0)
     assert rover.is_still
-    speeds = np.array(rover.speeds)[:: round(0.01 / STEP)]  # one for each cycle
+    speeds = np.array(rover.speeds)
     assert np.abs(speeds).max() <= 6.0 * RADIUS + UNIT
     assert np.abs(np.diff(speeds, axis=0)).max() <= 20.0 * RADIUS * 0.01 + UNIT
     assert np.abs(speeds.mean(axis=1)).max() <= 0.3 + UNIT
@@ -202,7 +202,7 @@ def test_a_wheel_in_fault_stops_the_other_one_within_its_limits() -> None:
     ask(rover, "/left/enable", SetBool, SetBool.Request(data=False))
     begin = len(rover.speeds)
     rover.drive(0.2, 0.0, 0.5)
-    right = np.array(rover.speeds[begin:])[:: round(0.01 / STEP), 1]
+    right = np.array(rover.speeds[begin:])[:, 1]
     assert np.abs(np.diff(right)).max() <= 0.01 + UNIT
     assert rover.is_still
     assert rover.torque[0] == 0
@@ -224,7 +224,7 @@ def test_relaxed_wheels_roll_until_the_next_command() -> None:
     rover.drive(0.2, 0.0, 0.5)
     assert rover.torque == [1, 1]
     assert rover.speeds[-1] == pytest.approx((0.2, 0.2), abs=UNIT)
-    after = np.array(rover.speeds[begin:])[:: round(0.01 / STEP)]
+    after = np.array(rover.speeds[begin:])
     assert np.abs(np.diff(after, axis=0)).max() <= 0.01 + UNIT  # from rest
 
 
@@ -238,7 +238,7 @@ def test_a_stop_brakes_within_the_limits_and_nothing_moves_until_the_release() -
     begin = len(rover.speeds)
     rover.bench.host.stop()
     rover.drive(0.2, 0.5, 0.6)
-    speeds = np.array(rover.speeds[begin:])[:: round(0.01 / STEP)]
+    speeds = np.array(rover.speeds[begin:])
     assert np.abs(np.diff(speeds, axis=0)).max() <= (1.0 + 3.0 * DISTANCE / 2) * 0.01 + UNIT
     assert rover.is_still
     rover.bench.host.release()
@@ -254,7 +254,7 @@ def test_a_base_that_is_switched_off_brakes_within_its_limits_and_ignores_comman
     rover.driver.switch(SwitchControllers("servos", off=("base",)))
     begin = len(rover.speeds)
     rover.drive(0.2, 0.0, 1.0)
-    speeds = np.array(rover.speeds[begin:])[:: round(0.01 / STEP)]
+    speeds = np.array(rover.speeds[begin:])
     assert np.abs(np.diff(speeds, axis=0)).max() <= 0.01 + UNIT
     assert rover.is_still
     rover.driver.switch(SwitchControllers("servos", on=("base",)))

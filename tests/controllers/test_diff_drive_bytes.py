@@ -72,6 +72,7 @@ def test_a_base_drives_by_bytes_and_knows_where_it_is(model: str, tmp_path: Path
         pose, tick = base.odometry.pose, known[1].per_tick
         told = [drives[name].measured.position * RADIUS for name in ("left", "right")]
         true = [(line[1]._position - 2048) * tick * RADIUS, (2048 - line[2]._position) * tick * RADIUS]
+    assert site.told == []
     turn = math.tau * RADIUS  # a servo of protocol 1.0 starts again at 0
     left, right = (one + turn * round((other - one) / turn) for one, other in zip(true, told, strict=True))
     left -= (4000 - 2048) * tick * RADIUS
@@ -79,4 +80,3 @@ def test_a_base_drives_by_bytes_and_knows_where_it_is(model: str, tmp_path: Path
     assert abs(wrap_angle(pose.heading - true_pose.heading)) < 1e-3
     assert pose.distance(true_pose) < 3e-3
     assert pose.heading > math.pi / 4
-    assert site.told == []

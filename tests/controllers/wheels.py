@@ -12,7 +12,7 @@ from rbxcompose.testing import Bench, instance
 from rbxcompose.twins.servo_fake import FakeServo
 
 RADIUS, DISTANCE = 0.04, 0.26  # [m]
-STEP = 0.001  # [s] between two looks at the wheels
+STEP = 0.01  # [s] between two looks at the wheels: a cycle, within which speeds do not change
 
 
 def wheels(model: str = "XL430-W250", *, rate: float = 100.0, joint: Any = None, **config: Any) -> dict[str, Any]:
