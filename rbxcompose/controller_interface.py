@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Literal, Protocol, Self, TypeVar, get_args
 
 from pydantic import PrivateAttr
@@ -72,6 +73,14 @@ class LedJoint(Protocol):
         """Return why it may not move; empty if it may."""
 
     @property
+    def has_torque(self) -> bool:
+        """Return whether its servos hold or move it, and nobody has asked to relax it."""
+
+    @property
+    def measured_at(self) -> float:
+        """Return when it was measured [s], -inf if it never was."""
+
+    @property
     def per_tick(self) -> float:
         """Return how far it moves for one tick of its servo."""
 
@@ -118,6 +127,10 @@ class Controller(ABC, Generic[C]):
 
     type_name: ClassVar[str] = ""
     interface: ClassVar[Literal["position", "velocity"]] = "position"
+    kinds: ClassVar[frozenset[str]] = frozenset()
+    """Kinds of joints that it can lead, in the words of URDF; empty if of any kind."""
+    topics: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """The fields that give ports their topics: port -> field."""
 
     def __init__(self, name: str, config: C, site: ControllerSite) -> None:
         self.name, self.config, self.site = name, config, site
@@ -139,7 +152,7 @@ class Controller(ABC, Generic[C]):
 
     @classmethod
     def capabilities(cls, name: str, config: C) -> tuple[Capability, ...]:
-        """Return what checks and commands should know about it; texts are names of its ports."""
+        """Return what checks and commands should know about it, with its own names of ports and fields."""
         return ()
 
     @classmethod

@@ -16,11 +16,24 @@ class ControllerManager:
     def __init__(self, controllers: Mapping[str, Controller[ControllerConfig]]) -> None:
         self.controllers = dict(controllers)
         self._active = {name for name, one in self.controllers.items() if one.config.start == "active"}
+        self._leaving = set[str]()  # switched off, and not at rest yet
 
     @property
     def active(self) -> list[Controller[ControllerConfig]]:
         """Return the active controllers, in the order of the manifest."""
         return [one for name, one in self.controllers.items() if name in self._active]
+
+    @property
+    def leading(self) -> list[Controller[ControllerConfig]]:
+        """Return the active controllers, and those that still bring joints to rest that nobody else leads."""
+        taken = {joint for one in self.active for joint in one.config.led}
+        self._leaving = {
+            name for name in self._leaving if self.controllers[name].leads and not taken & {*self._led(name)}
+        }
+        return [one for name, one in self.controllers.items() if name in self._active | self._leaving]
+
+    def _led(self, name: str) -> tuple[str, ...]:
+        return self.controllers[name].config.led
 
     def is_active(self, name: str) -> bool:
         """Return whether a controller leads its joints."""
@@ -28,7 +41,7 @@ class ControllerManager:
 
     def leader(self, joint: str) -> str:
         """Return the active controller that moves a joint now, or nothing."""
-        return next((one.name for one in self.active if joint in one.config.led and one.leads), "")
+        return next((one.name for one in self.leading if joint in one.config.led and one.leads), "")
 
     def let_go(self, joint: str, now: float, reason: str) -> None:
         """Have a joint left alone, which has lost its torque."""
@@ -60,10 +73,12 @@ class ControllerManager:
             if name in self._active:
                 self.controllers[name].halt(now, f"controller '{name}' was switched off")
                 self._active.discard(name)
+                self._leaving.add(name)
                 yield f"controller '{name}' is inactive"
         for name in on:
             if name not in self._active:
                 self._active.add(name)
+                self._leaving.discard(name)
                 yield f"controller '{name}' is active"
 
 

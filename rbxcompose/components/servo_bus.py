@@ -31,7 +31,7 @@ from rbxcompose.msgs.std_msgs import Float64, Header
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.requests import Refused, answers
 from rbxcompose.sdk import Component, In, Out, Port, Serves, ServesAction, component
-from rbxcompose.sdk.capabilities import Capability, NeedsExtra, OpensPort, Setting
+from rbxcompose.sdk.capabilities import Capability, NeedsExtra, OpensPort, Setting, within
 from rbxcompose.sdk.component import Context
 from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, mimics_of
 from rbxcompose.twins.fault_script import FaultScript, InjectFault
@@ -85,11 +85,14 @@ class ServoBusDriver(Component[ServoBusConfig]):
     @classmethod
     def capabilities(cls, config: ServoBusConfig) -> tuple[Capability, ...]:
         """Declare what its controllers can do, that servos which speak bytes need the SDK, and real ones their port."""
-        setups = config.controllers.items()
-        led = (one for name, each in setups for one in controller_type(each.type).capabilities(name, each.config))
+        led = (
+            within(one, f"{name}_", f"controllers.{name}.")
+            for name, each in config.controllers.items()
+            for one in controller_type(each.type).capabilities(name, each.config)
+        )
         package = NeedsExtra(Setting("dynamixel_sdk"), Setting("servos"))
         ports = () if config.twin else (OpensPort(Setting(config.port, "port")),)
-        return (*led, *(() if config.twin == "servo" else (package,)), *ports)
+        return (*led, *(() if config.twin in ("ideal", "servo") else (package,)), *ports)
 
     def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
         """Give the ports of joints and controllers their methods."""
@@ -194,7 +197,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.info("the bus of servos is back")
             self.lost_at = -math.inf
         self.periods.begin(self.now)
-        self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.active)
+        self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.leading)
         if self.now - self.published_at >= 1 / PUBLISHED - 1e-9:
             self.published_at = self.now
             self.publish()
@@ -308,7 +311,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
                     effort=np.array([one.effort for one in known]),
                 )
             )
-        for controller in self.controllers.active:
+        for controller in self.controllers.leading:
             controller.publish()
 
     def tell(self) -> None:

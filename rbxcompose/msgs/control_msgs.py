@@ -172,6 +172,135 @@ class FollowJointTrajectory(Action["FollowJointTrajectory.Goal", "FollowJointTra
         feedback: FollowJointTrajectory.Feedback = field(default_factory=lambda: FollowJointTrajectory.Feedback())
 
 
+class SingleJointPosition(Action["SingleJointPosition.Goal", "SingleJointPosition.Result", "SingleJointPosition.Feedback"]):
+    """Move a single joint to a position."""
+
+    TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition"
+    HASH: ClassVar[str] = "RIHS01_1b330d11638c0b1d3228cc80b1123e5b3db3d24592e95429812bf30056e3db7b"
+
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `SingleJointPosition`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_Goal"
+        HASH: ClassVar[str] = "RIHS01_c434f6bb755396b6037c46761f492580e7121d17157ead1d58dfee174001cf79"
+        FIELDS: ClassVar[Fields] = {
+            "position": "float64",
+            "min_duration": "builtin_interfaces/msg/Duration",
+            "max_velocity": "float64",
+        }
+
+        position: float = 0.0
+        min_duration: builtin_interfaces.Duration = field(default_factory=builtin_interfaces.Duration)
+        max_velocity: float = 0.0
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `SingleJointPosition`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_Result"
+        HASH: ClassVar[str] = "RIHS01_4fa10d555d539d00370b7114db3c3dddb182647e720c8c5faaf8e184822db14c"
+        FIELDS: ClassVar[Fields] = {}
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `SingleJointPosition`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_Feedback"
+        HASH: ClassVar[str] = "RIHS01_b3eb28913208b01d2713c908067a803a975ef81a8b9431fd6b4639f2e91fc1fc"
+        FIELDS: ClassVar[Fields] = {
+            "header": "std_msgs/msg/Header",
+            "position": "float64",
+            "velocity": "float64",
+            "error": "float64",
+        }
+
+        header: std_msgs.Header = field(default_factory=std_msgs.Header)
+        position: float = 0.0
+        velocity: float = 0.0
+        error: float = 0.0
+
+    class SendGoal(Service["SingleJointPosition.SendGoal.Request", "SingleJointPosition.SendGoal.Response"]):
+        """Sends a goal of `SingleJointPosition`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_abcf6f8acd1889a685cd6ac2e948284a8012a81d01e6af0d6a918c52d759ca47"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `SingleJointPosition.SendGoal`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_5ddd6989bdf3389df344904c69b041d2b7eec76dfbb9fad4f66cf3714a3f0806"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "control_msgs/action/SingleJointPosition_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: SingleJointPosition.Goal = field(default_factory=lambda: SingleJointPosition.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `SingleJointPosition.SendGoal`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_bd3d63d72361e578cc2035b5b28db74b10e876db6050608589fc8f0b523f9839"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["SingleJointPosition.GetResult.Request", "SingleJointPosition.GetResult.Response"]):
+        """Waits for the result of a goal of `SingleJointPosition`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_GetResult"
+        HASH: ClassVar[str] = "RIHS01_afe95c54e7c59cdb7e0d978bfafb908e3f1546975d540911a1768009d577351d"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `SingleJointPosition.GetResult`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_d2b87049687ebad79bebbd130e6913b690069fba19f19b4b4774754f969d1566"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `SingleJointPosition.GetResult`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_6475df69e4fbff1aa8dcd8d2825e03f6faa3c69f158c8fe1d058eb506d53ee9e"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "control_msgs/action/SingleJointPosition_Result",
+            }
+
+            status: int = 0
+            result: SingleJointPosition.Result = field(default_factory=lambda: SingleJointPosition.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `SingleJointPosition` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_6da19eb420db90080a9bd9cac0041c865254b8e49cbe0d2b54c78e1814ed499b"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "control_msgs/action/SingleJointPosition_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: SingleJointPosition.Feedback = field(default_factory=lambda: SingleJointPosition.Feedback())
+
+
 @dataclass(frozen=True, slots=True)
 class JointComponentTolerance(Message):
     """How far one component of a joint of several degrees of freedom may be from where it should be."""

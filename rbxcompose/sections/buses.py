@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.config import Angle, BitRate, Config, Frequency, Time
+from rbxcompose.controller_interface import ControllerConfig, controller_type
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, SetScope
-from rbxcompose.manifest.tree import key_span
+from rbxcompose.manifest.tree import KeyPath, key_span
 from rbxcompose.manifest.validate import MISSING_KEY
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.manifest.written import as_written
@@ -65,6 +66,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         own = {joint: one for joint, one in driven.items() if places.get(joint) == name}
         if not own:
             continue
+        led = {key: one for key, one in contents.of(controllers).items() if set(one.led) <= own.keys()}
         config = {
             "name": name,
             "port": port_name(contents, bus.port),
@@ -86,16 +88,29 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
                 for joint, one in own.items()
             },
             "controllers": {
-                controller: {
+                key: {
                     "type": one.type,
                     "settings": as_written(one),
                     "sliding": [joint for joint in one.led if joint in known.joints and known.joints[joint].slides],
                 }
-                for controller, one in contents.of(controllers).items()
-                if set(one.led) <= own.keys()
+                for key, one in led.items()
             },
         }
-        yield WantedComponent(name, "servo_bus", config, ("buses", name))
+        yield WantedComponent(name, "servo_bus", config, ("buses", name), places=_places(led))
+
+
+def _places(led: Mapping[str, ControllerConfig]) -> dict[str, KeyPath]:
+    """Return where the fields and the ports of controllers are written."""
+    found: dict[str, KeyPath] = {f"controllers.{name}": ("controllers", name) for name in led}
+    for name, one in led.items():
+        cls = controller_type(one.type)
+        for port in cls.ports(name, one):
+            found[f"{name}_{port}"] = (
+                "controllers",
+                name,
+                *(cls.topics[port].split(".") if port in cls.topics else ()),
+            )
+    return found
 
 
 def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorModel]) -> dict[str, object]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
+from rbxcompose.actuation.servo_models import model_named
 from rbxcompose.config import Config
 from rbxcompose.controller_interface import ControllerConfig, controller_names, controller_type
 from rbxcompose.findings import Finding, Related, Span, kind
@@ -14,6 +16,7 @@ from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
 from rbxcompose.plugins import BROKEN, BrokenPluginError
 from rbxcompose.references import CONTROLLER
 from rbxcompose.sections.actuators import actuators
+from rbxcompose.sections.body import body
 from rbxcompose.sections.joints import joints
 
 NOT_DRIVEN = kind(
@@ -56,6 +59,28 @@ base without an extent.
 
 Bad: `hand: {type: gripper, ..., finger_length: 2 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
 Good: `hand: {type: gripper, ..., finger_length: 6 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
+""",
+)
+NO_WHOLE_TURN = kind(
+    "RBX2280",
+    """A servo that does not see a whole turn is to be a wheel or a spindle
+
+Servos of the families AX, RX, EX and the XL-320 turn without an end, but they do not tell where they are in a part of
+each turn. So nobody knows the way of a wheel, or the height of a lift.
+
+Bad: `left_servo: {bus: servos, model: AX-12, id: 1, mode: velocity}` for a wheel of a `diff_drive`.
+Good: `left_servo: {bus: servos, model: XL430-W250, id: 1, mode: velocity}`
+""",
+)
+WRONG_KIND = kind(
+    "RBX2285",
+    """A controller leads a joint of another kind than it can
+
+A wheel turns without an end: in the URDF its joint is `continuous`. What a `linear` controller drives up and down
+slides: its joint is `prismatic`.
+
+Bad: `wheels: {type: diff_drive, left: left_wheel, ...}`, where `left_wheel` has `type="revolute"`.
+Good: the same, where the URDF has `<joint name="left_wheel" type="continuous">`.
 """,
 )
 
@@ -140,6 +165,8 @@ def _mistakes(
     root = reading.contents.root
     here, cls = key_span(root, ("controllers", name)), controller_type(one.type)
     yield from _undriven(reading, name, one)
+    yield from _unfit(reading, name, one)
+    yield from _blind(reading, name, one)
     if name in reading.contents.of(joints):
         yield NAME_OF_JOINT.at(here, f"'{name}' is a joint and a controller")
     if (mistake := cls.mistake(one)) is not None:
@@ -176,6 +203,34 @@ def _undriven(reading: Reading[ControllerConfig], name: str, one: ControllerConf
             yield NOT_DRIVEN.at(
                 span, f"the joints of the controller '{name}' are on two buses: {', '.join(sorted(buses))}"
             )
+
+
+def _unfit(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield a finding for each joint whose kind the controller cannot lead."""
+    description, wanted = reading.contents.of(body), controller_type(one.type).kinds
+    known = description.body.joints if description else {}
+    for joint in one.led if wanted else ():
+        if joint in known and known[joint].kind not in wanted:
+            kinds = " or ".join(sorted(wanted))
+            message = f"'{joint}' is {known[joint].kind} in the body, and '{name}' leads joints that are {kinds}"
+            related = [Related(known[joint].span, "the joint")]
+            yield WRONG_KIND.at(_place(reading, name, joint), message, related=related)
+
+
+def _blind(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield a finding for each servo that cannot tell how far its joint turns."""
+    driven, servos = reading.contents.of(joints), reading.contents.of(actuators)
+    if controller_type(one.type).interface != "velocity":
+        return
+    for servo in (each for joint in one.led if joint in driven for each in driven[joint].servos if each in servos):
+        model = model_named(servos[servo].model)
+        if model is not None and model.family.span < math.tau - model.per_tick:
+            degrees = round(math.degrees(model.family.span))
+            message = f"'{name}' needs to know how far '{servo}' turns, and an {model.name} tells {degrees} of 360 deg"
+            span = value_span(reading.contents.root, ("actuators", servo, "model"))
+            help_text = "take a model that sees the whole turn, such as XL430-W250 or MX-28"
+            here = Related(key_span(reading.contents.root, ("controllers", name)), "the controller")
+            yield NO_WHOLE_TURN.at(span, message, help=help_text, related=[here])
 
 
 _PLURAL = {"position": "positions", "velocity": "velocities"}

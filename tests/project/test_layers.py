@@ -73,7 +73,7 @@ ABOVE = {
     "mission_tests": "compiler components.mission composition executive missions model plan.model sdk sections.faults "
     "testing.bench twins.fault_script twins.servo_faults",
     "missions": "",
-    "model": "composition missions sdk sections",
+    "model": "body.model composition missions sdk sections",
     "mux": "",
     "navigation": "",
     "params": "",
