@@ -47,6 +47,7 @@ def _actions(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
                 pausable=port.pausable,
                 outcomes=port.outcomes,
                 entries=port.entries,
+                measures=port.measures,
             )
             yield SkillSource(skill, end.type_name, end.topic)
 
