@@ -81,6 +81,9 @@ class LedJoint(Protocol):
     def turn(self, velocity: float) -> None:
         """Move with a velocity up to the end of this cycle."""
 
+    def hold(self) -> None:
+        """Come to rest within its limits, and stay there."""
+
 
 class ControllerSite(Protocol):
     """What a controller uses of the component that runs it."""
@@ -146,6 +149,11 @@ class Controller(ABC, Generic[C]):
     def mistake(cls, config: C) -> tuple[str, str] | None:
         """Return the field and the reason, if a configuration cannot work although each of its values can."""
         return None
+
+    @classmethod
+    def asks(cls, config: C) -> Mapping[str, tuple[float, float]]:
+        """Return the least and the greatest position that it may give its joints, as far as the configuration tells."""
+        return {}
 
     def prepare(self) -> None:
         """Set up what it needs."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
 
+from rbxcompose.body.model import BodyJoint
 from rbxcompose.config import Config
 from rbxcompose.controller_interface import ControllerConfig, controller_names, controller_type
 from rbxcompose.findings import Finding, Related, Span, kind
@@ -14,7 +16,8 @@ from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
 from rbxcompose.plugins import BROKEN, BrokenPluginError
 from rbxcompose.references import CONTROLLER
 from rbxcompose.sections.actuators import actuators
-from rbxcompose.sections.joints import joints
+from rbxcompose.sections.body import body
+from rbxcompose.sections.joints import bounds_of, joints
 
 NOT_DRIVEN = kind(
     "RBX2215",
@@ -56,6 +59,17 @@ base without an extent.
 
 Bad: `hand: {type: gripper, ..., finger_length: 2 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
 Good: `hand: {type: gripper, ..., finger_length: 6 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
+""",
+)
+BEYOND_LIMITS = kind(
+    "RBX2290",
+    """A controller asks for positions that its joint does not reach
+
+The joint would stop at its limit, and what the controller wants would never be done. The limits are those of the body,
+and those under `joints:`, which can only be tighter. Angles of a gripper follow from its `opening` and its fingers.
+
+Bad: `hand: {type: gripper, ..., opening: [0 cm, 9 cm]}`, for which the finger would turn farther than its `upper`.
+Good: `hand: {type: gripper, ..., opening: [0 cm, 5 cm]}`
 """,
 )
 
@@ -145,6 +159,8 @@ def _mistakes(
     if (mistake := cls.mistake(one)) is not None:
         field, reason = mistake
         yield CANNOT_WORK.at(key_span(root, ("controllers", name, field)), f"controller '{name}': {reason}")
+    else:
+        yield from _beyond(reading, name, one)
     for joint in one.led if one.start == "active" else ():
         other, span = owners.setdefault(joint, (name, here))
         if other != name:
@@ -178,6 +194,31 @@ def _undriven(reading: Reading[ControllerConfig], name: str, one: ControllerConf
             )
 
 
+def _beyond(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield findings on joints that the controller would move beyond their limits."""
+    driven, description = reading.contents.of(joints), reading.contents.of(body)
+    known = description.body.joints if description else {}
+    for joint, (least, greatest) in controller_type(one.type).asks(one).items():
+        if joint not in driven:
+            continue
+        lower, upper = bounds_of(known.get(joint), driven[joint])
+        is_below = lower is not None and least < lower - _ROUNDING
+        is_above = upper is not None and greatest > upper + _ROUNDING
+        if is_below or is_above:
+            show = _shown(known.get(joint))
+            message = f"the controller '{name}' moves '{joint}' from {show(least)} to {show(greatest)}"
+            limits = " to ".join("any" if end is None else show(end) for end in (lower, upper))
+            yield BEYOND_LIMITS.at(_place(reading, name, joint), f"{message}, beyond its limits: {limits}")
+
+
+def _shown(joint: BodyJoint | None) -> Callable[[float], str]:
+    """Return how positions of a joint are written."""
+    if joint is not None and joint.kind == "prismatic":
+        return lambda position: f"{position:.4g} m"
+    return lambda position: f"{math.degrees(position):.4g} deg"
+
+
+_ROUNDING = 1e-4  # [rad or m], less than a tick
 _PLURAL = {"position": "positions", "velocity": "velocities"}
 
 
