@@ -72,7 +72,7 @@ class GripperConfig(ControllerConfig):
     model: Literal["one_sided", "dual", "parallel", "calibrated"]
     """One finger turns, two fingers turn, both pads move in parallel, or the opening was measured."""
     joint: JointName | None = None
-    """The joint that opens it; positive opens."""
+    """The joint that opens it."""
     left: JointName | None = None
     """The joint of the left finger of a `dual` gripper; positive opens."""
     right: JointName | None = None
@@ -80,7 +80,7 @@ class GripperConfig(ControllerConfig):
     pad_width: Length | None = None
     """Opening with parallel fingers."""
     finger_length: Length | None = None
-    """From the axis of a finger to its pad."""
+    """From the axis of a finger to its pad; half of that for `one_sided`, as in ArbotiX."""
     opening: tuple[Length, Length] | None = None
     """Least and greatest opening."""
     center: Angle | None = None
