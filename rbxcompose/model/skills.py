@@ -54,7 +54,7 @@ def _actions(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
 
 def _services(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
     for end in _ends(components):
-        if isinstance(end.port, Serves) and end.port.interface is not None:
+        if isinstance(end.port, Serves) and end.port.interface is not None and end.skill:
             skill = service_skill(end.port.interface, end.skill)
             if skill is not None:
                 yield SkillSource(skill, end.type_name, end.topic, SkillWay.SERVICE)

@@ -160,13 +160,16 @@ class SendsOrders(Out[M]):
 
 
 class Serves(Port[None]):
-    """Serves requests: the method `on_<port>` takes a request and returns the response."""
+    """Serves requests: the method `on_<port>` takes a request and returns the response.
+
+    It is a skill of missions if the response has a flag `success`; `skill` is as in `ServesAction`.
+    """
 
     kind = "serves"
 
-    def __init__(self, service: type[Service[Q, R]], topic: str) -> None:
+    def __init__(self, service: type[Service[Q, R]], topic: str, *, skill: str | None = "") -> None:
         super().__init__(topic)
-        self.interface = service
+        self.interface, self.skill = service, skill
 
 
 class Calls(Port[Caller[Q, R]]):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.config import Angle, BitRate, Config, Frequency, Time
+from rbxcompose.controller_interface import ControllerConfig
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, SetScope
 from rbxcompose.manifest.tree import key_span
@@ -63,7 +64,9 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
     places = buses_of_joints(contents)
     for name, bus in contents.of(buses).items():
         own = {joint: one for joint, one in driven.items() if places.get(joint) == name}
-        if not own:
+        led = {key: one for key, one in contents.of(controllers).items() if _is_led(one, own, servos, name)}
+        used = {item.actuator: _servo(servos[item.actuator]) for one in led.values() for item in one.used}
+        if not own and not used:
             continue
         config = {
             "name": name,
@@ -91,11 +94,23 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
                     "settings": as_written(one),
                     "sliding": [joint for joint in one.led if joint in known.joints and known.joints[joint].slides],
                 }
-                for controller, one in contents.of(controllers).items()
-                if set(one.led) <= own.keys()
+                for controller, one in led.items()
             },
+            "used": used,
         }
         yield WantedComponent(name, "servo_bus", config, ("buses", name))
+
+
+def _is_led(
+    one: ControllerConfig, joints: Mapping[str, JointModel], servos: Mapping[str, ActuatorModel], bus: str
+) -> bool:
+    """Return whether all that a controller leads and uses is on a bus."""
+    places = [item.actuator in servos and servos[item.actuator].bus == bus for item in one.used]
+    return set(one.led) <= joints.keys() and all(places) and bool(one.led or places)
+
+
+def _servo(one: ActuatorModel) -> dict[str, object]:
+    return {"id": one.id, "model": one.model, "neutral": one.neutral, "invert": one.invert}
 
 
 def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorModel]) -> dict[str, object]:
@@ -104,7 +119,7 @@ def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorMod
     lower, upper = bounds_of(joint, driven)
     mimic = joint.mimic if joint else None
     return {
-        "servos": [{"id": one.id, "model": one.model, "neutral": one.neutral, "invert": one.invert} for one in servos],
+        "servos": [_servo(one) for one in servos],
         "mode": servos[0].mode,
         "ratio": math.tau / driven.travel if driven.travel else driven.ratio,
         "offset": driven.offset,

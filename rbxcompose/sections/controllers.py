@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 
+from rbxcompose.actuation.control_tables import OUTPUTS
+from rbxcompose.actuation.servo_models import model_named
 from rbxcompose.body.model import BodyJoint
 from rbxcompose.config import Config
 from rbxcompose.controller_interface import ControllerConfig, controller_names, controller_type
@@ -71,6 +73,18 @@ and those under `joints:`, which can only be tighter. Angles of a gripper follow
 Bad: `hand: {type: gripper, ..., opening: [0 cm, 9 cm]}`, for which the finger would turn farther than its `upper`.
 Good: `hand: {type: gripper, ..., opening: [0 cm, 5 cm]}`
 """,
+)
+NO_ITEM = kind(
+    "RBX2291",
+    """A servo has no such item
+
+The model of a servo decides which items its memory has: a light, and ports for sensors in some models. Only what moves
+nothing can be switched by a controller; everything can be read.
+
+Bad: `lamp: {type: gpio, actuator: pan_servo, item: lde, direction: out}`
+Good: `lamp: {type: gpio, actuator: pan_servo, item: led, direction: out}`
+""",
+    is_fixable=True,
 )
 
 
@@ -161,6 +175,7 @@ def _mistakes(
         yield CANNOT_WORK.at(key_span(root, ("controllers", name, field)), f"controller '{name}': {reason}")
     else:
         yield from _beyond(reading, name, one)
+        yield from _unknown_items(reading, name, one)
     for joint in one.led if one.start == "active" else ():
         other, span = owners.setdefault(joint, (name, here))
         if other != name:
@@ -209,6 +224,20 @@ def _beyond(reading: Reading[ControllerConfig], name: str, one: ControllerConfig
             message = f"the controller '{name}' moves '{joint}' from {show(least)} to {show(greatest)}"
             limits = " to ".join("any" if end is None else show(end) for end in (lower, upper))
             yield BEYOND_LIMITS.at(_place(reading, name, joint), f"{message}, beyond its limits: {limits}")
+
+
+def _unknown_items(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield findings on items that the model of a servo lacks, or that may not be switched."""
+    servos = reading.contents.of(actuators)
+    for used in one.used:
+        model = model_named(servos[used.actuator].model) if used.actuator in servos else None
+        valid = [item for item in model.items if item in OUTPUTS or not used.is_written] if model else []
+        if model is not None and used.item not in valid:
+            span = value_span(reading.contents.root, ("controllers", name, used.field))
+            is_there = used.item in model.items
+            message = f"'{used.item}' cannot be switched" if is_there else f"{model.name} has no item '{used.item}'"
+            what = "items that can be switched" if used.is_written else "its items"
+            yield NO_ITEM.misspelt(span, message, used.item, valid, what)
 
 
 def _shown(joint: BodyJoint | None) -> Callable[[float], str]:

@@ -142,7 +142,7 @@ def test_a_jammed_gripper_holds_an_object_and_presses_a_little_only() -> None:
     hand.grip(0.09, 3.0)
     ends = hand.grip(0.01)
     hand.robot.advance(0.3)
-    hand.servo.is_jammed = True
+    hand.servo.faults.is_jammed = True
     hand.robot.advance(3.0)
     [ended] = ends
     assert ended.outcome is Outcome.SUCCEEDED
@@ -153,7 +153,7 @@ def test_a_jammed_gripper_holds_an_object_and_presses_a_little_only() -> None:
 
 def test_a_stall_may_be_a_failure_and_the_gripper_stays_where_it_is() -> None:
     hand = Hand(on_stall="fail", stall={"progress": "2 mm", "window": "0.4 s"})
-    hand.servo.is_jammed = True
+    hand.servo.faults.is_jammed = True
     [ended] = hand.command(0.01, 1.0)
     assert ended.outcome is Outcome.ABORTED
     assert (ended.result.stalled, ended.result.reached_goal) == (True, False)

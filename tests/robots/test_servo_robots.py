@@ -102,7 +102,7 @@ def test_the_gripper_holds_what_is_between_its_fingers(name: str) -> None:
     send(Grip.Goal(opening=0.0), ends.append)
     robot.advance(0.3)
     servos: Any = robot.component("servos")
-    servos.cycle.bus.line[9].is_jammed = True
+    servos.cycle.bus.line[9].faults.is_jammed = True
     robot.advance(2.0)
     assert [one.outcome for one in ends] == [Outcome.SUCCEEDED] * 2
     assert (ends[0].result.reached, ends[1].result.stalled) == (True, True)
