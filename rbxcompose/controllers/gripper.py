@@ -196,11 +196,20 @@ class GripperController(Controller[GripperConfig]):
         return self.goal is not None
 
     def accept(self, port: str, goal: Any) -> str:
-        """Refuse an opening that cannot be."""
+        """Refuse an opening that cannot be, or replace what leads the joints."""
         try:
             self.model.angles(opening_of(port, goal))
         except ValueError as error:
             return str(error)
+        for other in (COMMAND, GRIP):
+            if (replaced := self.site.goal(other)) is None:
+                continue
+            if replaced.cancel_requested:
+                replaced.canceled(result_of(other, self._outcome("canceled")))
+            else:
+                outcome = self._outcome(f"replaced by a newer goal of '{port}'")
+                replaced.aborted(outcome.message, result_of(other, outcome))
+        self.goal = None
         return ""
 
     def cycle(self, now: float, dt: float) -> None:
@@ -244,8 +253,6 @@ class GripperController(Controller[GripperConfig]):
                 self.goal = None
             goal.canceled(result_of(port, self._outcome("canceled")))
         elif goal is not self.goal:
-            if self.port != port:
-                self._end(self._outcome("a newer goal replaced it"))
             self.goal, self.port, self.wanted = goal, port, opening_of(port, goal.request)
             self.attempt = GripAttempt(self.model, self.wanted, self.policy)
             self.at = self.model.opening([one.commanded.position for one in self.joints])

@@ -130,10 +130,14 @@ def test_both_actions_lead_the_same_gripper_and_the_newest_goal_replaces_the_oth
     first = hand.grip(0.09, 0.2)
     second = hand.command(0.02, 0.1)
     assert first[0].outcome is Outcome.ABORTED
-    assert "newer goal" in first[0].result.message
-    third = hand.grip(0.08, 3.0)
+    assert first[0].result.message == "replaced by a newer goal of 'command'"
+    third = hand.grip(0.03, 0.1)
     assert second[0].outcome is Outcome.ABORTED
-    assert third[0].outcome is Outcome.SUCCEEDED
+    assert hand.grip(math.nan, 0.1)[0].outcome is Outcome.REJECTED
+    assert not third
+    fourth = hand.grip(0.08, 3.0)
+    assert third[0].result.message == "replaced by a newer goal of 'grip'"
+    assert fourth[0].outcome is Outcome.SUCCEEDED
     assert hand.opening == pytest.approx(0.08, abs=0.001)
 
 
