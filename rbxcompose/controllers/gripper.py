@@ -298,7 +298,9 @@ class GripperController(Controller[GripperConfig]):
         return max((abs(one.effort) for one in self.joints if math.isfinite(one.effort)), default=0.0)
 
     def _outcome(self, reason: str) -> GripOutcome:
-        return GripOutcome(self._opening(), self._effort(), False, False, False, reason)
+        opening = self._opening()
+        known = opening if math.isfinite(opening) else 0.0  # viewers of results take numbers only
+        return GripOutcome(known, self._effort(), False, False, False, reason)
 
     def _end(self, outcome: GripOutcome | None) -> None:
         goal = self.goal
