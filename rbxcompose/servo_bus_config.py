@@ -137,6 +137,11 @@ class ServoBusConfig(Config):
     """Servos of which controllers use items, by the names of their actuators; they need not drive joints."""
 
     @property
+    def models(self) -> dict[int, str]:
+        """Return the names of the servos' models by id."""
+        return {servo.id: servo.model for joint in self.joints.values() for servo in joint.servos}
+
+    @property
     def lone(self) -> dict[int, ServoModel]:
         """Return the models of servos that drive no joint, by id."""
         driving = {servo.id for joint in self.joints.values() for servo in joint.servos}

@@ -22,7 +22,7 @@ from rbxcompose.actuation.servo_items import ServoItem, set_up
 from rbxcompose.actuation.servo_joint import ServoJoint
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.control.joint_states import Enable, Hold, JointMode, MoveTo
-from rbxcompose.controller_interface import LedJoint, controller_type
+from rbxcompose.controller_interface import controller_type
 from rbxcompose.controller_manager import ControllerManager, ControllerSeat
 from rbxcompose.controller_requests import ControllerState, ListControllers, SwitchControllers
 from rbxcompose.levels import Level
@@ -120,7 +120,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         bus = self.opened([one.joint for one in drives.values()])
         self.cycle = ServoCycle(bus, drives, mimics, config.watchdog, config.thermal.scope == "bus")
         seats = {
-            name: ServoSeat(self, name, {joint: drives[joint] for joint in one.config.led})
+            name: ControllerSeat(self, name, {joint: drives[joint] for joint in one.config.led})
             for name, one in config.controllers.items()
         }
         self.controllers = ControllerManager(
@@ -242,6 +242,12 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Return why a controller may command nothing now, or nothing."""
         is_active = self.controllers.is_active(controller)
         return self.refusal() if is_active else f"controller '{controller}' is not active"
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ServoItem:
+        """Return an item of a servo, which the cycle reads or writes."""
+        found = item_of(self.config, actuator, name, is_read, setup)
+        self.cycle.items.append(found)
+        return found
 
     def received(self, port: str, message: Any) -> None:
         """Pass a message on to its controller, or move one joint unless a controller leads it."""
@@ -389,22 +395,3 @@ class ServoBusDriver(Component[ServoBusConfig]):
         except PortError as error:
             self.warn(f"the joints could not be relaxed: {error}")
         self.at_end.close()
-
-
-class ServoSeat(ControllerSeat):
-    """What a controller uses of a bus of servos."""
-
-    def __init__(self, bus: ServoBusDriver, name: str, joints: Mapping[str, LedJoint]) -> None:
-        super().__init__(bus, name, joints)
-        self._driver = bus
-
-    @property
-    def refusal(self) -> str:
-        """Return why nothing may be commanded now, or nothing."""
-        return self._driver.objection(self._name)
-
-    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ServoItem:
-        """Return an item of a servo, which the cycle reads or writes."""
-        found = item_of(self._driver.config, actuator, name, is_read, setup)
-        self._driver.cycle.items.append(found)
-        return found
