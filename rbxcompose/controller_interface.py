@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Literal, Protocol, Self, TypeVar, get_args
 
@@ -26,6 +27,16 @@ PLUGINS = Plugins("controller", "rbxcompose.controllers")
 _TYPES: dict[str, type[Controller[Any]]] = {}
 
 
+@dataclass(frozen=True, slots=True)
+class UsedItem:
+    """An item of a servo that a controller reads or writes; `field` is where the configuration names it."""
+
+    actuator: str
+    item: str
+    field: str
+    is_written: bool
+
+
 class ControllerConfig(Config):
     """What every controller can be given; a subclass names its joints, by fields of the type `JointName`."""
 
@@ -40,6 +51,11 @@ class ControllerConfig(Config):
     def led(self) -> tuple[str, ...]:
         """Return the joints that it leads."""
         raise NotImplementedError
+
+    @property
+    def used(self) -> tuple[UsedItem, ...]:
+        """Return the items of servos that it uses itself."""
+        return ()
 
     @property
     def dimensions(self) -> dict[str, Dimension]:
@@ -90,6 +106,19 @@ class LedJoint(Protocol):
     def turn(self, velocity: float) -> None:
         """Move with a velocity up to the end of this cycle."""
 
+    def hold(self) -> None:
+        """Come to rest within its limits, and stay there."""
+
+
+class ItemOfServo(Protocol):
+    """An item of a servo as a controller sees it."""
+
+    value: float
+    problem: str
+
+    def write(self, raw: int) -> None:
+        """Write a raw value in one of the next cycles; a newer one replaces it."""
+
 
 class ControllerSite(Protocol):
     """What a controller uses of the component that runs it."""
@@ -105,6 +134,13 @@ class ControllerSite(Protocol):
     @property
     def joints(self) -> Mapping[str, LedJoint]:
         """Return its joints by name."""
+
+    @property
+    def refusal(self) -> str:
+        """Return why nothing may be commanded now; empty if it may."""
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ItemOfServo:
+        """Return an item of a servo; what it needs in other items is written before. Only `prepare` may ask."""
 
     def action(self, port: str) -> ActionServer[Any, Any, Any]:
         """Return the action at one of its ports."""
@@ -159,6 +195,11 @@ class Controller(ABC, Generic[C]):
     def mistake(cls, config: C) -> tuple[str, str] | None:
         """Return the field and the reason, if a configuration cannot work although each of its values can."""
         return None
+
+    @classmethod
+    def asks(cls, config: C) -> Mapping[str, tuple[float, float]]:
+        """Return the least and the greatest position that it may give its joints, as far as the configuration tells."""
+        return {}
 
     def prepare(self) -> None:
         """Set up what it needs."""

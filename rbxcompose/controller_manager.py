@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, Protocol
 
-from rbxcompose.controller_interface import Controller, ControllerConfig, LedJoint
+from rbxcompose.controller_interface import Controller, ControllerConfig, ItemOfServo, LedJoint
 from rbxcompose.sdk.bound import ActionServer, ServedGoal
-from rbxcompose.sdk.component import Component
 
 
 class ControllerManager:
@@ -82,10 +81,33 @@ class ControllerManager:
                 yield f"controller '{name}' is active"
 
 
+class ControllerHost(Protocol):
+    """The component that runs controllers, as their seats see it."""
+
+    bound: dict[str, Any]
+
+    @property
+    def now(self) -> float:
+        """Return robot time [s]."""
+
+    @property
+    def stamp(self) -> int:
+        """Return the time for message headers [ns]."""
+
+    def warn(self, text: str) -> None:
+        """Log something that a person should look at."""
+
+    def objection(self, controller: str) -> str:
+        """Return why a controller may command nothing now, or nothing."""
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ItemOfServo:
+        """Return an item of a servo."""
+
+
 class ControllerSeat:
     """What a controller uses of its bus: see `ControllerSite`."""
 
-    def __init__(self, bus: Component[Any], name: str, joints: Mapping[str, LedJoint]) -> None:
+    def __init__(self, bus: ControllerHost, name: str, joints: Mapping[str, LedJoint]) -> None:
         self._bus, self._name = bus, name
         self.joints = joints
 
@@ -98,6 +120,15 @@ class ControllerSeat:
     def stamp(self) -> int:
         """Return the time for message headers [ns]."""
         return self._bus.stamp
+
+    @property
+    def refusal(self) -> str:
+        """Return why nothing may be commanded now, or nothing."""
+        return self._bus.objection(self._name)
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ItemOfServo:
+        """Return an item of a servo, which the cycle reads or writes."""
+        return self._bus.item(actuator, name, is_read=is_read, setup=setup)
 
     def action(self, port: str) -> ActionServer[Any, Any, Any]:
         """Return the action at one of the controller's ports."""

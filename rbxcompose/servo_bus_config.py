@@ -8,8 +8,9 @@ from typing import Any, Literal
 from rbxcompose.actuation.joint_drive import JointDrive
 from rbxcompose.actuation.position_drive import PositionDrive
 from rbxcompose.actuation.servo_cycle import JointMimic
+from rbxcompose.actuation.servo_items import ServoItem
 from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
-from rbxcompose.actuation.servo_models import model_named
+from rbxcompose.actuation.servo_models import ServoModel, model_named, servo_models
 from rbxcompose.actuation.velocity_drive import VelocityDrive
 from rbxcompose.config import Config
 from rbxcompose.control.calibration import Calibration
@@ -132,11 +133,19 @@ class ServoBusConfig(Config):
     """Joints by name."""
     controllers: dict[str, ControllerSetup] = {}
     """Controllers by name."""
+    used: dict[str, JointServoConfig] = {}
+    """Servos of which controllers use items, by the names of their actuators; they need not drive joints."""
 
     @property
     def models(self) -> dict[int, str]:
         """Return the names of the servos' models by id."""
         return {servo.id: servo.model for joint in self.joints.values() for servo in joint.servos}
+
+    @property
+    def lone(self) -> dict[int, ServoModel]:
+        """Return the models of servos that drive no joint, by id."""
+        driving = {servo.id for joint in self.joints.values() for servo in joint.servos}
+        return {one.id: servo_models()[one.model] for one in self.used.values() if one.id not in driving}
 
     @property
     def policy(self) -> JointPolicy:
@@ -145,6 +154,12 @@ class ServoBusConfig(Config):
         thermal = ThermalPolicy(heat.warn, heat.limit, heat.resume, heat.rest)
         cycle = 1.0 / self.rate
         return JointPolicy(cycle, fault_after=max(0.5, 3 * cycle), on_start=self.on_start, thermal=thermal)
+
+
+def item_of(config: ServoBusConfig, actuator: str, name: str, is_read: bool, setup: Mapping[str, int]) -> ServoItem:
+    """Return an item of a servo that a controller uses."""
+    servo = config.used[actuator]
+    return ServoItem(servo.id, servo_models()[servo.model], name, is_read, setup)
 
 
 def drives_of(config: ServoBusConfig) -> dict[str, JointDrive]:

@@ -14,6 +14,7 @@ from rbxcompose.control.joint_state_machine import step_joint
 from rbxcompose.control.joint_states import (
     WITH_TORQUE,
     BringToRest,
+    Hold,
     JointCondition,
     JointInputs,
     JointMode,
@@ -141,6 +142,10 @@ class JointDrive(ABC):
     def relax(self) -> None:
         """Switch torque off in the next cycle, until the next command."""
         self.ask(Relax())
+
+    def hold(self) -> None:
+        """Come to rest within its limits in the next cycles, and stay there with torque."""
+        self.ask(Hold())
 
     def follow(self, sample: JointSample) -> None:
         """Be at a position at the end of the next cycle, and pass there with its velocity."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -17,6 +18,7 @@ from rbxcompose.actuation.position_drive import PositionDrive
 from rbxcompose.actuation.preparation import prepare, with_torque
 from rbxcompose.actuation.priority import be_prompt
 from rbxcompose.actuation.servo_cycle import ServoCycle
+from rbxcompose.actuation.servo_items import ServoItem, set_up
 from rbxcompose.actuation.servo_joint import ServoJoint
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.control.joint_states import Enable, Hold, JointMode, MoveTo
@@ -33,8 +35,9 @@ from rbxcompose.requests import Refused, answers
 from rbxcompose.sdk import Component, In, Out, Port, Serves, ServesAction, component
 from rbxcompose.sdk.capabilities import Capability, NeedsExtra, OpensPort, Setting, within
 from rbxcompose.sdk.component import Context
-from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, mimics_of
+from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, item_of, mimics_of
 from rbxcompose.twins.fault_script import FaultScript, InjectFault
+from rbxcompose.twins.servo_fake import FakeServo
 from rbxcompose.twins.servo_stage import twin_of, twin_servos
 from rbxcompose.twins.servo_twin import TwinBus
 
@@ -138,6 +141,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
             if config.twin == "pty" and not has_bytes:
                 self.warn("bytes need real time, so servos are simulated without them")
             servos = twin_servos(joints, is_ideal=config.twin == "ideal", noise=config.noise, seed=config.seed)
+            servos |= {f"servo {id_}": [FakeServo(one.name, id_)] for id_, one in config.lone.items()}
             twin = self.at_end.enter_context(twin_of(servos, lambda: self.now, has_bytes=has_bytes))
             self.faults = FaultScript(config.faults.values(), servos, twin)
             if isinstance(twin, TwinBus):
@@ -146,14 +150,15 @@ class ServoBusDriver(Component[ServoBusConfig]):
         from rbxcompose.actuation.dynamixel_bus import DynamixelBus
 
         known = {servo.id: servo.model for joint in joints for servo in joint.servos}
-        bus = DynamixelBus(path, known, baud=self.config.baud, clock=lambda: self.now)
+        bus = DynamixelBus(path, known | config.lone, baud=self.config.baud, clock=lambda: self.now)
         self.at_end.callback(bus.close)
         return bus
 
     def prepare(self) -> None:
         """Set the modes of the servos."""
         joints = [drive.joint for drive in self.cycle.drives.values()]
-        for text in prepare(self.cycle.bus, joints, self.config.watchdog):
+        bus = self.cycle.bus
+        for text in (*prepare(bus, joints, self.config.watchdog), *set_up(self.cycle.items, bus)):
             self.info(text)
 
     def activate(self) -> None:
@@ -206,9 +211,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     def accept(self, controller: str, port: str, goal: Any) -> str:
         """Refuse what moves while the robot is stopped, or its bus has gone; else the controller decides."""
-        if not self.controllers.is_active(controller):
-            return f"controller '{controller}' is not active"
-        return self.refusal() or self.controllers.controllers[controller].accept(port, goal)
+        return self.objection(controller) or self.controllers.controllers[controller].accept(port, goal)
 
     def asked(self, controller: str, port: str, request: Any) -> Any:
         """Pass a request on to a controller."""
@@ -238,11 +241,22 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Return why nothing may move now, or nothing."""
         return "the robot is stopped" if self.is_stopped else GONE if self.lost_at > -math.inf else ""
 
+    def objection(self, controller: str) -> str:
+        """Return why a controller may command nothing now, or nothing."""
+        is_active = self.controllers.is_active(controller)
+        return self.refusal() if is_active else f"controller '{controller}' is not active"
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ServoItem:
+        """Return an item of a servo, which the cycle reads or writes."""
+        found = item_of(self.config, actuator, name, is_read, setup)
+        self.cycle.items.append(found)
+        return found
+
     def received(self, port: str, message: Any) -> None:
         """Pass a message on to its controller, or move one joint unless a controller leads it."""
         if port in self.owners:
             controller, short = self.owners[port]
-            if self.controllers.is_active(controller) and not self.refusal():
+            if not self.objection(controller):
                 self.controllers.controllers[controller].received(short, message)
             return
         name = port.removesuffix("_command")

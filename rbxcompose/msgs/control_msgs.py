@@ -12,6 +12,52 @@ from rbxcompose.msgs import builtin_interfaces, std_msgs, trajectory_msgs, uniqu
 from rbxcompose.msgs.types import Action, Fields, Message, Service
 
 
+@dataclass(frozen=True, slots=True)
+class JointTolerance(Message):
+    """How far a joint may be from where it should be; 0 is the default of the controller, -1 is no limit."""
+
+    TYPE: ClassVar[str] = "control_msgs/msg/JointTolerance"
+    HASH: ClassVar[str] = "RIHS01_c254f9cece0f3b733017b6990fd46d1326e25242d6b8844398c97d9a88e7d648"
+    FIELDS: ClassVar[Fields] = {
+        "name": "string",
+        "position": "float64",
+        "velocity": "float64",
+        "acceleration": "float64",
+    }
+
+    name: str = ""
+    position: float = 0.0  # [rad or m]
+    velocity: float = 0.0  # [rad/s or m/s]
+    acceleration: float = 0.0  # [rad/s^2 or m/s^2]
+
+
+@dataclass(frozen=True, slots=True)
+class JointComponentTolerance(Message):
+    """How far one component of a joint of several degrees of freedom may be from where it should be."""
+
+    TYPE: ClassVar[str] = "control_msgs/msg/JointComponentTolerance"
+    HASH: ClassVar[str] = "RIHS01_739ea7566931944d33830fa10f1bf5e7a7fbdc3172bce7a7eaac642bd6e3ffa4"
+    FIELDS: ClassVar[Fields] = {
+        "joint_name": "string",
+        "component": "uint16",
+        "position": "float64",
+        "velocity": "float64",
+        "acceleration": "float64",
+    }
+
+    X_AXIS: ClassVar[int] = 1
+    Y_AXIS: ClassVar[int] = 2
+    Z_AXIS: ClassVar[int] = 3
+    TRANSLATION: ClassVar[int] = 4
+    ROTATION: ClassVar[int] = 5
+
+    joint_name: str = ""
+    component: int = 0
+    position: float = 0.0
+    velocity: float = 0.0
+    acceleration: float = 0.0
+
+
 class FollowJointTrajectory(Action["FollowJointTrajectory.Goal", "FollowJointTrajectory.Result", "FollowJointTrajectory.Feedback"]):
     """Move joints along a trajectory."""
 
@@ -172,6 +218,156 @@ class FollowJointTrajectory(Action["FollowJointTrajectory.Goal", "FollowJointTra
         feedback: FollowJointTrajectory.Feedback = field(default_factory=lambda: FollowJointTrajectory.Feedback())
 
 
+@dataclass(frozen=True, slots=True)
+class GripperCommandMessage(Message):
+    """The message `control_msgs/msg/GripperCommand`."""
+
+    TYPE: ClassVar[str] = "control_msgs/msg/GripperCommand"
+    HASH: ClassVar[str] = "RIHS01_57eb8f326c9889ca8bb34ead82cc94cc09bf6bc5c3b6c09546dca3a00b589890"
+    FIELDS: ClassVar[Fields] = {
+        "position": "float64",
+        "max_effort": "float64",
+    }
+
+    position: float = 0.0
+    max_effort: float = 0.0
+
+
+class GripperCommand(Action["GripperCommand.Goal", "GripperCommand.Result", "GripperCommand.Feedback"]):
+    """The action `control_msgs/action/GripperCommand`."""
+
+    TYPE: ClassVar[str] = "control_msgs/action/GripperCommand"
+    HASH: ClassVar[str] = "RIHS01_e17c0e644eccf14bea84a0a93e0977182872c2eb7873ca6694900059b46dbc84"
+
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `GripperCommand`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_Goal"
+        HASH: ClassVar[str] = "RIHS01_607d9f41eb241e1922e90f02125e87ae6bfb78f7f64a71dc92630263d01f8b6d"
+        FIELDS: ClassVar[Fields] = {
+            "command": "control_msgs/msg/GripperCommand",
+        }
+
+        command: GripperCommandMessage = field(default_factory=GripperCommandMessage)
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `GripperCommand`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_Result"
+        HASH: ClassVar[str] = "RIHS01_bf512d5aa6a0e4fe4d8be22b2ec4a1973c3d250fa1f65e47450322c25c45c0a0"
+        FIELDS: ClassVar[Fields] = {
+            "position": "float64",
+            "effort": "float64",
+            "stalled": "bool",
+            "reached_goal": "bool",
+        }
+
+        position: float = 0.0
+        effort: float = 0.0
+        stalled: bool = False
+        reached_goal: bool = False
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `GripperCommand`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_Feedback"
+        HASH: ClassVar[str] = "RIHS01_8f7c520077bab528bb9161ee3b83c81eee1f8aecadb8922ce82c79d667a819c4"
+        FIELDS: ClassVar[Fields] = {
+            "position": "float64",
+            "effort": "float64",
+            "stalled": "bool",
+            "reached_goal": "bool",
+        }
+
+        position: float = 0.0
+        effort: float = 0.0
+        stalled: bool = False
+        reached_goal: bool = False
+
+    class SendGoal(Service["GripperCommand.SendGoal.Request", "GripperCommand.SendGoal.Response"]):
+        """Sends a goal of `GripperCommand`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_6bf8cc4ce80cd499e7dd3258c03c50c3fa6672b469ff8355339ef1df77fcd212"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `GripperCommand.SendGoal`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_1b869b7b4042272dc0f8ed65468c4e57c9e532ea5e53ce74fda0767eefbfa983"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "control_msgs/action/GripperCommand_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: GripperCommand.Goal = field(default_factory=lambda: GripperCommand.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `GripperCommand.SendGoal`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_0c8dda5e9d39ab5e3162b66e79b292a4258659ddfcf8722d39463f718b6c59bc"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["GripperCommand.GetResult.Request", "GripperCommand.GetResult.Response"]):
+        """Waits for the result of a goal of `GripperCommand`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_GetResult"
+        HASH: ClassVar[str] = "RIHS01_7e60a7606063d4a2728d21badac099e68b734a196ac3ab42d1d4c668eb0bb3cd"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `GripperCommand.GetResult`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_1a3308da3acbc62cd8a3c823de80ba9e5f9b6bb6f6056d1ad6b29f5f285f97ae"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `GripperCommand.GetResult`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_32ed5e1b5906767a3e9914dca4c4aed22529918f6c2360e6fb382363d4df4b45"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "control_msgs/action/GripperCommand_Result",
+            }
+
+            status: int = 0
+            result: GripperCommand.Result = field(default_factory=lambda: GripperCommand.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `GripperCommand` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_392ff03fcd872f9dc2405cbeb2897fcf011ad9998458b6aa85c603b8a49e431d"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "control_msgs/action/GripperCommand_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: GripperCommand.Feedback = field(default_factory=lambda: GripperCommand.Feedback())
+
+
 class SingleJointPosition(Action["SingleJointPosition.Goal", "SingleJointPosition.Result", "SingleJointPosition.Feedback"]):
     """Move a single joint to a position."""
 
@@ -299,49 +495,3 @@ class SingleJointPosition(Action["SingleJointPosition.Goal", "SingleJointPositio
 
         goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
         feedback: SingleJointPosition.Feedback = field(default_factory=lambda: SingleJointPosition.Feedback())
-
-
-@dataclass(frozen=True, slots=True)
-class JointComponentTolerance(Message):
-    """How far one component of a joint of several degrees of freedom may be from where it should be."""
-
-    TYPE: ClassVar[str] = "control_msgs/msg/JointComponentTolerance"
-    HASH: ClassVar[str] = "RIHS01_739ea7566931944d33830fa10f1bf5e7a7fbdc3172bce7a7eaac642bd6e3ffa4"
-    FIELDS: ClassVar[Fields] = {
-        "joint_name": "string",
-        "component": "uint16",
-        "position": "float64",
-        "velocity": "float64",
-        "acceleration": "float64",
-    }
-
-    X_AXIS: ClassVar[int] = 1
-    Y_AXIS: ClassVar[int] = 2
-    Z_AXIS: ClassVar[int] = 3
-    TRANSLATION: ClassVar[int] = 4
-    ROTATION: ClassVar[int] = 5
-
-    joint_name: str = ""
-    component: int = 0
-    position: float = 0.0
-    velocity: float = 0.0
-    acceleration: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class JointTolerance(Message):
-    """How far a joint may be from where it should be; 0 is the default of the controller, -1 is no limit."""
-
-    TYPE: ClassVar[str] = "control_msgs/msg/JointTolerance"
-    HASH: ClassVar[str] = "RIHS01_c254f9cece0f3b733017b6990fd46d1326e25242d6b8844398c97d9a88e7d648"
-    FIELDS: ClassVar[Fields] = {
-        "name": "string",
-        "position": "float64",
-        "velocity": "float64",
-        "acceleration": "float64",
-    }
-
-    name: str = ""
-    position: float = 0.0  # [rad or m]
-    velocity: float = 0.0  # [rad/s or m/s]
-    acceleration: float = 0.0  # [rad/s^2 or m/s^2]

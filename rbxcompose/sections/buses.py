@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -23,7 +23,7 @@ from rbxcompose.sections.body import body
 from rbxcompose.sections.controllers import controllers
 from rbxcompose.sections.devices import port_name
 from rbxcompose.sections.faults import buses_of_joints, faults_of
-from rbxcompose.sections.joints import JointModel, joints, table_of
+from rbxcompose.sections.joints import JointModel, bounds_of, joints, table_of, tighter
 from rbxcompose.sections.safety import safety
 from rbxcompose.units import Quantity
 
@@ -64,9 +64,10 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
     places = buses_of_joints(contents)
     for name, bus in contents.of(buses).items():
         own = {joint: one for joint, one in driven.items() if places.get(joint) == name}
-        if not own:
+        led = {key: one for key, one in contents.of(controllers).items() if _is_led(one, own, servos, name)}
+        used = {item.actuator: _servo(servos[item.actuator]) for one in led.values() for item in one.used}
+        if not own and not used:
             continue
-        led = {key: one for key, one in contents.of(controllers).items() if set(one.led) <= own.keys()}
         config = {
             "name": name,
             "port": port_name(contents, bus.port),
@@ -95,6 +96,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
                 }
                 for key, one in led.items()
             },
+            "used": used,
         }
         yield WantedComponent(name, "servo_bus", config, ("buses", name), places=_places(led))
 
@@ -113,24 +115,33 @@ def _places(led: Mapping[str, ControllerConfig]) -> dict[str, KeyPath]:
     return found
 
 
+def _is_led(
+    one: ControllerConfig, joints: Mapping[str, JointModel], servos: Mapping[str, ActuatorModel], bus: str
+) -> bool:
+    """Return whether all that a controller leads and uses is on a bus."""
+    places = [item.actuator in servos and servos[item.actuator].bus == bus for item in one.used]
+    return set(one.led) <= joints.keys() and all(places) and bool(one.led or places)
+
+
+def _servo(one: ActuatorModel) -> dict[str, object]:
+    return {"id": one.id, "model": one.model, "neutral": one.neutral, "invert": one.invert}
+
+
 def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorModel]) -> dict[str, object]:
     """Return how a joint is driven, within the limits of the body."""
-    limits = driven.limits
-    least, greatest = [one.value for one in limits.position] if limits.position else (None, None)
-    is_continuous = joint is not None and joint.kind == "continuous"
-    outer = joint.limits if joint else None
-    is_bounded = outer is not None and not is_continuous
+    limits, outer = driven.limits, joint.limits if joint else None
+    lower, upper = bounds_of(joint, driven)
     mimic = joint.mimic if joint else None
     return {
-        "servos": [{"id": one.id, "model": one.model, "neutral": one.neutral, "invert": one.invert} for one in servos],
+        "servos": [_servo(one) for one in servos],
         "mode": servos[0].mode,
         "ratio": math.tau / driven.travel if driven.travel else driven.ratio,
         "offset": driven.offset,
         "calibration": table_of(driven),
-        "is_continuous": is_continuous,
-        "lower": _tighter(max, outer.lower if outer and is_bounded else None, least),
-        "upper": _tighter(min, outer.upper if outer and is_bounded else None, greatest),
-        "velocity": _tighter(min, outer.velocity if outer else None, _value(limits.velocity)),
+        "is_continuous": joint is not None and joint.kind == "continuous",
+        "lower": lower,
+        "upper": upper,
+        "velocity": tighter(min, outer.velocity if outer else None, _value(limits.velocity)),
         "acceleration": _value(limits.acceleration),
         "mimic": mimic.joint if mimic else "",
         "multiplier": mimic.multiplier if mimic else 1.0,
@@ -140,10 +151,6 @@ def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorMod
 
 def _value(quantity: Quantity | None) -> float | None:
     return None if quantity is None else quantity.value
-
-
-def _tighter(pick: Callable[[float, float], float], outer: float | None, inner: float | None) -> float | None:
-    return pick(outer, inner) if outer is not None and inner is not None else outer if inner is None else inner
 
 
 @section(

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
+from rbxcompose.actuation.control_tables import OUTPUTS
 from rbxcompose.actuation.servo_models import model_named
+from rbxcompose.body.model import BodyJoint
 from rbxcompose.config import Config
 from rbxcompose.controller_interface import ControllerConfig, controller_names, controller_type
 from rbxcompose.findings import Finding, Related, Span, kind
@@ -17,7 +19,7 @@ from rbxcompose.plugins import BROKEN, BrokenPluginError
 from rbxcompose.references import CONTROLLER
 from rbxcompose.sections.actuators import actuators
 from rbxcompose.sections.body import body
-from rbxcompose.sections.joints import joints
+from rbxcompose.sections.joints import bounds_of, joints
 
 NOT_DRIVEN = kind(
     "RBX2215",
@@ -82,6 +84,29 @@ slides: its joint is `prismatic`.
 Bad: `wheels: {type: diff_drive, left: left_wheel, ...}`, where `left_wheel` has `type="revolute"`.
 Good: the same, where the URDF has `<joint name="left_wheel" type="continuous">`.
 """,
+)
+BEYOND_LIMITS = kind(
+    "RBX2290",
+    """A controller asks for positions that its joint does not reach
+
+The joint would stop at its limit, and what the controller wants would never be done. The limits are those of the body,
+and those under `joints:`, which can only be tighter. Angles of a gripper follow from its `opening` and its fingers.
+
+Bad: `hand: {type: gripper, ..., opening: [0 cm, 9 cm]}`, for which the finger would turn farther than its `upper`.
+Good: `hand: {type: gripper, ..., opening: [0 cm, 5 cm]}`
+""",
+)
+NO_ITEM = kind(
+    "RBX2291",
+    """A servo has no such item
+
+The model of a servo decides which items its memory has: a light, and ports for sensors in some models. Only what moves
+nothing can be switched by a controller; everything can be read.
+
+Bad: `lamp: {type: gpio, actuator: pan_servo, item: lde, direction: out}`
+Good: `lamp: {type: gpio, actuator: pan_servo, item: led, direction: out}`
+""",
+    is_fixable=True,
 )
 
 
@@ -172,6 +197,9 @@ def _mistakes(
     if (mistake := cls.mistake(one)) is not None:
         field, reason = mistake
         yield CANNOT_WORK.at(key_span(root, ("controllers", name, field)), f"controller '{name}': {reason}")
+    else:
+        yield from _beyond(reading, name, one)
+        yield from _unknown_items(reading, name, one)
     for joint in one.led if one.start == "active" else ():
         other, span = owners.setdefault(joint, (name, here))
         if other != name:
@@ -233,6 +261,45 @@ def _blind(reading: Reading[ControllerConfig], name: str, one: ControllerConfig)
             yield NO_WHOLE_TURN.at(span, message, help=help_text, related=[here])
 
 
+def _beyond(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield findings on joints that the controller would move beyond their limits."""
+    driven, description = reading.contents.of(joints), reading.contents.of(body)
+    known = description.body.joints if description else {}
+    for joint, (least, greatest) in controller_type(one.type).asks(one).items():
+        if joint not in driven:
+            continue
+        lower, upper = bounds_of(known.get(joint), driven[joint])
+        is_below = lower is not None and least < lower - _ROUNDING
+        is_above = upper is not None and greatest > upper + _ROUNDING
+        if is_below or is_above:
+            show = _shown(known.get(joint))
+            message = f"the controller '{name}' moves '{joint}' from {show(least)} to {show(greatest)}"
+            limits = " to ".join("any" if end is None else show(end) for end in (lower, upper))
+            yield BEYOND_LIMITS.at(_place(reading, name, joint), f"{message}, beyond its limits: {limits}")
+
+
+def _unknown_items(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield findings on items that the model of a servo lacks, or that may not be switched."""
+    servos = reading.contents.of(actuators)
+    for used in one.used:
+        model = model_named(servos[used.actuator].model) if used.actuator in servos else None
+        valid = [item for item in model.items if item in OUTPUTS or not used.is_written] if model else []
+        if model is not None and used.item not in valid:
+            span = value_span(reading.contents.root, ("controllers", name, used.field))
+            is_there = used.item in model.items
+            message = f"'{used.item}' cannot be switched" if is_there else f"{model.name} has no item '{used.item}'"
+            what = "items that can be switched" if used.is_written else "its items"
+            yield NO_ITEM.misspelt(span, message, used.item, valid, what)
+
+
+def _shown(joint: BodyJoint | None) -> Callable[[float], str]:
+    """Return how positions of a joint are written."""
+    if joint is not None and joint.kind == "prismatic":
+        return lambda position: f"{position:.4g} m"
+    return lambda position: f"{math.degrees(position):.4g} deg"
+
+
+_ROUNDING = 1e-4  # [rad or m], less than a tick
 _PLURAL = {"position": "positions", "velocity": "velocities"}
 
 

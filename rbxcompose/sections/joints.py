@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any
 
 from pydantic import PlainValidator, WithJsonSchema
@@ -216,3 +216,18 @@ def _no_table(one: JointModel) -> str:
 def table_of(one: JointModel) -> tuple[tuple[float, float], ...]:
     """Return the calibration: angles of the servo and positions of the joint, in SI."""
     return tuple(sorted((point.servo, point.joint.value) for point in one.calibration))
+
+
+def bounds_of(joint: BodyJoint | None, driven: JointModel) -> tuple[float | None, float | None]:
+    """Return the least and the greatest position: the tighter ones of the body and of what is written here."""
+    inner = driven.limits.position
+    outer = joint.limits if joint is not None and joint.kind != "continuous" else None
+    return (
+        tighter(max, outer.lower if outer else None, inner[0].value if inner else None),
+        tighter(min, outer.upper if outer else None, inner[1].value if inner else None),
+    )
+
+
+def tighter(pick: Callable[[float, float], float], outer: float | None, inner: float | None) -> float | None:
+    """Return the limit that `pick` prefers, None if there is none."""
+    return pick(outer, inner) if outer is not None and inner is not None else outer if inner is None else inner

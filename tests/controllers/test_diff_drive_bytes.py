@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ class Site:
     """A bus as a controller sees it, without messages."""
 
     stamp = 0
+    refusal = ""
 
     def __init__(self, joints: Any) -> None:
         self.joints, self.told = joints, list[str]()
@@ -37,6 +39,9 @@ class Site:
     @property
     def now(self) -> float:
         return time.monotonic()
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> Any:
+        raise AssertionError(name)
 
     def action(self, port: str) -> Any:
         raise AssertionError(port)

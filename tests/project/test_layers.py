@@ -85,8 +85,8 @@ ABOVE = {
     "scaffold": "actuation.servo_models composition missions sdk",
     "schema": "controller_interface missions sdk sections",
     "sdk": "",
-    "sections": "actuation.serial_ports actuation.servo_models body control.calibration controller_interface sdk "
-    "twins.servo_faults",
+    "sections": "actuation.control_tables actuation.serial_ports actuation.servo_models body control.calibration "
+    "controller_interface sdk twins.servo_faults",
     "servo_bus_config": "actuation control controller_interface twins.fault_script",
     "sim": "",
     "skills": "sdk",
@@ -100,7 +100,7 @@ TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
 }
-TYPE_CHECKING_BLOCKS = 12
+TYPE_CHECKING_BLOCKS = 13
 
 
 def imports(path: Path) -> set[str]:
