@@ -18,6 +18,10 @@ from rbxcompose.control.joint_states import JointPolicy, ThermalPolicy
 from rbxcompose.control.limits import MotionLimits
 from rbxcompose.control.transmission import Gear, Measured
 from rbxcompose.controller_interface import ControllerConfig, controller_type
+from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
+from rbxcompose.msgs.std_msgs import Float64
+from rbxcompose.msgs.std_srvs import SetBool, Trigger
+from rbxcompose.sdk.ports import In, Port, Serves
 from rbxcompose.twins.fault_script import TwinFault
 
 
@@ -154,6 +158,22 @@ class ServoBusConfig(Config):
         thermal = ThermalPolicy(heat.warn, heat.limit, heat.resume, heat.rest)
         cycle = 1.0 / self.rate
         return JointPolicy(cycle, fault_after=max(0.5, 3 * cycle), on_start=self.on_start, thermal=thermal)
+
+
+def joint_ports(config: ServoBusConfig) -> dict[str, Port[Any]]:
+    """Return the ports of each joint and those for all, by name."""
+    found: dict[str, Port[Any]] = {
+        "relax_all": Serves(Trigger, f"{config.name}/relax_all"),
+        "enable_all": Serves(SetBool, f"{config.name}/enable_all"),
+    }
+    for name, one in config.joints.items():
+        if one.mode == "position" and not one.mimic:
+            found[f"{name}_command"] = In(Float64, f"{name}/command", qos="command", is_open=True)
+            found[f"{name}_set_speed"] = Serves(SetSpeed, f"{name}/set_speed")
+        found[f"{name}_relax"] = Serves(Trigger, f"{name}/relax")
+        found[f"{name}_enable"] = Serves(SetBool, f"{name}/enable")
+        found[f"{name}_reboot"] = Serves(Trigger, f"{name}/reboot", skill=f"reboot_{name}")
+    return found
 
 
 def item_of(config: ServoBusConfig, actuator: str, name: str, is_read: bool, setup: Mapping[str, int]) -> ServoItem:

@@ -25,7 +25,7 @@ from rbxcompose.msgs.entries import ArrayEntries
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Command, Query, Refused, answers
 from rbxcompose.robot_events import MissionOver, MissionWaits
-from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal, ServedGoal
+from rbxcompose.sdk.bound import Ended, Later, Outcome, Reply, SentGoal, ServedGoal
 from rbxcompose.sdk.capabilities import (
     Capability,
     Charges,
@@ -68,6 +68,7 @@ __all__ = [
     "Frequency",
     "In",
     "JointName",
+    "Later",
     "Length",
     "Level",
     "LinkName",

@@ -59,7 +59,7 @@ ABOVE = {
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
     "components": "actuation body control controller_interface controller_manager controller_requests diagnostics "
-    "executive missions mux.core navigation.go_to sdk servo_bus_config sim twins",
+    "executive missions mux.core navigation.go_to sdk servo_bus_config servo_bus_line sim twins.fault_script",
     "composition": "body.description sections",
     "control": "",
     "diagnostics": "",
@@ -87,7 +87,8 @@ ABOVE = {
     "sdk": "",
     "sections": "actuation.control_tables actuation.serial_ports actuation.servo_models body control.calibration "
     "controller_interface sdk twins.servo_faults",
-    "servo_bus_config": "actuation control controller_interface twins.fault_script",
+    "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",
+    "servo_bus_line": "actuation servo_bus_config twins",
     "sim": "",
     "skills": "sdk",
     "twins": "actuation",
