@@ -36,6 +36,8 @@ class JointServoConfig(Config):
     """The tick at angle 0; without it the middle of its range."""
     invert: bool = False
     """Whether it turns the other way round than the joint."""
+    torque: float = 1.0
+    """Share of its torque that it may use."""
 
 
 class DrivenJointConfig(Config):
@@ -212,4 +214,4 @@ def _servo(config: JointServoConfig) -> JointServo:
     if model is None:
         raise ValueError(f"no servo is called '{config.model}'")
     neutral = model.family.centre if config.neutral is None else config.neutral
-    return JointServo(config.id, model, neutral, config.invert)
+    return JointServo(config.id, model, neutral, config.invert, config.torque)

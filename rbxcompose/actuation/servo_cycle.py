@@ -9,14 +9,16 @@ from typing import Protocol
 
 from rbxcompose.actuation.bus import ServoBus
 from rbxcompose.actuation.joint_drive import JointDrive, Writes
-from rbxcompose.actuation.preparation import arm, has_fired
+from rbxcompose.actuation.preparation import arm, has_fired, is_unarmed
 from rbxcompose.actuation.servo_items import ServoItem, use_next
+from rbxcompose.actuation.servo_joint import JointServo
+from rbxcompose.actuation.torque_limits import TorqueLimits
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.joint_states import Relax
 
 FAST = ("present_position", "present_speed", "present_load")
 SLOW = ("present_temperature", "present_voltage")
-RARE = ("hardware_error", "bus_watchdog")  # of models that have them
+RARE = ("hardware_error", "bus_watchdog", "torque_limit")  # of models that have them
 
 
 class Leader(Protocol):
@@ -48,6 +50,10 @@ class ServoCycle:
     """Whether all joints rest when one is too hot."""
     items: list[ServoItem] = field(default_factory=list)
     """Items of servos that controllers use themselves."""
+    torques: TorqueLimits = field(default_factory=TorqueLimits)
+    """The torque limits of the servos."""
+    notes: list[str] = field(default_factory=list)
+    """What has happened to servos, for people; whoever tells it clears it."""
     _turn: int = 0  # whose slow items are read next
 
     @property
@@ -98,9 +104,16 @@ class ServoCycle:
         items = [*SLOW, *(name for name in RARE if name in drives[id_].joint.servo(id_).model.items)]
         if (slow := self.bus.read([id_], items).get(id_)) is not None:
             drives[id_].take(id_, slow)
-            if has_fired(slow.values):
-                drives[id_].was_cut()
-                arm(self.bus, drives[id_].joint.servo(id_), self.watchdog)
+            self._care(drives[id_], drives[id_].joint.servo(id_), slow.values)
+
+    def _care(self, drive: JointDrive, servo: JointServo, values: Mapping[str, int]) -> None:
+        """Give a servo back what it has forgotten without its supply, and arm a watchdog that has stopped it."""
+        if has_fired(values):
+            drive.was_cut()
+        if has_fired(values) or is_unarmed(values):
+            arm(self.bus, servo, self.watchdog)
+        if not (drive.hindrance or drive.error) and (note := self.torques.keep(self.bus, servo, values)):
+            self.notes.append(note)
 
     def _mimic(self) -> None:
         """Let joints follow those which they mimic, with and without torque."""

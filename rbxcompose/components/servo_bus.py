@@ -135,6 +135,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
         bus, joints = self.cycle.bus, [drive.joint for drive in drives or self.cycle.drives.values()]
         for text in (*prepare(bus, joints, self.config.watchdog), *set_up(self.cycle.items, bus)):
             self.info(text)
+        for servo in (servo for joint in joints for servo in joint.servos):
+            self.cycle.torques.write(bus, servo)
 
     def activate(self) -> None:
         """Begin the cycles; torque that an earlier driver has left on is kept if that is what the end is to be."""
@@ -179,6 +181,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.periods.begin(self.now)
         self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.leading)
         self.reboots.step(self.now)
+        while self.cycle.notes:
+            self.info(self.cycle.notes.pop(0))
         if self.now - self.published_at >= 1 / PUBLISHED - 1e-9:
             self.published_at = self.now
             self.publish()

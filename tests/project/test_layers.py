@@ -49,7 +49,8 @@ ABOVE = {
     "body": "",
     "bus": "sdk.bound",
     "check_runner": "missions.analysis model.robot",
-    "checks": "body.model check_runner composition diagnostics.core missions model sdk sections",
+    "checks": "actuation.servo_models actuation.torques body.model check_runner composition "
+    "diagnostics.core missions model sdk sections",
     "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
     "importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "
     "scaffold schema.documents sdk sections",
@@ -85,8 +86,8 @@ ABOVE = {
     "scaffold": "actuation.servo_models composition missions sdk",
     "schema": "controller_interface missions sdk sections",
     "sdk": "",
-    "sections": "actuation.control_tables actuation.serial_ports actuation.servo_models body control.calibration "
-    "controller_interface sdk twins.servo_faults",
+    "sections": "actuation.control_tables actuation.serial_ports actuation.servo_models actuation.torques body "
+    "control.calibration controller_interface sdk twins.servo_faults",
     "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",
     "servo_bus_line": "actuation servo_bus_config twins",
     "sim": "",
