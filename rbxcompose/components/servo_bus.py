@@ -356,7 +356,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         for controller in self.controllers.active:
             controller.halt(self.now, reason)
         for drive in self.cycle.drives.values():
-            if drive.mode is JointMode.ACTIVE:
+            if drive.mode is JointMode.ACTIVE and drive.has_torque:
                 drive.ask(Hold())
 
     @property
