@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from rbxcompose.actuation.bus import ServoReading
 from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
@@ -132,6 +133,16 @@ class JointDrive(ABC):
         if servo.model.protocol == 2:
             return raw
         return last + (raw - last + count // 2) % count - count // 2
+
+    def slow_down(self, fastest: float) -> bool:
+        """Move with this speed at most [rad/s or m/s]; return whether that is slower than before."""
+        if fastest >= self.joint.limits.speed:
+            return False
+        limits = replace(self.joint.limits, velocity=fastest)
+        self.joint, self.rules = replace(self.joint, limits=limits), replace(self.rules, limits=limits)
+        if self.limiter is not None:
+            self.limiter.limits = limits
+        return True
 
     def was_cut(self) -> None:
         """Go on from where the joint is: a servo has stopped by itself, since the bus was silent for too long."""

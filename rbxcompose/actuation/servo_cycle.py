@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import Protocol
@@ -12,6 +12,7 @@ from rbxcompose.actuation.joint_drive import JointDrive, Writes
 from rbxcompose.actuation.preparation import arm, has_fired, is_unarmed
 from rbxcompose.actuation.servo_items import ServoItem, use_next
 from rbxcompose.actuation.servo_joint import JointServo
+from rbxcompose.actuation.speed_limits import keep_speeds
 from rbxcompose.actuation.torque_limits import TorqueLimits
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.joint_states import Relax
@@ -79,6 +80,17 @@ class ServoCycle:
                 drive.temperature = warmest
         self._write([drive.step(now, dt) for drive in self.drives.values()])
         use_next(self.items, self.bus, now)
+
+    def limit(self, drives: Iterable[JointDrive]) -> Iterator[str]:
+        """Write the torque limits of servos, and keep to the speeds that they take; yield what is slower now.
+
+        Raises:
+            PortError: if the bus has gone.
+        """
+        for drive in drives:
+            for servo in drive.joint.servos:
+                self.torques.write(self.bus, servo)
+            yield from keep_speeds(self.bus, drive)
 
     def relax(self, now: float, dt: float) -> None:
         """Switch all torque off, twice, since nobody confirms a group write."""

@@ -132,11 +132,10 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     def prepare(self, *drives: JointDrive) -> None:
         """Set the modes of the servos of some joints, or of all, and of those that controllers use."""
-        bus, joints = self.cycle.bus, [drive.joint for drive in drives or self.cycle.drives.values()]
-        for text in (*prepare(bus, joints, self.config.watchdog), *set_up(self.cycle.items, bus)):
+        bus, drives = self.cycle.bus, drives or tuple(self.cycle.drives.values())
+        changed = prepare(bus, [drive.joint for drive in drives], self.config.watchdog)
+        for text in (*changed, *self.cycle.limit(drives), *set_up(self.cycle.items, bus)):
             self.info(text)
-        for servo in (servo for joint in joints for servo in joint.servos):
-            self.cycle.torques.write(bus, servo)
 
     def activate(self) -> None:
         """Begin the cycles; torque that an earlier driver has left on is kept if that is what the end is to be."""

@@ -204,6 +204,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
     def received(self, port: str, message: geometry.Twist) -> None:
         """Take a command; forwards and the turn count."""
         before = self.drive.clamped
+        self.drive.wheel_speed = min(wheel.rules.limits.speed for wheel in self.wheels)  # servos may take less
         refusal = self.drive.command(Velocity2(message.linear.x, message.angular.z), self.site.now)
         cut = "commands are cut to its limits" if self.drive.clamped > before else ""
         self.refused = f"a command was refused: {refusal}" if refusal else cut

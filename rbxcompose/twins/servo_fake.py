@@ -86,6 +86,8 @@ class FakeServo:
         first |= {"shutdown": _SHUTDOWN[self.model.protocol]}
         first |= dict.fromkeys(("max_torque", "torque_limit"), self.model.to_raw("torque_limit", 1.0))
         first |= {"min_position": 0, "max_position": family.ticks - 1, "goal_position": family.centre}
+        if "velocity_limit" in self.model.items:
+            first["velocity_limit"] = self.model.to_raw("velocity_limit", FASTEST)
         if family.table == "P":
             first |= {"min_position": -family.ticks // 2, "max_position": family.ticks // 2}
         if family.modes:
@@ -286,6 +288,8 @@ class FakeServo:
             return _FAILED
         if item.name == "torque_limit" and self.model.protocol == 2 and abs(raw) > self.get("max_torque"):
             return _LIMIT
+        if item.name in ("goal_velocity", "goal_speed") and "velocity_limit" in self.model.items:
+            return _LIMIT if abs(raw) > self.get("velocity_limit") else _RIGHT
         return _LIMIT if item.name == "goal_position" and not self._is_within(raw) else _RIGHT
 
     def _is_kept(self, item: ControlItem) -> bool:

@@ -58,6 +58,18 @@ def test_the_driver_of_the_book_would_be_wrong_by_centimetres() -> None:
     assert way_of_arbotix(ways).distance(Pose2(radius, radius)) == pytest.approx(0.063, abs=0.02)
 
 
+def test_a_base_whose_servos_take_less_speed_is_slower_on_the_same_curve() -> None:
+    rover, (radius, speed) = Rover(max_speed=1.0), QUARTER
+    for servo in rover.servos:
+        servo.set("velocity_limit", 120)
+    rover.driver.prepare()
+    rover.drive(3 * speed, 3 * speed / radius, 3.0)
+    left, right = rover.speeds[-1]
+    assert right == pytest.approx(120 * UNIT, abs=UNIT)
+    assert (right + left) / (right - left) * DISTANCE / 2 == pytest.approx(radius, abs=0.02)
+    assert any("turns at most 2.88 rad/s" in text for text in rover.bench.texts())
+
+
 def test_what_it_tells_has_covariances_and_frames() -> None:
     rover = Rover()
     frames = rover.bench.collect("/tf", TFMessage)
