@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 REAL_TIME = (
+    "tests/actuation/test_bus_load",
     "tests/actuation/test_dynamixel_bus",
     "tests/actuation/test_recovery",
     "tests/cli/test_servo",

@@ -10,12 +10,18 @@ from typing import Protocol
 from rbxcompose.actuation.bus import ServoBus
 from rbxcompose.actuation.joint_drive import JointDrive, Writes
 from rbxcompose.actuation.preparation import arm, has_fired
+from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.joint_states import Relax
 
 FAST = ("present_position", "present_speed", "present_load")
 SLOW = ("present_temperature", "present_voltage")
 RARE = ("hardware_error", "bus_watchdog")  # of models that have them
+
+
+def slow_items(model: ServoModel) -> list[str]:
+    """Return what is read of one servo in each cycle."""
+    return [*SLOW, *(name for name in RARE if name in model.items)]
 
 
 class Leader(Protocol):
@@ -89,7 +95,7 @@ class ServoCycle:
             drives[id_].take(id_, reading)
         id_ = list(drives)[self._turn % len(drives)]
         self._turn += 1
-        items = [*SLOW, *(name for name in RARE if name in drives[id_].joint.servo(id_).model.items)]
+        items = slow_items(drives[id_].joint.servo(id_).model)
         if (slow := self.bus.read([id_], items).get(id_)) is not None:
             drives[id_].take(id_, slow)
             if has_fired(slow.values):
