@@ -108,6 +108,8 @@ class ServoBusConfig(Config):
     """Cycles per second."""
     watchdog: float = 0.2
     """Silence of the bus after which servos stop by themselves, if they can [s]; 0 is never."""
+    return_delay: float | None = None
+    """Pause of servos before each reply, which is written into them [s]; None leaves theirs."""
     twin: Literal["", "ideal", "servo", "pty"] = ""
     """How its servos are simulated, if they are."""
     noise: float = 0.0

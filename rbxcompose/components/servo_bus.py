@@ -147,7 +147,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
     def prepare(self) -> None:
         """Set the modes of the servos."""
         joints = [drive.joint for drive in self.cycle.drives.values()]
-        for text in prepare(self.cycle.bus, joints, self.config.watchdog):
+        for text in prepare(self.cycle.bus, joints, self.config.watchdog, self.config.return_delay):
             self.info(text)
 
     def activate(self) -> None:

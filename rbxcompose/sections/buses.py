@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.config import Angle, BitRate, Config, Frequency, Time
+from rbxcompose.control.limits import MotionLimits
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, SetScope
 from rbxcompose.manifest.tree import key_span
@@ -22,9 +23,8 @@ from rbxcompose.sections.body import body
 from rbxcompose.sections.controllers import controllers
 from rbxcompose.sections.devices import port_name
 from rbxcompose.sections.faults import buses_of_joints, faults_of
-from rbxcompose.sections.joints import JointModel, joints, table_of
+from rbxcompose.sections.joints import JointModel, joints, limits_of, table_of
 from rbxcompose.sections.safety import safety
-from rbxcompose.units import Quantity
 
 
 class TwinModel(Config):
@@ -49,6 +49,9 @@ class BusOfServosModel(Config):
     """How often all joints are read and written."""
     watchdog: Time = Field(0.2, ge=0)
     """Silence after which servos stop by themselves, if their model can; 0 is never."""
+    return_delay: Time | None = Field(None, ge=0, le=254 * 2e-6)
+    """Pause of servos before each reply, which is written into them; without it theirs stays: 500 us as they are sold.
+    """
     sim: Literal["ideal", "servo", "pty"] = "servo"
     """How true simulated servos are: `ideal` ones are at their goals at once, `servo` has motors; with `pty` they also
     answer by bytes on a pseudo-terminal, through the driver of real ones."""
@@ -71,6 +74,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             "baud": round(bus.baud),
             "rate": bus.rate,
             "watchdog": bus.watchdog,
+            "return_delay": bus.return_delay,
             "twin": bus.sim if contents.is_simulated else "",
             "noise": bus.twin.noise,
             "seed": bus.twin.seed,
@@ -100,11 +104,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
 
 def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorModel]) -> dict[str, object]:
     """Return how a joint is driven, within the limits of the body."""
-    limits = driven.limits
-    least, greatest = [one.value for one in limits.position] if limits.position else (None, None)
-    is_continuous = joint is not None and joint.kind == "continuous"
-    outer = joint.limits if joint else None
-    is_bounded = outer is not None and not is_continuous
+    limits = limits_of(driven, joint).limits or MotionLimits()  # those that leave nothing are told before
     mimic = joint.mimic if joint else None
     return {
         "servos": [{"id": one.id, "model": one.model, "neutral": one.neutral, "invert": one.invert} for one in servos],
@@ -112,23 +112,15 @@ def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorMod
         "ratio": math.tau / driven.travel if driven.travel else driven.ratio,
         "offset": driven.offset,
         "calibration": table_of(driven),
-        "is_continuous": is_continuous,
-        "lower": _tighter(max, outer.lower if outer and is_bounded else None, least),
-        "upper": _tighter(min, outer.upper if outer and is_bounded else None, greatest),
-        "velocity": _tighter(min, outer.velocity if outer else None, _value(limits.velocity)),
-        "acceleration": _value(limits.acceleration),
+        "is_continuous": joint is not None and joint.kind == "continuous",
+        "lower": limits.lower,
+        "upper": limits.upper,
+        "velocity": limits.velocity,
+        "acceleration": limits.acceleration,
         "mimic": mimic.joint if mimic else "",
         "multiplier": mimic.multiplier if mimic else 1.0,
         "mimic_offset": mimic.offset if mimic else 0.0,
     }
-
-
-def _value(quantity: Quantity | None) -> float | None:
-    return None if quantity is None else quantity.value
-
-
-def _tighter(pick: Callable[[float, float], float], outer: float | None, inner: float | None) -> float | None:
-    return pick(outer, inner) if outer is not None and inner is not None else outer if inner is None else inner
 
 
 @section(

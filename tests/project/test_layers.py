@@ -49,7 +49,8 @@ ABOVE = {
     "body": "",
     "bus": "sdk.bound",
     "check_runner": "missions.analysis model.robot",
-    "checks": "body.model check_runner composition diagnostics.core missions model sdk sections",
+    "checks": "actuation body.model check_runner composition diagnostics.core missions model sdk sections "
+    "servo_bus_config",
     "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
     "importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "
     "scaffold schema.documents sdk sections",
@@ -73,7 +74,7 @@ ABOVE = {
     "mission_tests": "compiler components.mission composition executive missions model plan.model sdk sections.faults "
     "testing.bench twins.fault_script twins.servo_faults",
     "missions": "",
-    "model": "composition missions sdk sections",
+    "model": "actuation body.model composition missions sdk sections servo_bus_config",
     "mux": "",
     "navigation": "",
     "params": "",
@@ -85,8 +86,8 @@ ABOVE = {
     "scaffold": "actuation.servo_models composition missions sdk",
     "schema": "controller_interface missions sdk sections",
     "sdk": "",
-    "sections": "actuation.serial_ports actuation.servo_models body control.calibration controller_interface sdk "
-    "twins.servo_faults",
+    "sections": "actuation.serial_ports actuation.servo_models body control.calibration control.limits "
+    "controller_interface sdk twins.servo_faults",
     "servo_bus_config": "actuation control controller_interface twins.fault_script",
     "sim": "",
     "skills": "sdk",
