@@ -10,6 +10,7 @@ REAL_TIME = (
     "tests/exposure/",
     "tests/faults/",
     "tests/net/",
+    "tests/robots/test_three_levels",
     "tests/runtime/test_apply_for_real",
     "tests/runtime/test_external_clock",
     "tests/runtime/test_lifeline",

@@ -18,8 +18,8 @@ PI = {"head_pan_joint": 1, "head_tilt_joint": 2} | {f"right_arm_{name}_joint": 3
 TICK = 0.00512  # [rad] of an AX-12
 
 
-def driver(name: str, *, real: bool = False) -> Any:
-    plan = compile_robot(str(ROOT / f"robots/{name}"), environment={}, real=real).plan
+def driver(name: str) -> Any:
+    plan = compile_robot(str(ROOT / f"robots/{name}"), environment={}).plan
     assert plan
     [found] = [one for one in plan.instances if one.type == "servo_bus"]
     return found
@@ -33,12 +33,6 @@ def test_one_bus_has_all_joints_of_all_parts(name: str, ids: dict[str, int]) -> 
     assert {joint: one.servos[0].id for joint, one in config.joints.items()} == ids
     led = [joint for one in config.controllers.values() for joint in one.config.led]
     assert sorted(led) == sorted(ids)
-
-
-def test_the_real_robot_differs_in_the_port_alone() -> None:
-    real, simulated = driver("head_only", real=True).config, driver("head_only").config
-    assert (real.twin, simulated.twin, real.port) == ("", "servo", "/dev/ttyUSB0")
-    assert real.model_copy(update={"twin": "servo"}) == simulated
 
 
 def test_the_arm_goes_where_it_is_commanded() -> None:
