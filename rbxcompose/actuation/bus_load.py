@@ -11,8 +11,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from rbxcompose.actuation.cycle_items import FAST, slow_items
 from rbxcompose.actuation.groups import FACTORY_DELAY, REPLY, ROOM, in_chunks, request_groups
-from rbxcompose.actuation.servo_cycle import FAST, slow_items
 from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.actuation.transfers import Stretch, read_plan, write_plans
 

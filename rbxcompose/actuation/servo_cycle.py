@@ -8,20 +8,11 @@ from itertools import zip_longest
 from typing import Protocol
 
 from rbxcompose.actuation.bus import ServoBus
+from rbxcompose.actuation.cycle_items import FAST, slow_items
 from rbxcompose.actuation.joint_drive import JointDrive, Writes
 from rbxcompose.actuation.preparation import arm, has_fired
-from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.joint_states import Relax
-
-FAST = ("present_position", "present_speed", "present_load")
-SLOW = ("present_temperature", "present_voltage")
-RARE = ("hardware_error", "bus_watchdog")  # of models that have them
-
-
-def slow_items(model: ServoModel) -> list[str]:
-    """Return what is read of one servo in each cycle."""
-    return [*SLOW, *(name for name in RARE if name in model.items)]
 
 
 class Leader(Protocol):

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.actuation.servo_models import COMMON_BAUDS, model_named
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
-from rbxcompose.model.driven_joints import buses_of
+from rbxcompose.model.driven_joints import driven_buses
 from rbxcompose.model.robot import Robot
 from rbxcompose.sections.actuators import actuators
 from rbxcompose.units import BIT_RATE, format_quantity
@@ -23,7 +23,7 @@ def baud_of_servo(robot: Robot) -> Iterator[Finding]:
     Bad: `servos: {type: dynamixel, baud: 3000000}` with an AX-12.
     Good: `servos: {type: dynamixel, baud: 1000000}`
     """
-    for bus, path in buses_of(robot):
+    for bus in driven_buses(robot):
         own = {name: one for name, one in robot.manifest.contents.of(actuators).items() if one.bus == bus.name}
         models = {name: model for name, one in own.items() if (model := model_named(one.model))}
         deaf = [name for name, model in models.items() if model.code_of(bus.baud) is None]
@@ -31,7 +31,7 @@ def baud_of_servo(robot: Robot) -> Iterator[Finding]:
             names = sorted({models[name].name for name in deaf})
             common = [one for one in COMMON_BAUDS if all(model.code_of(one) is not None for model in models.values())]
             yield baud_of_servo.at(
-                robot.value(*path, "baud"),
+                robot.value(*bus.path, "baud"),
                 f"{' and '.join(names)} cannot listen at {format_quantity(bus.baud, BIT_RATE)}",
                 help=f"rates that all servos of the bus have: {', '.join(map(str, common))}",
                 related=[Related(robot.key("actuators", deaf[0]), f"'{deaf[0]}' is one of them")],

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from rbxcompose.actuation.servo_joint import ServoJoint
+from rbxcompose.actuation.servo_models import ServoModel, model_named
 from rbxcompose.body.model import BodyJoint
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import KeyPath
 from rbxcompose.model.robot import Robot
 from rbxcompose.sections.joints import JointModel, joints
-from rbxcompose.servo_bus_config import ServoBusConfig, servo_joint
 from rbxcompose.units import ANGLE, ANGULAR_SPEED, LENGTH, SPEED, format_quantity
 
+BUSES = ("buses",)
 ROUNDED = 0.002
 """Of a limit, by which two that mean the same may differ: 145 deg and 2.53 rad."""
 
@@ -57,19 +59,41 @@ class DrivenJoint:
         return format_quantity(value, SPEED) if self.slides else format_quantity(value, ANGULAR_SPEED)
 
 
-def buses_of(robot: Robot) -> Iterator[tuple[ServoBusConfig, KeyPath]]:
-    """Yield each bus of servos, as its driver gets it, and where it is written."""
+@dataclass(frozen=True, slots=True)
+class DrivenBus:
+    """A bus of servos: their models and modes by id, its rates [bit/s, Hz] and the pause before a reply [s], if set."""
+
+    name: str
+    path: KeyPath
+    baud: int
+    rate: float
+    delay: float | None
+    servos: Mapping[int, tuple[ServoModel, str]]
+
+
+def driven_buses(robot: Robot) -> Iterator[DrivenBus]:
+    """Yield each bus whose joints are driven."""
     for component in robot.components.values():
-        if isinstance(component.config, ServoBusConfig):
-            yield component.config, component.path
+        if component.path[:1] == BUSES:
+            bus: Any = component.config
+            servos = {
+                servo.id: (model, joint.mode)
+                for joint in bus.joints.values()
+                for servo in joint.servos
+                if (model := model_named(servo.model))
+            }
+            yield DrivenBus(bus.name, component.path, bus.baud, bus.rate, bus.return_delay, servos)
 
 
 def driven_joints(robot: Robot) -> Iterator[DrivenJoint]:
     """Yield all joints that servos drive."""
     written = robot.manifest.contents.of(joints)
     body = robot.manifest.body.body.joints if robot.manifest.body else {}
-    for bus, _ in buses_of(robot):
-        for name, one in bus.joints.items():
-            if name in written:
-                joint = servo_joint(name, one)
-                yield DrivenJoint(robot, bus.name, written[name], body.get(name), joint, one.mimic)
+    for component in robot.components.values():
+        if component.path[:1] == BUSES:
+            from rbxcompose.servo_bus_config import servo_joint  # slow to import, and most robots need none
+
+            bus: Any = component.config
+            for name, one in bus.joints.items():
+                if name in written:
+                    yield DrivenJoint(robot, bus.name, written[name], body.get(name), servo_joint(name, one), one.mimic)

@@ -49,8 +49,7 @@ ABOVE = {
     "body": "",
     "bus": "sdk.bound",
     "check_runner": "missions.analysis model.robot",
-    "checks": "actuation body.model check_runner composition diagnostics.core missions model sdk sections "
-    "servo_bus_config",
+    "checks": "actuation body.model check_runner composition diagnostics.core missions model sdk sections",
     "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
     "importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "
     "scaffold schema.documents sdk sections",
