@@ -153,11 +153,16 @@ def model_of_number(number: int) -> ServoModel | None:
     return _by_number().get(number)
 
 
-def model_named(name: str) -> ServoModel | None:
+def find_model(name: str, models: Mapping[str, ServoModel]) -> ServoModel | None:
     """Return a model by its name; capitals, signs and the revision (`AX-12A`, `AX-12+`) do not matter."""
     folded = _folded(name)
-    known = {_folded(one.name): one for one in servo_models().values()}
+    known = {_folded(one.name): one for one in models.values()}
     return known.get(folded) or known.get(folded.removesuffix("a").removesuffix("f"))
+
+
+def model_named(name: str) -> ServoModel | None:
+    """Return a model of Dynamixel by its name."""
+    return find_model(name, servo_models())
 
 
 def _folded(name: str) -> str:

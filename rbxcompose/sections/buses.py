@@ -6,15 +6,16 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, WithJsonSchema
 
+from rbxcompose.actuation.bus_types import bus_type_names
 from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.config import Angle, BitRate, Config, Frequency, Time
 from rbxcompose.controller_interface import ControllerConfig, controller_type
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, SetScope
-from rbxcompose.manifest.tree import KeyPath, key_span
-from rbxcompose.manifest.validate import MISSING_KEY
+from rbxcompose.manifest.tree import KeyPath, at, key_span, value_span
+from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.manifest.written import as_written
 from rbxcompose.references import DEVICE_PORT, SERVO_BUS, Refers
@@ -26,6 +27,8 @@ from rbxcompose.sections.faults import buses_of_joints, faults_of
 from rbxcompose.sections.joints import JointModel, bounds_of, joints, table_of, tighter
 from rbxcompose.sections.safety import safety
 from rbxcompose.units import Quantity
+
+BusTypeName = Annotated[str, WithJsonSchema({"type": "string", "enum": bus_type_names()})]
 
 
 class TwinModel(Config):
@@ -40,7 +43,7 @@ class TwinModel(Config):
 class BusOfServosModel(Config):
     """A line of servos, driven by a process of its own."""
 
-    type: Literal["dynamixel"]
+    type: BusTypeName
     """What speaks on it."""
     port: Annotated[str, Refers(DEVICE_PORT)] = ""
     """The serial port, such as `/dev/ttyUSB0`, or `dev:NAME` of a device; simulated servos need none."""
@@ -57,6 +60,15 @@ class BusOfServosModel(Config):
     """How what simulated servos measure differs from what is."""
 
 
+def _is_known(reading: Reading[BusOfServosModel], name: str, one: BusOfServosModel) -> bool:
+    if one.type in bus_type_names():
+        return True
+    path = ("buses", name, "type")
+    span, node = value_span(reading.contents.root, path), at(reading.contents.root, path)
+    reading.report.add(not_a_choice(span, "type", node, bus_type_names()))
+    return False
+
+
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     """Yield the component that drives the joints of each bus."""
     description, driven, servos = contents.of(body), contents.of(joints), contents.of(actuators)
@@ -70,6 +82,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             continue
         config = {
             "name": name,
+            "kind": bus.type,
             "port": port_name(contents, bus.port),
             "baud": round(bus.baud),
             "rate": bus.rate,
@@ -173,7 +186,8 @@ def buses(reading: Reading[BusOfServosModel]) -> dict[str, BusOfServosModel]:
             port: /dev/ttyUSB0
             rate: 100 Hz
     """
-    found = reading.entries()
+    read = reading.entries()
+    found = {name: one for name, one in read.items() if _is_known(reading, name, one)}
     for name, one in found.items():
         if not one.port and not reading.contents.is_simulated:
             span = key_span(reading.contents.root, ("buses", name))
