@@ -68,10 +68,10 @@ def rows() -> list[Row]:
 
 
 @contextmanager
-def up(robot: str, environment: dict[str, str]) -> Iterator[None]:
+def up(robot: str, environment: dict[str, str], *options: str) -> Iterator[None]:
     """Have a robot up."""
     try:
-        program([*COMMAND, "up", "-d", robot], environment)()
+        program([*COMMAND, "up", "-d", robot, *options], environment)()
         yield
     finally:
         program([*COMMAND, "down"], environment)()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from docs.generating import commands, components, expressions, findings, missions, robot, sdk, tables
+from docs.generating import commands, components, controllers, expressions, findings, missions, robot, sdk, tables
 
 DOCS = Path(__file__).parent
 FOLDERS = ("findings", "reference")  # in them is nothing else
@@ -19,6 +19,7 @@ def pages() -> dict[str, str]:
     reference = {
         "robot": robot.whole_page(),
         "components": components.whole_page(),
+        "controllers": controllers.whole_page(),
         "missions": missions.whole_page(),
         "expressions": expressions.whole_page(),
         "commands": commands.whole_page(),

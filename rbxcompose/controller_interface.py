@@ -8,6 +8,8 @@ from __future__ import annotations
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Literal, Protocol, Self, TypeVar, get_args
 
 from pydantic import PrivateAttr
@@ -25,6 +27,16 @@ PLUGINS = Plugins("controller", "rbxcompose.controllers")
 _TYPES: dict[str, type[Controller[Any]]] = {}
 
 
+@dataclass(frozen=True, slots=True)
+class UsedItem:
+    """An item of a servo that a controller reads or writes; `field` is where the configuration names it."""
+
+    actuator: str
+    item: str
+    field: str
+    is_written: bool
+
+
 class ControllerConfig(Config):
     """What every controller can be given; a subclass names its joints, by fields of the type `JointName`."""
 
@@ -39,6 +51,11 @@ class ControllerConfig(Config):
     def led(self) -> tuple[str, ...]:
         """Return the joints that it leads."""
         raise NotImplementedError
+
+    @property
+    def used(self) -> tuple[UsedItem, ...]:
+        """Return the items of servos that it uses itself."""
+        return ()
 
     @property
     def dimensions(self) -> dict[str, Dimension]:
@@ -72,6 +89,14 @@ class LedJoint(Protocol):
         """Return why it may not move; empty if it may."""
 
     @property
+    def has_torque(self) -> bool:
+        """Return whether its servos hold or move it, and nobody has asked to relax it."""
+
+    @property
+    def measured_at(self) -> float:
+        """Return when it was measured [s], -inf if it never was."""
+
+    @property
     def per_tick(self) -> float:
         """Return how far it moves for one tick of its servo."""
 
@@ -80,6 +105,19 @@ class LedJoint(Protocol):
 
     def turn(self, velocity: float) -> None:
         """Move with a velocity up to the end of this cycle."""
+
+    def hold(self) -> None:
+        """Come to rest within its limits, and stay there."""
+
+
+class ItemOfServo(Protocol):
+    """An item of a servo as a controller sees it."""
+
+    value: float
+    problem: str
+
+    def write(self, raw: int) -> None:
+        """Write a raw value in one of the next cycles; a newer one replaces it."""
 
 
 class ControllerSite(Protocol):
@@ -96,6 +134,13 @@ class ControllerSite(Protocol):
     @property
     def joints(self) -> Mapping[str, LedJoint]:
         """Return its joints by name."""
+
+    @property
+    def refusal(self) -> str:
+        """Return why nothing may be commanded now; empty if it may."""
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ItemOfServo:
+        """Return an item of a servo; what it needs in other items is written before. Only `prepare` may ask."""
 
     def action(self, port: str) -> ActionServer[Any, Any, Any]:
         """Return the action at one of its ports."""
@@ -118,6 +163,10 @@ class Controller(ABC, Generic[C]):
 
     type_name: ClassVar[str] = ""
     interface: ClassVar[Literal["position", "velocity"]] = "position"
+    kinds: ClassVar[frozenset[str]] = frozenset()
+    """Kinds of joints that it can lead, in the words of URDF; empty if of any kind."""
+    topics: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """The fields that give ports their topics: port -> field."""
 
     def __init__(self, name: str, config: C, site: ControllerSite) -> None:
         self.name, self.config, self.site = name, config, site
@@ -139,13 +188,18 @@ class Controller(ABC, Generic[C]):
 
     @classmethod
     def capabilities(cls, name: str, config: C) -> tuple[Capability, ...]:
-        """Return what checks and commands should know about it; texts are names of its ports."""
+        """Return what checks and commands should know about it, with its own names of ports and fields."""
         return ()
 
     @classmethod
     def mistake(cls, config: C) -> tuple[str, str] | None:
         """Return the field and the reason, if a configuration cannot work although each of its values can."""
         return None
+
+    @classmethod
+    def asks(cls, config: C) -> Mapping[str, tuple[float, float]]:
+        """Return the least and the greatest position that it may give its joints, as far as the configuration tells."""
+        return {}
 
     def prepare(self) -> None:
         """Set up what it needs."""
@@ -170,6 +224,10 @@ class Controller(ABC, Generic[C]):
 
     def halt(self, now: float, reason: str) -> None:
         """End what it does; its joints come to rest within their limits."""
+
+    def let_go(self, joint: str, now: float, reason: str) -> None:
+        """Leave a joint alone, which has lost its torque; the others come to rest."""
+        self.halt(now, reason)
 
     @property
     def leads(self) -> bool:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, Protocol
 
-from rbxcompose.controller_interface import Controller, ControllerConfig, LedJoint
+from rbxcompose.controller_interface import Controller, ControllerConfig, ItemOfServo, LedJoint
 from rbxcompose.sdk.bound import ActionServer, ServedGoal
-from rbxcompose.sdk.component import Component
 
 
 class ControllerManager:
@@ -16,11 +15,24 @@ class ControllerManager:
     def __init__(self, controllers: Mapping[str, Controller[ControllerConfig]]) -> None:
         self.controllers = dict(controllers)
         self._active = {name for name, one in self.controllers.items() if one.config.start == "active"}
+        self._leaving = set[str]()  # switched off, and not at rest yet
 
     @property
     def active(self) -> list[Controller[ControllerConfig]]:
         """Return the active controllers, in the order of the manifest."""
         return [one for name, one in self.controllers.items() if name in self._active]
+
+    @property
+    def leading(self) -> list[Controller[ControllerConfig]]:
+        """Return the active controllers, and those that still bring joints to rest that nobody else leads."""
+        taken = {joint for one in self.active for joint in one.config.led}
+        self._leaving = {
+            name for name in self._leaving if self.controllers[name].leads and not taken & {*self._led(name)}
+        }
+        return [one for name, one in self.controllers.items() if name in self._active | self._leaving]
+
+    def _led(self, name: str) -> tuple[str, ...]:
+        return self.controllers[name].config.led
 
     def is_active(self, name: str) -> bool:
         """Return whether a controller leads its joints."""
@@ -28,7 +40,13 @@ class ControllerManager:
 
     def leader(self, joint: str) -> str:
         """Return the active controller that moves a joint now, or nothing."""
-        return next((one.name for one in self.active if joint in one.config.led and one.leads), "")
+        return next((one.name for one in self.leading if joint in one.config.led and one.leads), "")
+
+    def let_go(self, joint: str, now: float, reason: str) -> None:
+        """Have a joint left alone, which has lost its torque."""
+        for one in self.active:
+            if joint in one.config.led:
+                one.let_go(joint, now, reason)
 
     def objection(self, on: Iterable[str], off: Iterable[str]) -> str:
         """Return why controllers cannot be switched on and off, or nothing."""
@@ -54,17 +72,42 @@ class ControllerManager:
             if name in self._active:
                 self.controllers[name].halt(now, f"controller '{name}' was switched off")
                 self._active.discard(name)
+                self._leaving.add(name)
                 yield f"controller '{name}' is inactive"
         for name in on:
             if name not in self._active:
                 self._active.add(name)
+                self._leaving.discard(name)
                 yield f"controller '{name}' is active"
+
+
+class ControllerHost(Protocol):
+    """The component that runs controllers, as their seats see it."""
+
+    bound: dict[str, Any]
+
+    @property
+    def now(self) -> float:
+        """Return robot time [s]."""
+
+    @property
+    def stamp(self) -> int:
+        """Return the time for message headers [ns]."""
+
+    def warn(self, text: str) -> None:
+        """Log something that a person should look at."""
+
+    def objection(self, controller: str) -> str:
+        """Return why a controller may command nothing now, or nothing."""
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ItemOfServo:
+        """Return an item of a servo."""
 
 
 class ControllerSeat:
     """What a controller uses of its bus: see `ControllerSite`."""
 
-    def __init__(self, bus: Component[Any], name: str, joints: Mapping[str, LedJoint]) -> None:
+    def __init__(self, bus: ControllerHost, name: str, joints: Mapping[str, LedJoint]) -> None:
         self._bus, self._name = bus, name
         self.joints = joints
 
@@ -77,6 +120,15 @@ class ControllerSeat:
     def stamp(self) -> int:
         """Return the time for message headers [ns]."""
         return self._bus.stamp
+
+    @property
+    def refusal(self) -> str:
+        """Return why nothing may be commanded now, or nothing."""
+        return self._bus.objection(self._name)
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ItemOfServo:
+        """Return an item of a servo, which the cycle reads or writes."""
+        return self._bus.item(actuator, name, is_read=is_read, setup=setup)
 
     def action(self, port: str) -> ActionServer[Any, Any, Any]:
         """Return the action at one of the controller's ports."""

@@ -82,6 +82,8 @@ ACCELERATION = _dimension("acceleration", m=1, s=-2)
 ANGLE = _dimension("angle", rad=1)
 ANGULAR_SPEED = _dimension("angular_speed", rad=1, s=-1)
 ANGULAR_ACCELERATION = _dimension("angular_acceleration", rad=1, s=-2)
+JERK = _dimension("jerk", m=1, s=-3)
+ANGULAR_JERK = _dimension("angular_jerk", rad=1, s=-3)
 FREQUENCY = _dimension("frequency", s=-1)
 RATIO = _dimension("ratio")
 MASS = _dimension("mass", kg=1)
@@ -110,6 +112,8 @@ _TABLE: Mapping[Dimension, tuple[str, Mapping[str, tuple[float, float]]]] = {
     ANGLE: ("90 deg", {"rad": (1, 1), "deg": (math.pi, 180)}),
     ANGULAR_SPEED: ("90 deg/s", {"rad/s": (1, 1), "deg/s": (math.pi, 180), "rpm": (math.pi, 30)}),
     ANGULAR_ACCELERATION: ("180 deg/s^2", {"rad/s^2": (1, 1), "deg/s^2": (math.pi, 180)}),
+    JERK: ("5 m/s^3", {"m/s^3": (1, 1)}),
+    ANGULAR_JERK: ("20 rad/s^3", {"rad/s^3": (1, 1), "deg/s^3": (math.pi, 180)}),
     FREQUENCY: ("20 Hz", {"Hz": (1, 1), "kHz": (1000, 1)}),
     RATIO: ("50 %", {"%": (1, 100)}),
     MASS: ("2 kg", {"kg": (1, 1), "g": (1, 1000)}),

@@ -7,6 +7,7 @@ REAL_TIME = (
     "tests/actuation/test_dynamixel_bus",
     "tests/actuation/test_recovery",
     "tests/cli/test_servo",
+    "tests/controllers/test_diff_drive_bytes",
     "tests/exposure/",
     "tests/faults/",
     "tests/net/",

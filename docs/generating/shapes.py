@@ -119,6 +119,8 @@ def default_of(field: FieldInfo, dimension: Dimension | None) -> str:
         return "*required*"
     value = field.get_default(call_default_factory=True)
     value = value.when if isinstance(value, Restart) else value  # the word that stands for it
+    if isinstance(value, Config):
+        return ""  # its keys have theirs
     return code(_shown(value, dimension)) if value not in (None, {}, (), [], "") else ""
 
 

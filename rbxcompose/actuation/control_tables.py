@@ -127,6 +127,14 @@ present_temperature 146 1 degC u
 """
 )
 _X_CURRENT = _X + "goal_current 102 2 LOAD s\n"
+_PORTS = """
+external_port_mode_1 56 1 - u
+external_port_mode_2 57 1 - u
+external_port_mode_3 58 1 - u
+external_port_data_1 152 2 - u
+external_port_data_2 154 2 - u
+external_port_data_3 156 2 - u
+"""
 _P = (
     _TWO_LOW.replace(" 4 tick u", " 4 tick s")
     + """
@@ -158,10 +166,13 @@ TABLES: Mapping[str, str] = MappingProxyType(
         "X load": _X.replace("LOAD", "0.1%"),
         "X 1 mA": _X_CURRENT.replace("LOAD", "1mA"),
         "X 2.69 mA": _X_CURRENT.replace("LOAD", "2.69mA"),
+        "X540": _X_CURRENT.replace("LOAD", "2.69mA") + _PORTS,
         "P": _P,
     }
 )
 """The rows of each family."""
+OUTPUTS = ("led", *(f"external_port_data_{number}" for number in (1, 2, 3)))
+"""Items that may be switched without moving anything."""
 
 
 def items_of(table: str, per_tick: float, centre: int) -> Mapping[str, ControlItem]:

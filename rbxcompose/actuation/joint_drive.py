@@ -14,6 +14,7 @@ from rbxcompose.control.joint_state_machine import step_joint
 from rbxcompose.control.joint_states import (
     WITH_TORQUE,
     BringToRest,
+    Hold,
     JointCondition,
     JointInputs,
     JointMode,
@@ -80,8 +81,14 @@ class JointDrive(ABC):
 
     @property
     def has_torque(self) -> bool:
-        """Return whether its servos hold or move it."""
-        return not self.condition.is_blocked and self.condition.base in WITH_TORQUE
+        """Return whether its servos hold or move it, and nobody has asked to relax it."""
+        is_let_go = any(isinstance(one, Relax) for one in self._requests)
+        return not self.condition.is_blocked and self.condition.base in WITH_TORQUE and not is_let_go
+
+    @property
+    def measured_at(self) -> float:
+        """Return when all of its servos had been measured [s], -inf if they never were."""
+        return min(self._stamps.values()) if len(self._stamps) == len(self.joint.servos) else -math.inf
 
     @property
     def is_at_rest(self) -> bool:
@@ -136,6 +143,10 @@ class JointDrive(ABC):
         """Switch torque off in the next cycle, until the next command."""
         self.ask(Relax())
 
+    def hold(self) -> None:
+        """Come to rest within its limits in the next cycles, and stay there with torque."""
+        self.ask(Hold())
+
     def follow(self, sample: JointSample) -> None:
         """Be at a position at the end of the next cycle, and pass there with its velocity."""
         raise TypeError(f"joint '{self.joint.name}' takes velocities")
@@ -146,9 +157,8 @@ class JointDrive(ABC):
 
     def step(self, now: float, dt: float) -> list[Writes]:
         """Return what is to be written in the cycle that ends `dt` [s] from `now`, one after the other."""
-        measured_at = min(self._stamps.values()) if len(self._stamps) == len(self.joint.servos) else -math.inf
         error = ", ".join(words for words in self._errors.values() if words)
-        inputs = JointInputs(self.measured.position, measured_at, self.temperature, error, tuple(self._requests))
+        inputs = JointInputs(self.measured.position, self.measured_at, self.temperature, error, tuple(self._requests))
         self._requests.clear()
         self.condition, actions = step_joint(self.condition, inputs, now, self.policy)
         writes: list[Writes] = []

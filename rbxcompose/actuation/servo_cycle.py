@@ -11,6 +11,7 @@ from rbxcompose.actuation.bus import ServoBus
 from rbxcompose.actuation.cycle_items import FAST, slow_items
 from rbxcompose.actuation.joint_drive import JointDrive, Writes
 from rbxcompose.actuation.preparation import arm, has_fired
+from rbxcompose.actuation.servo_items import ServoItem, use_next
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.joint_states import Relax
 
@@ -42,6 +43,8 @@ class ServoCycle:
     """Silence after which servos stop by themselves, if they can [s]; 0 is never."""
     shares_heat: bool = False
     """Whether all joints rest when one is too hot."""
+    items: list[ServoItem] = field(default_factory=list)
+    """Items of servos that controllers use themselves."""
     _turn: int = 0  # whose slow items are read next
 
     @property
@@ -66,6 +69,7 @@ class ServoCycle:
             for drive in self.drives.values():
                 drive.temperature = warmest
         self._write([drive.step(now, dt) for drive in self.drives.values()])
+        use_next(self.items, self.bus, now)
 
     def relax(self, now: float, dt: float) -> None:
         """Switch all torque off, twice, since nobody confirms a group write."""
@@ -82,6 +86,8 @@ class ServoCycle:
 
     def _read(self) -> None:
         drives = {id_: drive for drive in self.drives.values() for id_ in drive.joint.ids}
+        if not drives:
+            return
         for id_, reading in self.bus.read(list(drives), FAST).items():
             drives[id_].take(id_, reading)
         id_ = list(drives)[self._turn % len(drives)]

@@ -82,6 +82,12 @@ class ServoJoint:
                 least, greatest = max(least, ends[0]), min(greatest, ends[1])
         return least, greatest
 
+    @property
+    def least_velocity(self) -> float:
+        """Return the least velocity of its first servo, in the middle of its range [rad/s or m/s]."""
+        servo = self.servos[0].model
+        return abs(servo.item("goal_velocity").per_raw * self.transmission.slope(0.0))
+
     def positions(self, raws: Mapping[int, int]) -> dict[int, float]:
         """Return the positions that the ticks of servos stand for, by id."""
         return {one.id: self.transmission.position(one.angle(raws[one.id])) for one in self.servos if one.id in raws}

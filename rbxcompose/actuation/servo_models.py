@@ -114,6 +114,7 @@ _XL320 = ServoFamily("XL-320", 2, 1024, math.radians(300), 512, MappingProxyType
 _X_LOAD = ServoFamily("X load", 2, 4096, _TURN, 2048, _MODES_X)
 _X_1MA = ServoFamily("X 1 mA", 2, 4096, _TURN, 2048, _MODES_CURRENT)
 _X_2MA = ServoFamily("X 2.69 mA", 2, 4096, _TURN, 2048, _MODES_CURRENT)
+_X540 = ServoFamily("X540", 2, 4096, _TURN, 2048, _MODES_CURRENT)
 
 
 def _p(half_turn: int) -> ServoFamily:
@@ -131,8 +132,8 @@ _MODELS: tuple[tuple[ServoFamily, Mapping[str, int]], ...] = (
     (_X_1MA, {"XL330-M077": 1190, "XL330-M288": 1200}),
     (_X_1MA, {"XC330-T181": 1210, "XC330-T288": 1220, "XC330-M181": 1230, "XC330-M288": 1240}),
     (_X_2MA, {"MX-64(2.0)": 311, "MX-106(2.0)": 321}),
-    (_X_2MA, {"XM430-W350": 1020, "XM430-W210": 1030, "XM540-W270": 1120, "XM540-W150": 1130}),
-    (_X_2MA, {"XH430-W350": 1000, "XH430-W210": 1010, "XH540-W270": 1100, "XH540-W150": 1110}),
+    (_X_2MA, {"XM430-W350": 1020, "XM430-W210": 1030, "XH430-W350": 1000, "XH430-W210": 1010}),
+    (_X540, {"XM540-W270": 1120, "XM540-W150": 1130, "XH540-W270": 1100, "XH540-W150": 1110}),
     (_PM42, {"PM42-010": 2100}),
     (_PM54, {"PM54-040": 2110, "PM54-060": 2120}),
     (_PH42, {"PH42-020": 2000}),
@@ -162,11 +163,16 @@ def model_of_number(number: int) -> ServoModel | None:
     return _by_number().get(number)
 
 
-def model_named(name: str) -> ServoModel | None:
+def find_model(name: str, models: Mapping[str, ServoModel]) -> ServoModel | None:
     """Return a model by its name; capitals, signs and the revision (`AX-12A`, `AX-12+`) do not matter."""
     folded = _folded(name)
-    known = {_folded(one.name): one for one in servo_models().values()}
+    known = {_folded(one.name): one for one in models.values()}
     return known.get(folded) or known.get(folded.removesuffix("a").removesuffix("f"))
+
+
+def model_named(name: str) -> ServoModel | None:
+    """Return a model of Dynamixel by its name."""
+    return find_model(name, servo_models())
 
 
 def _folded(name: str) -> str:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.actuation.servo_models import COMMON_BAUDS, model_named
+from rbxcompose.actuation.servo_models import COMMON_BAUDS
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.driven_joints import driven_buses
 from rbxcompose.model.robot import Robot
-from rbxcompose.sections.actuators import actuators
+from rbxcompose.sections.actuators import actuators, model_of
 from rbxcompose.units import BIT_RATE, format_quantity
 
 
@@ -24,8 +24,9 @@ def baud_of_servo(robot: Robot) -> Iterator[Finding]:
     Good: `servos: {type: dynamixel, baud: 1000000}`
     """
     for bus in driven_buses(robot):
-        own = {name: one for name, one in robot.manifest.contents.of(actuators).items() if one.bus == bus.name}
-        models = {name: model for name, one in own.items() if (model := model_named(one.model))}
+        contents = robot.manifest.contents
+        own = {name: one for name, one in contents.of(actuators).items() if one.bus == bus.name}
+        models = {name: model for name, one in own.items() if (model := model_of(contents, one))}
         deaf = [name for name, model in models.items() if model.code_of(bus.baud) is None]
         if deaf:
             names = sorted({models[name].name for name in deaf})

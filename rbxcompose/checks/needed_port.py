@@ -68,11 +68,11 @@ def _is_command(end: PortEnd) -> bool:
 def _finding(robot: Robot, component: RobotComponent, ends: list[PortEnd]) -> Finding:
     names = " and ".join(f"'{end.topic}'" for end in ends)
     near = [(end, other) for end in ends for other in robot.ends if _fits(end, other)]
-    fix = ", ".join(f"{end.name}: {other.topic.strip('/')}" for end, other in near)
+    fix = robot.connection((end, other.topic.strip("/")) for end, other in near)
     return needed_port.at(
         robot.end_span(ends[0]),
         f"'{component.name}' needs {names}, which nothing in the robot provides",
-        help=f"connect it: 'connect: {{{fix}}}'" if fix else "add the component that provides it",
+        help=f"connect it: {fix}" if fix else "add the component that provides it",
         related=[Related(robot.end_span(other), f"'{other.topic}' is of this type") for _, other in near],
     )
 

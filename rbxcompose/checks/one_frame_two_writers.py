@@ -57,12 +57,14 @@ def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
     first: dict[tuple[str, str], FrameWriter] = {}
     for one in sorted(_writers(robot), key=lambda one: one.component.name in robot.written):
         other = first.setdefault((one.end.topic.removesuffix(STATIC), one.frame.child.value), one)
-        if other.component is not one.component:
+        if other.end is not one.end:
             name = one.component.name
+            connection = robot.connection([(one.end, f"{name}/tf")])
+            remedy = f", or use another topic: {connection}" if connection else ""
             yield one_frame_two_writers.at(
                 one.span(robot),
                 f"'{name}' and '{other.component.name}' both write the pose of the frame '{one.frame.child.value}'",
-                help=f"remove one of them, or use another topic: 'connect: {{{one.end.name}: {name}/tf}}'",
+                help=f"remove one of them{remedy}",
                 related=[Related(other.span(robot), "the other one")] if other.component.name in robot.written else [],
             )
 
@@ -81,7 +83,7 @@ class FrameWriter:
         return (
             setting_span(robot, (component, field))
             if is_written(robot, component, field)
-            else robot.entry_span(component.name)
+            else robot.entry_span(component.name, self.end.name)
         )
 
 

@@ -36,14 +36,14 @@ def two_bases(robot: Robot) -> Iterator[Finding]:
     ```
     """
     for topic, ends in robot.readers.items():
-        bases = [end.instance for end in ends if _moves(robot, end)]
+        bases = [end for end in ends if _moves(robot, end)]
         for other in bases[1:]:
             yield two_bases.at(
-                robot.entry_span(other),
-                f"'{other}' and '{bases[0]}' are both bases that follow '{topic}'",
+                robot.entry_span(other.instance, other.name),
+                f"'{other.instance}' and '{bases[0].instance}' are both bases that follow '{topic}'",
                 label="this one",
                 help="a robot has one base: remove one of them",
-                related=[Related(robot.entry_span(bases[0]), "and this one")],
+                related=[Related(robot.entry_span(bases[0].instance, bases[0].name), "and this one")],
             )
 
 

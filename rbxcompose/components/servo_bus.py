@@ -3,36 +3,39 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from rbxcompose.actuation.bus import ServoBus as Bus
+from rbxcompose.actuation.bus_types import bus_type
+from rbxcompose.actuation.periods import Periods
 from rbxcompose.actuation.port_errors import PortError
 from rbxcompose.actuation.position_drive import PositionDrive
 from rbxcompose.actuation.preparation import prepare, with_torque
+from rbxcompose.actuation.priority import be_prompt
 from rbxcompose.actuation.servo_cycle import ServoCycle
+from rbxcompose.actuation.servo_items import ServoItem, set_up
 from rbxcompose.actuation.servo_joint import ServoJoint
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.control.joint_states import Enable, Hold, JointMode, MoveTo
 from rbxcompose.controller_interface import controller_type
 from rbxcompose.controller_manager import ControllerManager, ControllerSeat
 from rbxcompose.controller_requests import ControllerState, ListControllers, SwitchControllers
-from rbxcompose.levels import Level
 from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.msgs.stamps import to_time
-from rbxcompose.msgs.std_msgs import Float64, Header
+from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.requests import Refused, answers
 from rbxcompose.sdk import Component, In, Out, Port, Serves, ServesAction, component
-from rbxcompose.sdk.capabilities import Capability, NeedsExtra, OpensPort, Setting
+from rbxcompose.sdk.capabilities import Capability, NeedsExtra, OpensPort, Setting, within
 from rbxcompose.sdk.component import Context
-from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, mimics_of
+from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, item_of, mimics_of
+from rbxcompose.servo_report import joint_state, report
 from rbxcompose.twins.fault_script import FaultScript, InjectFault
+from rbxcompose.twins.servo_fake import FakeServo
 from rbxcompose.twins.servo_stage import twin_of, twin_servos
 from rbxcompose.twins.servo_twin import TwinBus
 
@@ -83,11 +86,15 @@ class ServoBusDriver(Component[ServoBusConfig]):
     @classmethod
     def capabilities(cls, config: ServoBusConfig) -> tuple[Capability, ...]:
         """Declare what its controllers can do, that servos which speak bytes need the SDK, and real ones their port."""
-        setups = config.controllers.items()
-        led = (one for name, each in setups for one in controller_type(each.type).capabilities(name, each.config))
-        package = NeedsExtra(Setting("dynamixel_sdk"), Setting("servos"))
+        led = (
+            within(one, f"{name}_", f"controllers.{name}.")
+            for name, each in config.controllers.items()
+            for one in controller_type(each.type).capabilities(name, each.config)
+        )
+        kind, has_bytes = bus_type(config.kind), config.twin in ("", "pty")
+        packages = (NeedsExtra(Setting(kind.package), Setting(kind.extra)),) if kind.package and has_bytes else ()
         ports = () if config.twin else (OpensPort(Setting(config.port, "port")),)
-        return (*led, *(() if config.twin == "servo" else (package,)), *ports)
+        return (*led, *packages, *ports)
 
     def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
         """Give the ports of joints and controllers their methods."""
@@ -109,6 +116,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Open the bus, real or simulated; nothing moves."""
         config, self.at_end = self.config, ExitStack()
         self.period = 1.0 / config.rate
+        self.periods = Periods(self.period)
         self.faults: FaultScript | None = None
         drives, mimics = drives_of(config), mimics_of(config.joints)
         bus = self.opened([one.joint for one in drives.values()])
@@ -132,22 +140,23 @@ class ServoBusDriver(Component[ServoBusConfig]):
             if config.twin == "pty" and not has_bytes:
                 self.warn("bytes need real time, so servos are simulated without them")
             servos = twin_servos(joints, is_ideal=config.twin == "ideal", noise=config.noise, seed=config.seed)
+            servos |= {f"servo {id_}": [FakeServo(one, id_)] for id_, one in config.lone.items()}
             twin = self.at_end.enter_context(twin_of(servos, lambda: self.now, has_bytes=has_bytes))
             self.faults = FaultScript(config.faults.values(), servos, twin)
             if isinstance(twin, TwinBus):
                 return twin
             path = str(twin.path)
-        from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-
         known = {servo.id: servo.model for joint in joints for servo in joint.servos}
-        bus = DynamixelBus(path, known, baud=self.config.baud, clock=lambda: self.now)
+        bus = bus_type(config.kind).open(path, known | config.lone, baud=config.baud, clock=lambda: self.now)
         self.at_end.callback(bus.close)
         return bus
 
     def prepare(self) -> None:
         """Set the modes of the servos."""
         joints = [drive.joint for drive in self.cycle.drives.values()]
-        for text in prepare(self.cycle.bus, joints, self.config.watchdog, self.config.return_delay):
+        bus, config = self.cycle.bus, self.config
+        told = prepare(bus, joints, config.watchdog, config.return_delay)
+        for text in (*told, *set_up(self.cycle.items, bus)):
             self.info(text)
 
     def activate(self) -> None:
@@ -162,6 +171,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.lose(error)
         if self.faults is not None:
             self.faults.start(self.now)
+        is_real = not self.config.twin and isinstance(self.context.clock, MonotonicClock)
+        if is_real and (reason := be_prompt()):
+            self.info(f"cycles may be late on a busy machine: no real-time priority ({reason})")
         self.wake()
 
     def wake(self) -> None:
@@ -188,7 +200,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.prepare()
             self.info("the bus of servos is back")
             self.lost_at = -math.inf
-        self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.active)
+        self.periods.begin(self.now)
+        self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.leading)
         if self.now - self.published_at >= 1 / PUBLISHED - 1e-9:
             self.published_at = self.now
             self.publish()
@@ -197,9 +210,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     def accept(self, controller: str, port: str, goal: Any) -> str:
         """Refuse what moves while the robot is stopped, or its bus has gone; else the controller decides."""
-        if not self.controllers.is_active(controller):
-            return f"controller '{controller}' is not active"
-        return self.refusal() or self.controllers.controllers[controller].accept(port, goal)
+        return self.objection(controller) or self.controllers.controllers[controller].accept(port, goal)
 
     def asked(self, controller: str, port: str, request: Any) -> Any:
         """Pass a request on to a controller."""
@@ -229,11 +240,22 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Return why nothing may move now, or nothing."""
         return "the robot is stopped" if self.is_stopped else GONE if self.lost_at > -math.inf else ""
 
+    def objection(self, controller: str) -> str:
+        """Return why a controller may command nothing now, or nothing."""
+        is_active = self.controllers.is_active(controller)
+        return self.refusal() if is_active else f"controller '{controller}' is not active"
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ServoItem:
+        """Return an item of a servo, which the cycle reads or writes."""
+        found = item_of(self.config, actuator, name, is_read, setup)
+        self.cycle.items.append(found)
+        return found
+
     def received(self, port: str, message: Any) -> None:
         """Pass a message on to its controller, or move one joint unless a controller leads it."""
         if port in self.owners:
             controller, short = self.owners[port]
-            if self.controllers.is_active(controller) and not self.refusal():
+            if not self.objection(controller):
                 self.controllers.controllers[controller].received(short, message)
             return
         name = port.removesuffix("_command")
@@ -249,8 +271,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     def let_go(self, name: str) -> None:
         """Relax a joint; a controller that leads it ends what it does, or it would have torque again at once."""
-        if leader := self.controllers.leader(name):
-            self.controllers.controllers[leader].halt(self.now, f"joint '{name}' was relaxed")
+        self.controllers.let_go(name, self.now, f"joint '{name}' was relaxed")
         self.cycle.drives[name].relax()
 
     def on_relax_all(self, request: Trigger.Request) -> Trigger.Response:
@@ -292,30 +313,16 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     def publish(self) -> None:
         """Publish where the joints are, and what controllers know."""
-        known = [one for one in self.cycle.drives.values() if math.isfinite(one.measured.position)]
-        if known:
-            self.joint_states(
-                JointState(
-                    header=Header(stamp=to_time(self.stamp)),
-                    name=tuple(one.joint.name for one in known),
-                    position=np.array([one.measured.position for one in known]),
-                    velocity=np.array([one.measured.velocity for one in known]),
-                    effort=np.array([one.effort for one in known]),
-                )
-            )
-        for controller in self.controllers.active:
+        if (message := joint_state(self.cycle.drives.values(), self.stamp)) is not None:
+            self.joint_states(message)
+        for controller in self.controllers.leading:
             controller.publish()
 
     def tell(self) -> None:
         """Report to diagnostics."""
-        drives = self.cycle.drives
-        notes = {name: one.condition.note or one.refused for name, one in drives.items()}
-        notes |= {name: one.note for name, one in self.controllers.controllers.items()}
-        notes = {name: words for name, words in notes.items() if words}
-        bad = [name for name, one in drives.items() if one.mode in (JointMode.FAULT, JointMode.RESTING)]
-        level = Level.ERROR if bad or self.lost_at > -math.inf else Level.WARN if notes else Level.OK
-        message = "; ".join(f"{name}: {words}" for name, words in notes.items()) or f"{len(drives)} joints"
-        self.status(level, message, **{name: one.mode for name, one in drives.items()})
+        notes = {name: one.note for name, one in self.controllers.controllers.items()}
+        found = report(self.cycle.drives, notes, self.periods, is_lost=self.lost_at > -math.inf)
+        self.status(found.level, found.message, **found.values)
 
     # Stopping
 
@@ -324,6 +331,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         if self.lost_at == -math.inf:
             self.warn(str(error))
         self.lost_at = self.now
+        self.periods.pause()
         self.halt(GONE)
 
     def halt(self, reason: str) -> None:

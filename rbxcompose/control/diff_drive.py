@@ -6,7 +6,7 @@ The base has its frame between the wheels, x forwards; turning left is positive.
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 
 from rbxcompose.control.velocity_window import VelocityWindow
 from rbxcompose.geometry import AT_REST, Velocity2
@@ -47,6 +47,11 @@ class WheelGeometry:
         scale = self.metres_per_unit
         return WheelSpeeds((velocity.linear - half) / scale, (velocity.linear + half) / scale)
 
+    def fastest(self, velocity: Velocity2) -> float:
+        """Return the speed of the faster wheel [units/s] at a velocity of the base."""
+        wheels = self.wheels(velocity)
+        return max(abs(wheels.left), abs(wheels.right))
+
     def velocity(self, wheels: WheelSpeeds) -> Velocity2:
         """Return the velocity of the base whose wheels turn at these speeds [units/s] and do not slip."""
         left, right = wheels.left * self.metres_per_unit, wheels.right * self.metres_per_unit
@@ -82,6 +87,12 @@ class BaseLimits:
         if not all(value > 0.0 for value in astuple(self) if value is not None):
             raise ValueError("limits of a base are above 0")
 
+    def of_wheels(self, geometry: WheelGeometry, acceleration: float) -> BaseLimits:
+        """Return these limits, tightened so that no wheel accelerates by more than `acceleration` [units/s^2]."""
+        needed = geometry.fastest(Velocity2(self.acceleration, self.turn_acceleration))
+        part = min(1.0, acceleration / needed)
+        return replace(self, acceleration=self.acceleration * part, turn_acceleration=self.turn_acceleration * part)
+
     @property
     def smoothing(self) -> float:
         """Over how long velocities are averaged [s], so that the jerk is kept: see `VelocityWindow`."""
@@ -98,9 +109,13 @@ class TwistLimiter:
 
     def __init__(self, limits: BaseLimits) -> None:
         self.limits = limits
+        self.rest()
+
+    def rest(self) -> None:
+        """Start again from rest."""
         self.velocity = AT_REST
         self._ramp = AT_REST  # the velocity before it is averaged
-        self._window = VelocityWindow(limits.smoothing)
+        self._window = VelocityWindow(self.limits.smoothing)
 
     def within(self, velocity: Velocity2) -> Velocity2:
         """Return a velocity scaled to the limits of speed and turn rate."""
@@ -129,9 +144,16 @@ class TwistLimiter:
 class WheelDrive:
     """Follows commands for the velocity of a base; without new ones it brakes within its limits."""
 
-    def __init__(self, geometry: WheelGeometry, limits: BaseLimits, command_timeout: float = 0.5) -> None:
-        """`command_timeout` [s] is how long a command holds; 0 is for ever."""
+    def __init__(
+        self,
+        geometry: WheelGeometry,
+        limits: BaseLimits,
+        command_timeout: float = 0.5,
+        wheel_speed: float = math.inf,
+    ) -> None:
+        """`command_timeout` [s] is how long a command holds; 0 is for ever. `wheel_speed` limits wheels [units/s]."""
         self.geometry = geometry
+        self.wheel_speed = wheel_speed
         self.limiter = TwistLimiter(limits)
         self.command_timeout = command_timeout
         self.refused = 0  # commands that were not finite, or absurd
@@ -150,22 +172,42 @@ class WheelDrive:
         """Return whether the wheels are to stand still."""
         return self.velocity == AT_REST
 
+    @property
+    def is_commanded(self) -> bool:
+        """Return whether a command holds."""
+        return self._until > -math.inf
+
     def command(self, velocity: Velocity2, now: float) -> str | None:
         """Accept the velocity to reach; return why it is refused, else None. While braking it is ignored."""
         excess = self.limiter.excess(velocity) if velocity.is_finite else math.inf
         if excess > ABSURD:
             self.refused += 1
             return _refusal(velocity, excess)
-        self.clamped += excess > 1.0
+        target = self._within_wheels(self.limiter.within(velocity))
+        self.clamped += target != velocity
         if not self._braking:
-            self._target = velocity
+            self._target = target
             self._until = now + self.command_timeout if self.command_timeout else math.inf
         return None
+
+    def _within_wheels(self, velocity: Velocity2) -> Velocity2:
+        """Return a velocity scaled to what the wheels can do."""
+        fastest = self.geometry.fastest(velocity)
+        return velocity if fastest <= self.wheel_speed else _scaled(velocity, self.wheel_speed / fastest)
+
+    def forget(self) -> None:
+        """Come to rest, and stay there until the next command."""
+        self._until = -math.inf
+
+    def rest(self) -> None:
+        """Be at rest at once: the wheels are not driven any more."""
+        self.forget()
+        self.limiter.rest()
 
     def brake(self) -> None:
         """Come to rest and stay there, whatever is commanded, until `release`."""
         self._braking = True
-        self._until = -math.inf
+        self.forget()
 
     def release(self) -> None:
         """Follow commands again; the base stays at rest until the next one."""
@@ -182,6 +224,7 @@ class WheelDrive:
         if driven > 0.0:
             self.limiter.step(self._target, driven)
         if driven < dt:
+            self.forget()
             self.limiter.step(AT_REST, dt - driven)
         return self.geometry.wheels(self.velocity)
 

@@ -193,7 +193,7 @@ class GripOutcome:
     message: str
 
 
-class Grip:
+class GripAttempt:
     """One command of a gripper, judged by the progress of its opening: no effort needs to be measured."""
 
     def __init__(self, model: GripperModel, opening: float, policy: GripPolicy) -> None:

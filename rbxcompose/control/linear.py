@@ -1,4 +1,4 @@
-"""A joint that slides, driven by an actuator whose readings are calibrated: a lift of a torso, for example.
+"""A joint that is driven up or down at a set speed until it has arrived: a lift, for example.
 
 Positions are metres, times robot time [s].
 """
@@ -8,57 +8,64 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rbxcompose.control.calibration import Calibration
-from rbxcompose.control.limits import MotionLimits
+from rbxcompose.control.limits import stopping_speed
+
+CREEP = 0.1  # of its speed, below which it does not slow down before it has arrived
+MOVES = 0.02  # of its speed: slower than this it is stuck
 
 
 @dataclass(frozen=True, slots=True)
-class LinearJoint:
-    """A joint that an actuator moves up or down at a set speed, and a reading that tells where it is.
+class LinearPolicy:
+    """How a joint goes to a position. ValueError if it cannot."""
 
-    ValueError if the range of `limits` is not within that of the calibration.
-    """
-
-    calibration: Calibration
-    """Pairs of reading and position [m]."""
-    limits: MotionLimits
+    speed: float
+    """[m/s], above 0."""
     dead_band: float = 0.01
-    """Within this of the wanted position the joint stands still [m]."""
+    """Within this of the wanted position it has arrived [m]."""
+    stall_after: float = 2.0
+    """Without progress for this long [s], it is stuck."""
+    acceleration: float | None = None
+    """With which it brakes [m/s^2]; None is at once."""
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.dead_band) and self.dead_band >= 0.0):
-            raise ValueError(f"a dead band of {self.dead_band} m is none")
-        low, high = self.span
-        for name, value in (("lower", self.limits.lower), ("upper", self.limits.upper)):
-            if value is not None and not low <= value <= high:
-                raise ValueError(
-                    f"the limit '{name}' of {value:g} m is beyond the calibration: {low:g} m to {high:g} m"
-                )
+        for what, value in (("speed", self.speed), ("dead band", self.dead_band), ("time", self.stall_after)):
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"a {what} of {value} is none")
 
-    @property
-    def span(self) -> tuple[float, float]:
-        """The least and the greatest position of the calibration [m]."""
-        ends = self.calibration.pairs[0][1], self.calibration.pairs[-1][1]
-        return min(ends), max(ends)
 
-    def position(self, reading: float) -> float | None:
-        """Return the position [m] of a reading; None if it is no finite number or beyond the calibration."""
-        first, last = self.calibration.pairs[0][0], self.calibration.pairs[-1][0]
-        return self.calibration.value(reading) if first <= reading <= last else None
+class LinearMove:
+    """One way to a position.
 
-    def reading(self, position: float) -> float:
-        """Return the reading at a position [m], clamped to the limits."""
-        return self.calibration.inverse(self.limits.clamped(position))
+    A joint that is within the dead band at the beginning does not move; one that moves goes on to the wanted position,
+    not to the edge of the dead band.
+    """
 
-    def direction(self, wanted: float, position: float | None, *, moving: int = 0) -> int:
-        """Return where to move: 1 up, -1 down, 0 to stand still; without a position it stands still.
+    def __init__(self, policy: LinearPolicy, wanted: float, position: float, now: float) -> None:
+        self.policy, self.wanted = policy, wanted
+        self.is_over = abs(wanted - position) <= policy.dead_band
+        self.failure = ""
+        """Why it ended before it had arrived."""
+        self._direction = math.copysign(1.0, wanted - position)
+        self._best, self._since = abs(wanted - position), now  # how near it came, and when [m, s]
 
-        A joint that moves (`moving` is 1 or -1) goes on until it has reached or passed the wanted position, so that it
-        does not stop at the edge of the dead band and start again.
-        """
-        if position is None or not math.isfinite(wanted):
-            return 0
-        gap = self.limits.clamped(wanted) - position
-        if moving and gap * moving > 0.0:
-            return moving
-        return 0 if abs(gap) <= self.dead_band else int(math.copysign(1, gap))
+    def step(self, position: float, now: float, dt: float) -> float:
+        """Return with which velocity to move up to `now + dt` [m/s]; 0 when it is over."""
+        gap = self.wanted - position
+        has_passed, is_near = gap * self._direction <= 0.0, abs(gap) <= self.policy.dead_band
+        self._watch(gap, now)
+        if self.is_over or (has_passed and is_near):
+            self.is_over = True
+            return 0.0
+        self._direction = math.copysign(1.0, gap)
+        braking = stopping_speed(abs(gap), dt, self.policy.acceleration)
+        return self._direction * min(self.policy.speed, max(braking, CREEP * self.policy.speed))
+
+    def _watch(self, gap: float, now: float) -> None:
+        """End when there is no progress."""
+        policy = self.policy
+        if abs(gap) < self._best - MOVES * policy.speed * policy.stall_after:
+            self._best, self._since = abs(gap), now
+        if now - self._since >= policy.stall_after and not self.is_over:
+            self.is_over = True
+            if abs(gap) > policy.dead_band:
+                self.failure = f"it has not moved for {policy.stall_after:g} s, {abs(gap):.3g} m before its goal"

@@ -123,6 +123,10 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
         """End the trajectory."""
         self._end(self.follower.abort(now, reason))
 
+    def let_go(self, joint: str, now: float, reason: str) -> None:
+        """End the trajectory; the joint is not led to rest."""
+        self._end(self.follower.lose(joint, now, reason))
+
     def _trajectory(self, goal: Follow.Goal) -> TrajectoryGoal:
         return trajectory_of(goal, self.site.now, self.site.stamp)
 

@@ -21,6 +21,9 @@ class WantedComponent:
     """Its configuration, or the data from which its type makes one."""
     path: KeyPath
     options: ComponentOptions = field(default_factory=ComponentOptions)
+    places: Mapping[str, KeyPath] = field(default_factory=dict)
+    """Where the manifest has fields and ports that it got from elsewhere: `{"controllers.base": ("controllers",
+    "base")}`."""
 
 
 class Wiring(Protocol):

@@ -151,6 +151,7 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
         options.restart,
         log,
         capabilities,
+        wanted.places,
     )
 
 

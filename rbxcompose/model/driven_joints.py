@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from rbxcompose.actuation.bus_types import DYNAMIXEL
 from rbxcompose.actuation.servo_joint import ServoJoint
-from rbxcompose.actuation.servo_models import ServoModel, model_named
+from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.body.model import BodyJoint
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import KeyPath
@@ -72,15 +73,12 @@ class DrivenBus:
 
 
 def driven_buses(robot: Robot) -> Iterator[DrivenBus]:
-    """Yield each bus whose joints are driven."""
+    """Yield each bus of Dynamixel servos whose joints are driven."""
     for component in robot.components.values():
-        if component.path[:1] == BUSES:
-            bus: Any = component.config
+        bus: Any = component.config
+        if component.path[:1] == BUSES and bus.kind == DYNAMIXEL:
             servos = {
-                servo.id: (model, joint.mode)
-                for joint in bus.joints.values()
-                for servo in joint.servos
-                if (model := model_named(servo.model))
+                servo.id: (bus.model(servo.model), one.mode) for one in bus.joints.values() for servo in one.servos
             }
             yield DrivenBus(bus.name, component.path, bus.baud, bus.rate, bus.return_delay, servos)
 
@@ -91,9 +89,11 @@ def driven_joints(robot: Robot) -> Iterator[DrivenJoint]:
     body = robot.manifest.body.body.joints if robot.manifest.body else {}
     for component in robot.components.values():
         if component.path[:1] == BUSES:
-            from rbxcompose.servo_bus_config import servo_joint  # slow to import, and most robots need none
+            from rbxcompose.servo_bus_config import drives_of  # slow to import, and most robots need none
 
             bus: Any = component.config
-            for name, one in bus.joints.items():
+            for name, drive in drives_of(bus).items():
                 if name in written:
-                    yield DrivenJoint(robot, bus.name, written[name], body.get(name), servo_joint(name, one), one.mimic)
+                    yield DrivenJoint(
+                        robot, bus.name, written[name], body.get(name), drive.joint, bus.joints[name].mimic
+                    )

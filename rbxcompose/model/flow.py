@@ -82,11 +82,11 @@ def setting_span(robot: Robot, *settings: tuple[RobotComponent, str]) -> Span:
     """
     for component, name in settings:
         if is_written(robot, component, name):
-            return robot.value(*component.path, *name.split("."))
+            return robot.value(*component.place(name))
     component, name = settings[0]
     return robot.component_span(component.name) if name else robot.value(*component.path, "type")
 
 
 def is_written(robot: Robot, component: RobotComponent, name: str) -> bool:
     """Return whether a field of the configuration is written down in the manifest."""
-    return bool(name) and at(robot.manifest.root, (*component.path, *name.split("."))) is not None
+    return bool(name) and at(robot.manifest.root, component.place(name)) is not None

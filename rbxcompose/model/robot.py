@@ -24,6 +24,7 @@ from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import In, Out
 
 K = TypeVar("K", bound=Capability)
+ENTRY = 2  # length of the path of an entry: section and name
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,7 @@ class RobotComponent:
     restart: Restart = DEFAULT
     log: Level = Level.OK  # the lowest level that is logged
     capabilities: tuple[Capability, ...] = ()
+    places: Mapping[str, KeyPath] = field(default_factory=dict)  # of fields and ports that are written elsewhere
     _by_port: dict[str, PortEnd] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -49,6 +51,14 @@ class RobotComponent:
     def end(self, port: str) -> PortEnd | None:
         """Return the end of a port, or None."""
         return self._by_port.get(port)
+
+    def place(self, field: str) -> KeyPath:
+        """Return where the manifest has a field of the configuration, or would have it."""
+        keys = field.split(".")
+        for length in range(len(keys), 0, -1):
+            if (there := self.places.get(".".join(keys[:length]))) is not None:
+                return (*there, *keys[length:])
+        return (*self.path, *keys)
 
     def declared(self, kind: type[K]) -> list[K]:
         """Return the capabilities of a kind."""
@@ -127,17 +137,35 @@ class Robot:
 
     def end_span(self, end: PortEnd) -> Span:
         """Return the place where a port is connected, else that of the name of its component."""
-        path = (*self.components[end.instance].path, "connect", end.name)
+        component = self.components[end.instance]
+        if end.name in component.places:
+            return self.key(*component.places[end.name])
+        path = (*component.path, "connect", end.name)
         return self.key(*path) if at(self.manifest.root, path) is not None else self.component_span(end.instance)
+
+    def connection(self, wanted: Iterable[tuple[PortEnd, str]]) -> str:
+        """Return what to write so that ports of one component have other topics; nothing if that cannot be."""
+        given, renamed = [], []
+        for end, topic in wanted:
+            place = self.components[end.instance].places.get(end.name)
+            if place is None:
+                renamed.append(f"{end.name}: {topic}")
+            elif len(place) > ENTRY:
+                given.append(f"'{'.'.join(map(str, place[ENTRY:]))}: {topic}'")
+        return ", ".join([*given, *([f"'connect: {{{', '.join(renamed)}}}'"] if renamed else [])])
 
     def component_span(self, name: str) -> Span:
         """Return the place of the name of a component."""
         return key_span(self.manifest.root, self.components[name].path)
 
-    def entry_span(self, name: str) -> Span:
-        """Return the place of the robot's entry that brings a component: its own, or the one that includes it."""
+    def entry_span(self, name: str, port: str = "") -> Span:
+        """Return the place of the robot's entry that brings a component: its own, or the one that includes it.
+
+        A port may come from an entry of its own.
+        """
         brought = (one.span for one in self.manifest.parts.values() if name in one.components)
-        return next(brought, None) or self.component_span(name)
+        place = self.components[name].places.get(port, ())
+        return next(brought, None) or (self.key(*place[:ENTRY]) if place else self.component_span(name))
 
 
 def _by_topic(ends: Iterable[PortEnd]) -> Mapping[str, list[PortEnd]]:

@@ -47,13 +47,14 @@ def _actions(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
                 pausable=port.pausable,
                 outcomes=port.outcomes,
                 entries=port.entries,
+                measures=port.measures,
             )
             yield SkillSource(skill, end.type_name, end.topic)
 
 
 def _services(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
     for end in _ends(components):
-        if isinstance(end.port, Serves) and end.port.interface is not None:
+        if isinstance(end.port, Serves) and end.port.interface is not None and end.skill:
             skill = service_skill(end.port.interface, end.skill)
             if skill is not None:
                 yield SkillSource(skill, end.type_name, end.topic, SkillWay.SERVICE)

@@ -8,7 +8,7 @@ from typing import Any
 
 from rbxcompose.config import Config
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import Port, ServesAction
+from rbxcompose.sdk.ports import Port, Serves, ServesAction
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class PortEnd:
     @property
     def skill(self) -> str:
         """Return the name that a skill served here has in missions; empty if they do not have it."""
-        named = self.port.skill if isinstance(self.port, ServesAction) else ""
+        named = self.port.skill if isinstance(self.port, Serves | ServesAction) else ""
         return "" if named is None else named or self.topic.rpartition("/")[-1]
 
 

@@ -12,6 +12,52 @@ from rbxcompose.msgs import builtin_interfaces, std_msgs, trajectory_msgs, uniqu
 from rbxcompose.msgs.types import Action, Fields, Message, Service
 
 
+@dataclass(frozen=True, slots=True)
+class JointTolerance(Message):
+    """How far a joint may be from where it should be; 0 is the default of the controller, -1 is no limit."""
+
+    TYPE: ClassVar[str] = "control_msgs/msg/JointTolerance"
+    HASH: ClassVar[str] = "RIHS01_c254f9cece0f3b733017b6990fd46d1326e25242d6b8844398c97d9a88e7d648"
+    FIELDS: ClassVar[Fields] = {
+        "name": "string",
+        "position": "float64",
+        "velocity": "float64",
+        "acceleration": "float64",
+    }
+
+    name: str = ""
+    position: float = 0.0  # [rad or m]
+    velocity: float = 0.0  # [rad/s or m/s]
+    acceleration: float = 0.0  # [rad/s^2 or m/s^2]
+
+
+@dataclass(frozen=True, slots=True)
+class JointComponentTolerance(Message):
+    """How far one component of a joint of several degrees of freedom may be from where it should be."""
+
+    TYPE: ClassVar[str] = "control_msgs/msg/JointComponentTolerance"
+    HASH: ClassVar[str] = "RIHS01_739ea7566931944d33830fa10f1bf5e7a7fbdc3172bce7a7eaac642bd6e3ffa4"
+    FIELDS: ClassVar[Fields] = {
+        "joint_name": "string",
+        "component": "uint16",
+        "position": "float64",
+        "velocity": "float64",
+        "acceleration": "float64",
+    }
+
+    X_AXIS: ClassVar[int] = 1
+    Y_AXIS: ClassVar[int] = 2
+    Z_AXIS: ClassVar[int] = 3
+    TRANSLATION: ClassVar[int] = 4
+    ROTATION: ClassVar[int] = 5
+
+    joint_name: str = ""
+    component: int = 0
+    position: float = 0.0
+    velocity: float = 0.0
+    acceleration: float = 0.0
+
+
 class FollowJointTrajectory(Action["FollowJointTrajectory.Goal", "FollowJointTrajectory.Result", "FollowJointTrajectory.Feedback"]):
     """Move joints along a trajectory."""
 
@@ -173,46 +219,279 @@ class FollowJointTrajectory(Action["FollowJointTrajectory.Goal", "FollowJointTra
 
 
 @dataclass(frozen=True, slots=True)
-class JointComponentTolerance(Message):
-    """How far one component of a joint of several degrees of freedom may be from where it should be."""
+class GripperCommandMessage(Message):
+    """The message `control_msgs/msg/GripperCommand`."""
 
-    TYPE: ClassVar[str] = "control_msgs/msg/JointComponentTolerance"
-    HASH: ClassVar[str] = "RIHS01_739ea7566931944d33830fa10f1bf5e7a7fbdc3172bce7a7eaac642bd6e3ffa4"
+    TYPE: ClassVar[str] = "control_msgs/msg/GripperCommand"
+    HASH: ClassVar[str] = "RIHS01_57eb8f326c9889ca8bb34ead82cc94cc09bf6bc5c3b6c09546dca3a00b589890"
     FIELDS: ClassVar[Fields] = {
-        "joint_name": "string",
-        "component": "uint16",
         "position": "float64",
-        "velocity": "float64",
-        "acceleration": "float64",
+        "max_effort": "float64",
     }
 
-    X_AXIS: ClassVar[int] = 1
-    Y_AXIS: ClassVar[int] = 2
-    Z_AXIS: ClassVar[int] = 3
-    TRANSLATION: ClassVar[int] = 4
-    ROTATION: ClassVar[int] = 5
-
-    joint_name: str = ""
-    component: int = 0
     position: float = 0.0
-    velocity: float = 0.0
-    acceleration: float = 0.0
+    max_effort: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class JointTolerance(Message):
-    """How far a joint may be from where it should be; 0 is the default of the controller, -1 is no limit."""
+class GripperCommand(Action["GripperCommand.Goal", "GripperCommand.Result", "GripperCommand.Feedback"]):
+    """The action `control_msgs/action/GripperCommand`."""
 
-    TYPE: ClassVar[str] = "control_msgs/msg/JointTolerance"
-    HASH: ClassVar[str] = "RIHS01_c254f9cece0f3b733017b6990fd46d1326e25242d6b8844398c97d9a88e7d648"
-    FIELDS: ClassVar[Fields] = {
-        "name": "string",
-        "position": "float64",
-        "velocity": "float64",
-        "acceleration": "float64",
-    }
+    TYPE: ClassVar[str] = "control_msgs/action/GripperCommand"
+    HASH: ClassVar[str] = "RIHS01_e17c0e644eccf14bea84a0a93e0977182872c2eb7873ca6694900059b46dbc84"
 
-    name: str = ""
-    position: float = 0.0  # [rad or m]
-    velocity: float = 0.0  # [rad/s or m/s]
-    acceleration: float = 0.0  # [rad/s^2 or m/s^2]
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `GripperCommand`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_Goal"
+        HASH: ClassVar[str] = "RIHS01_607d9f41eb241e1922e90f02125e87ae6bfb78f7f64a71dc92630263d01f8b6d"
+        FIELDS: ClassVar[Fields] = {
+            "command": "control_msgs/msg/GripperCommand",
+        }
+
+        command: GripperCommandMessage = field(default_factory=GripperCommandMessage)
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `GripperCommand`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_Result"
+        HASH: ClassVar[str] = "RIHS01_bf512d5aa6a0e4fe4d8be22b2ec4a1973c3d250fa1f65e47450322c25c45c0a0"
+        FIELDS: ClassVar[Fields] = {
+            "position": "float64",
+            "effort": "float64",
+            "stalled": "bool",
+            "reached_goal": "bool",
+        }
+
+        position: float = 0.0
+        effort: float = 0.0
+        stalled: bool = False
+        reached_goal: bool = False
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `GripperCommand`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_Feedback"
+        HASH: ClassVar[str] = "RIHS01_8f7c520077bab528bb9161ee3b83c81eee1f8aecadb8922ce82c79d667a819c4"
+        FIELDS: ClassVar[Fields] = {
+            "position": "float64",
+            "effort": "float64",
+            "stalled": "bool",
+            "reached_goal": "bool",
+        }
+
+        position: float = 0.0
+        effort: float = 0.0
+        stalled: bool = False
+        reached_goal: bool = False
+
+    class SendGoal(Service["GripperCommand.SendGoal.Request", "GripperCommand.SendGoal.Response"]):
+        """Sends a goal of `GripperCommand`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_6bf8cc4ce80cd499e7dd3258c03c50c3fa6672b469ff8355339ef1df77fcd212"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `GripperCommand.SendGoal`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_1b869b7b4042272dc0f8ed65468c4e57c9e532ea5e53ce74fda0767eefbfa983"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "control_msgs/action/GripperCommand_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: GripperCommand.Goal = field(default_factory=lambda: GripperCommand.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `GripperCommand.SendGoal`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_0c8dda5e9d39ab5e3162b66e79b292a4258659ddfcf8722d39463f718b6c59bc"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["GripperCommand.GetResult.Request", "GripperCommand.GetResult.Response"]):
+        """Waits for the result of a goal of `GripperCommand`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_GetResult"
+        HASH: ClassVar[str] = "RIHS01_7e60a7606063d4a2728d21badac099e68b734a196ac3ab42d1d4c668eb0bb3cd"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `GripperCommand.GetResult`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_1a3308da3acbc62cd8a3c823de80ba9e5f9b6bb6f6056d1ad6b29f5f285f97ae"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `GripperCommand.GetResult`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_32ed5e1b5906767a3e9914dca4c4aed22529918f6c2360e6fb382363d4df4b45"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "control_msgs/action/GripperCommand_Result",
+            }
+
+            status: int = 0
+            result: GripperCommand.Result = field(default_factory=lambda: GripperCommand.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `GripperCommand` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/GripperCommand_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_392ff03fcd872f9dc2405cbeb2897fcf011ad9998458b6aa85c603b8a49e431d"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "control_msgs/action/GripperCommand_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: GripperCommand.Feedback = field(default_factory=lambda: GripperCommand.Feedback())
+
+
+class SingleJointPosition(Action["SingleJointPosition.Goal", "SingleJointPosition.Result", "SingleJointPosition.Feedback"]):
+    """Move a single joint to a position."""
+
+    TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition"
+    HASH: ClassVar[str] = "RIHS01_1b330d11638c0b1d3228cc80b1123e5b3db3d24592e95429812bf30056e3db7b"
+
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `SingleJointPosition`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_Goal"
+        HASH: ClassVar[str] = "RIHS01_c434f6bb755396b6037c46761f492580e7121d17157ead1d58dfee174001cf79"
+        FIELDS: ClassVar[Fields] = {
+            "position": "float64",
+            "min_duration": "builtin_interfaces/msg/Duration",
+            "max_velocity": "float64",
+        }
+
+        position: float = 0.0
+        min_duration: builtin_interfaces.Duration = field(default_factory=builtin_interfaces.Duration)
+        max_velocity: float = 0.0
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `SingleJointPosition`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_Result"
+        HASH: ClassVar[str] = "RIHS01_4fa10d555d539d00370b7114db3c3dddb182647e720c8c5faaf8e184822db14c"
+        FIELDS: ClassVar[Fields] = {}
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `SingleJointPosition`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_Feedback"
+        HASH: ClassVar[str] = "RIHS01_b3eb28913208b01d2713c908067a803a975ef81a8b9431fd6b4639f2e91fc1fc"
+        FIELDS: ClassVar[Fields] = {
+            "header": "std_msgs/msg/Header",
+            "position": "float64",
+            "velocity": "float64",
+            "error": "float64",
+        }
+
+        header: std_msgs.Header = field(default_factory=std_msgs.Header)
+        position: float = 0.0
+        velocity: float = 0.0
+        error: float = 0.0
+
+    class SendGoal(Service["SingleJointPosition.SendGoal.Request", "SingleJointPosition.SendGoal.Response"]):
+        """Sends a goal of `SingleJointPosition`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_abcf6f8acd1889a685cd6ac2e948284a8012a81d01e6af0d6a918c52d759ca47"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `SingleJointPosition.SendGoal`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_5ddd6989bdf3389df344904c69b041d2b7eec76dfbb9fad4f66cf3714a3f0806"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "control_msgs/action/SingleJointPosition_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: SingleJointPosition.Goal = field(default_factory=lambda: SingleJointPosition.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `SingleJointPosition.SendGoal`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_bd3d63d72361e578cc2035b5b28db74b10e876db6050608589fc8f0b523f9839"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["SingleJointPosition.GetResult.Request", "SingleJointPosition.GetResult.Response"]):
+        """Waits for the result of a goal of `SingleJointPosition`."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_GetResult"
+        HASH: ClassVar[str] = "RIHS01_afe95c54e7c59cdb7e0d978bfafb908e3f1546975d540911a1768009d577351d"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `SingleJointPosition.GetResult`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_d2b87049687ebad79bebbd130e6913b690069fba19f19b4b4774754f969d1566"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `SingleJointPosition.GetResult`."""
+
+            TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_6475df69e4fbff1aa8dcd8d2825e03f6faa3c69f158c8fe1d058eb506d53ee9e"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "control_msgs/action/SingleJointPosition_Result",
+            }
+
+            status: int = 0
+            result: SingleJointPosition.Result = field(default_factory=lambda: SingleJointPosition.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `SingleJointPosition` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "control_msgs/action/SingleJointPosition_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_6da19eb420db90080a9bd9cac0041c865254b8e49cbe0d2b54c78e1814ed499b"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "control_msgs/action/SingleJointPosition_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: SingleJointPosition.Feedback = field(default_factory=lambda: SingleJointPosition.Feedback())

@@ -56,16 +56,17 @@ class _Module:
         return "\n\n\n".join(["\n".join(self._head()), *classes]) + "\n"
 
     def _in_order(self) -> list[str]:
-        """Return the interfaces of the package in an order in which each message follows those inside it."""
+        """Return the interfaces of the package in an order in which each one follows the messages inside it."""
         names = sorted(
             name for name in self.structures if name.startswith(f"{self.package}/") and "_" not in _bare(name)
         )
         ordered: dict[str, None] = {}
 
         def visit(name: str) -> None:
-            for field in self.structures[name].fields:
-                if field.type.base in names:
-                    visit(field.type.base)
+            whole = (one for part, one in self.structures.items() if part == name or part.startswith(f"{name}_"))
+            for base in (field.type.base for one in whole for field in one.fields):
+                if base in names:
+                    visit(base)
             ordered[name] = None
 
         for name in names:
@@ -106,7 +107,7 @@ class _Module:
                 return self._action(name)
 
     def _action(self, name: str) -> Iterator[str]:
-        path = _python_path(name)
+        path = self._path(name)
         base = self._use("Action", TYPES)
         yield f'class {path}({base}["{path}.Goal", "{path}.Result", "{path}.Feedback"]):'
         yield from _indented(self._heading(name, self.structures[f"{name}_Goal"].comment or f"The action `{name}`."))
@@ -118,12 +119,21 @@ class _Module:
         yield from _indented(["", *feedback])
 
     def _service(self, name: str, doc: str) -> Iterator[str]:
-        path = _python_path(name)
+        path = self._path(name)
         base = self._use("Service", TYPES)
         yield f'class {path.split(".")[-1]}({base}["{path}.Request", "{path}.Response"]):'
         yield from _indented(self._heading(name, doc))
         for part in ("Request", "Response"):
             yield from _indented(["", *self._message(f"{name}_{part}", f"{part} of `{path}`.")])
+
+    def _path(self, name: str) -> str:
+        """Return the path of a structure in its module: `SetBool.Request` for `std_srvs/srv/SetBool_Request`.
+
+        A message that shares its name with an action of its package is told apart: `GripperCommandMessage`.
+        """
+        package, kind, bare = name.split("/")
+        is_shared = kind == "msg" and f"{package}/action/{bare}_Goal" in self.structures
+        return f"{bare}Message" if is_shared else bare.replace("_", ".")
 
     def _message(self, name: str, doc: str) -> Iterator[str]:
         structure = self.structures[name]
@@ -131,7 +141,7 @@ class _Module:
         base = self._use("ArrayMessage", ARRAYS) if has_arrays else self._use("Message", TYPES)
         options = "frozen=True, slots=True" + (", eq=False" if has_arrays else "")
         yield f"@{self._use('dataclass', 'dataclasses')}({options})"
-        yield f"class {_python_path(name).split('.')[-1]}({base}):"
+        yield f"class {self._path(name).split('.')[-1]}({base}):"
         yield from _indented(self._heading(name, doc))
         yield from _indented(self._fields_by_name(structure))
         for group in (map(self._constant, structure.constants), map(self._field, structure.fields)):
@@ -192,7 +202,7 @@ class _Module:
             case number if not type_.is_message:
                 return ("float", "0.0") if number in FLOATS else ("int", "0")
         package = type_.base.split("/")[0]
-        path = _python_path(type_.base)
+        path = self._path(type_.base)
         if package != self.package:
             self.packages.add(package)
             return f"{package}.{path}", f"{package}.{path}"
@@ -205,11 +215,6 @@ class _Module:
 
 def _bare(name: str) -> str:
     return name.split("/")[2]
-
-
-def _python_path(name: str) -> str:
-    """Return the path of a structure in its module: `SetBool.Request` for `std_srvs/srv/SetBool_Request`."""
-    return _bare(name).replace("_", ".")
 
 
 def _least(type_: FieldType) -> int:

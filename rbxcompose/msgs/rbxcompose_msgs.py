@@ -17,6 +17,137 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+class Grip(Action["Grip.Goal", "Grip.Result", "Grip.Feedback"]):
+    """Open or close a gripper."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/action/Grip"
+    HASH: ClassVar[str] = "RIHS01_9240acfef75880f16ee62f47823aed2f9c44339c3d618588ab2de2f0f670c22b"
+
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `Grip`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/Grip_Goal"
+        HASH: ClassVar[str] = "RIHS01_3e04807c83994fb6981e2a68697bd211583695135614d4332d54bdde41e77308"
+        FIELDS: ClassVar[Fields] = {
+            "opening": "float64",
+        }
+
+        opening: float = 0.0  # [m] between its pads
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `Grip`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/Grip_Result"
+        HASH: ClassVar[str] = "RIHS01_9bc0a756d365dae8cc046be197417b1f8af7bc974a704d2cc5ff169e838d22ea"
+        FIELDS: ClassVar[Fields] = {
+            "opening": "float64",
+            "reached": "bool",
+            "stalled": "bool",
+            "outcome": "string",
+            "message": "string",
+        }
+
+        opening: float = 0.0  # [m]
+        reached: bool = False
+        stalled: bool = False
+        outcome: str = ""
+        message: str = ""
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `Grip`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/Grip_Feedback"
+        HASH: ClassVar[str] = "RIHS01_2f12468a8610140400d2fabef1e19e5ec73df1c295a1540bee4467bac4370b57"
+        FIELDS: ClassVar[Fields] = {
+            "opening": "float64",
+        }
+
+        opening: float = 0.0  # [m]
+
+    class SendGoal(Service["Grip.SendGoal.Request", "Grip.SendGoal.Response"]):
+        """Sends a goal of `Grip`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/Grip_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_2a37a96f46c197838e370cc8474c833ea12ff61db1d89a6a129b8dfa5ef3bb47"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `Grip.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/Grip_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_99200300839865501655deb8db6b0b01c24c7a001aa333f78807af7afa8da94f"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "rbxcompose_msgs/action/Grip_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: Grip.Goal = field(default_factory=lambda: Grip.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `Grip.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/Grip_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_8f64f673b221d8dcf715c4334406b38e03497fd8f1d7981eeced805f29d5f427"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["Grip.GetResult.Request", "Grip.GetResult.Response"]):
+        """Waits for the result of a goal of `Grip`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/Grip_GetResult"
+        HASH: ClassVar[str] = "RIHS01_4b2e3d6673904982a3af80a0884054fc4d991e41fb7f9dc66c08bb7bf9ac6b93"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `Grip.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/Grip_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_b3aa40d237ce4ab13c814470a932e38705e45a4ad056a7c6ec3040ad47a09278"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `Grip.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/Grip_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_1fc7b6930e18c40fd611d40f132b55e361fc9aeb76f49ef9cfe21d652b4ca5a8"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "rbxcompose_msgs/action/Grip_Result",
+            }
+
+            status: int = 0
+            result: Grip.Result = field(default_factory=lambda: Grip.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `Grip` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/Grip_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_1dd68900fdb9f5ecfb5fab958635eeaf0c233206fdccfc69dde9fdc2b01d92df"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "rbxcompose_msgs/action/Grip_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: Grip.Feedback = field(default_factory=lambda: Grip.Feedback())
+
+
 class MoveJoints(Action["MoveJoints.Goal", "MoveJoints.Result", "MoveJoints.Feedback"]):
     """Move some joints of a controller in a time; 0 is as fast as their limits allow."""
 

@@ -216,6 +216,13 @@ def _skills(cls: type[Any]) -> Iterator[Skill]:
     for _, port in inspect.getmembers(cls):
         name = port.topic.rsplit("/", 1)[-1] if isinstance(port, ServesAction | ServesTopic) else ""
         if isinstance(port, ServesAction) and port.interface is not None and port.skill is not None:
-            yield skill_of(port.interface, port.skill or name, port.claims, port.restartable, entries=port.entries)
+            yield skill_of(
+                port.interface,
+                port.skill or name,
+                port.claims,
+                port.restartable,
+                entries=port.entries,
+                measures=port.measures,
+            )
         if isinstance(port, ServesTopic) and port.interface is not None:
             yield topic_skill(port.interface, name, None, port.claims, port.restartable, entries=port.entries)

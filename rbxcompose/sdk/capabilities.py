@@ -7,12 +7,13 @@ text in a capability is the name of a port of the component; everything else is 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Generic, TypeVar
 
 from rbxcompose.config import Config, Place
 
 T_co = TypeVar("T_co", covariant=True)
+C = TypeVar("C", bound="Capability")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,22 @@ class Drives(Capability):
     """Acceleration, also of braking [m/s^2]."""
     turn_acceleration: Setting[float] | None = None
     """Angular acceleration, also of braking [rad/s^2]."""
+
+
+@dataclass(frozen=True, slots=True)
+class RollsOn(Capability):
+    """A base on two driven wheels; they are joints of the body, whose positive direction is forwards."""
+
+    left: Setting[str]
+    """The joint of the left wheel."""
+    right: Setting[str]
+    """The joint of the right wheel."""
+    wheel_distance: Setting[float]
+    """Between the points where the wheels touch the ground [m]."""
+    wheel_radius: Setting[float] | None = None
+    """[m]."""
+    link: Setting[str] | None = None
+    """The link of the body that moves with the base: x is forwards."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +156,23 @@ class NeedsExtra(Capability):
 @dataclass(frozen=True, slots=True)
 class RunsMissions(Capability):
     """It runs the robot's missions: its skills are those of the robot, and values may come from outside."""
+
+
+def within(capability: C, ports: str, fields_: str) -> C:
+    """Return a capability of a part of a component: these begin the names of its ports, and those of its fields."""
+    changed = {one.name: _within(getattr(capability, one.name), ports, fields_) for one in fields(capability)}
+    return replace(capability, **changed)
+
+
+def _within(value: object, ports: str, fields_: str) -> object:
+    match value:
+        case Setting(value=inner, field=str(field)) if field:
+            return Setting(inner, f"{fields_}{field}")
+        case str() if value:
+            return f"{ports}{value}"
+        case tuple():
+            return tuple(f"{ports}{port}" for port in value)
+    return value
 
 
 def settings_of(capability: Capability) -> Iterator[Setting[Any]]:

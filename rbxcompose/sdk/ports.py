@@ -13,6 +13,7 @@ from rbxcompose.msgs.entries import ArrayEntries
 from rbxcompose.msgs.types import Action, Message, Service
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import ActionCaller, ActionServer, Caller, Latest, Look, Sender
+from rbxcompose.units import Dimension
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)
@@ -159,13 +160,16 @@ class SendsOrders(Out[M]):
 
 
 class Serves(Port[None]):
-    """Serves requests: the method `on_<port>` takes a request and returns the response."""
+    """Serves requests: the method `on_<port>` takes a request and returns the response.
+
+    It is a skill of missions if the response has a flag `success`; `skill` is as in `ServesAction`.
+    """
 
     kind = "serves"
 
-    def __init__(self, service: type[Service[Q, R]], topic: str) -> None:
+    def __init__(self, service: type[Service[Q, R]], topic: str, *, skill: str | None = "") -> None:
         super().__init__(topic)
-        self.interface = service
+        self.interface, self.skill = service, skill
 
 
 class Calls(Port[Caller[Q, R]]):
@@ -186,7 +190,8 @@ class ServesAction(Port[ActionServer[G, R, F]]):
     `outcome`. A `pausable` one respects `current.is_paused`: the service `<topic>/pause` holds goals. The optional
     method `accept_<port>` may refuse a goal by returning the reason. `skill` is its name in missions; without it, that
     is the last word of the topic, and None means that missions do not have it. Its arguments are the fields of the
-    goal, and the `entries` of two of its arrays.
+    goal, and the `entries` of two of its arrays. `measures` are the dimensions of numbers of the goal, so that missions
+    write them with units: `{"opening": LENGTH}`.
     """
 
     kind = "serves_action"
@@ -202,12 +207,13 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         outcomes: Mapping[str, str] = MappingProxyType({}),
         skill: str | None = "",
         entries: ArrayEntries | None = None,
+        measures: Mapping[str, Dimension] = MappingProxyType({}),
     ) -> None:
         """Declare the port.
 
         Raises:
             ValueError: if there are outcomes but the result has no field for them, one counts as something else, or the
-                goal does not have the `entries`.
+                goal does not have the `entries`, or a number that `measures` names.
         """
         super().__init__(topic)
         self.skill = skill
@@ -215,6 +221,9 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         if entries is not None:
             entries.require_in(action.Goal)
         self.entries = entries
+        if wrong := [name for name in measures if action.Goal.FIELDS.get(name) not in ("float32", "float64")]:
+            raise ValueError(f"{action.Goal.TYPE} has no number '{wrong[0]}'")
+        self.measures = measures
         self.interface, self.claims, self.restartable = action, claims, restartable
         self.pausable, self.outcomes = pausable, outcomes
 

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, WithJsonSchema
 
+from rbxcompose.actuation.bus_types import bus_type_names
 from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.config import Angle, BitRate, Config, Frequency, Time
-from rbxcompose.control.limits import MotionLimits
+from rbxcompose.controller_interface import ControllerConfig, controller_type
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, SetScope
-from rbxcompose.manifest.tree import key_span
-from rbxcompose.manifest.validate import MISSING_KEY
+from rbxcompose.manifest.tree import KeyPath, at, key_span, value_span
+from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.manifest.written import as_written
 from rbxcompose.references import DEVICE_PORT, SERVO_BUS, Refers
@@ -23,8 +24,10 @@ from rbxcompose.sections.body import body
 from rbxcompose.sections.controllers import controllers
 from rbxcompose.sections.devices import port_name
 from rbxcompose.sections.faults import buses_of_joints, faults_of
-from rbxcompose.sections.joints import JointModel, joints, limits_of, table_of
+from rbxcompose.sections.joints import JointModel, held_limits, joints, table_of
 from rbxcompose.sections.safety import safety
+
+BusTypeName = Annotated[str, WithJsonSchema({"type": "string", "enum": bus_type_names()})]
 
 
 class TwinModel(Config):
@@ -39,7 +42,7 @@ class TwinModel(Config):
 class BusOfServosModel(Config):
     """A line of servos, driven by a process of its own."""
 
-    type: Literal["dynamixel"]
+    type: BusTypeName
     """What speaks on it."""
     port: Annotated[str, Refers(DEVICE_PORT)] = ""
     """The serial port, such as `/dev/ttyUSB0`, or `dev:NAME` of a device; simulated servos need none."""
@@ -59,6 +62,15 @@ class BusOfServosModel(Config):
     """How what simulated servos measure differs from what is."""
 
 
+def _is_known(reading: Reading[BusOfServosModel], name: str, one: BusOfServosModel) -> bool:
+    if one.type in bus_type_names():
+        return True
+    path = ("buses", name, "type")
+    span, node = value_span(reading.contents.root, path), at(reading.contents.root, path)
+    reading.report.add(not_a_choice(span, "type", node, bus_type_names()))
+    return False
+
+
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     """Yield the component that drives the joints of each bus."""
     description, driven, servos = contents.of(body), contents.of(joints), contents.of(actuators)
@@ -66,10 +78,13 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
     places = buses_of_joints(contents)
     for name, bus in contents.of(buses).items():
         own = {joint: one for joint, one in driven.items() if places.get(joint) == name}
-        if not own:
+        led = {key: one for key, one in contents.of(controllers).items() if _is_led(one, own, servos, name)}
+        used = {item.actuator: _servo(servos[item.actuator]) for one in led.values() for item in one.used}
+        if not own and not used:
             continue
         config = {
             "name": name,
+            "kind": bus.type,
             "port": port_name(contents, bus.port),
             "baud": round(bus.baud),
             "rate": bus.rate,
@@ -90,24 +105,50 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
                 for joint, one in own.items()
             },
             "controllers": {
-                controller: {
+                key: {
                     "type": one.type,
                     "settings": as_written(one),
                     "sliding": [joint for joint in one.led if joint in known.joints and known.joints[joint].slides],
                 }
-                for controller, one in contents.of(controllers).items()
-                if set(one.led) <= own.keys()
+                for key, one in led.items()
             },
+            "used": used,
         }
-        yield WantedComponent(name, "servo_bus", config, ("buses", name))
+        yield WantedComponent(name, "servo_bus", config, ("buses", name), places=_places(led))
+
+
+def _places(led: Mapping[str, ControllerConfig]) -> dict[str, KeyPath]:
+    """Return where the fields and the ports of controllers are written."""
+    found: dict[str, KeyPath] = {f"controllers.{name}": ("controllers", name) for name in led}
+    for name, one in led.items():
+        cls = controller_type(one.type)
+        for port in cls.ports(name, one):
+            found[f"{name}_{port}"] = (
+                "controllers",
+                name,
+                *(cls.topics[port].split(".") if port in cls.topics else ()),
+            )
+    return found
+
+
+def _is_led(
+    one: ControllerConfig, joints: Mapping[str, JointModel], servos: Mapping[str, ActuatorModel], bus: str
+) -> bool:
+    """Return whether all that a controller leads and uses is on a bus."""
+    places = [item.actuator in servos and servos[item.actuator].bus == bus for item in one.used]
+    return set(one.led) <= joints.keys() and all(places) and bool(one.led or places)
+
+
+def _servo(one: ActuatorModel) -> dict[str, object]:
+    return {"id": one.id, "model": one.model, "neutral": one.neutral, "invert": one.invert}
 
 
 def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorModel]) -> dict[str, object]:
     """Return how a joint is driven, within the limits of the body."""
-    limits = limits_of(driven, joint).limits or MotionLimits()  # those that leave nothing are told before
+    limits = held_limits(driven, joint)
     mimic = joint.mimic if joint else None
     return {
-        "servos": [{"id": one.id, "model": one.model, "neutral": one.neutral, "invert": one.invert} for one in servos],
+        "servos": [_servo(one) for one in servos],
         "mode": servos[0].mode,
         "ratio": math.tau / driven.travel if driven.travel else driven.ratio,
         "offset": driven.offset,
@@ -143,7 +184,8 @@ def buses(reading: Reading[BusOfServosModel]) -> dict[str, BusOfServosModel]:
             port: /dev/ttyUSB0
             rate: 100 Hz
     """
-    found = reading.entries()
+    read = reading.entries()
+    found = {name: one for name, one in read.items() if _is_known(reading, name, one)}
     for name, one in found.items():
         if not one.port and not reading.contents.is_simulated:
             span = key_span(reading.contents.root, ("buses", name))

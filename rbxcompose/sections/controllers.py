@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
 
+from rbxcompose.actuation.control_tables import OUTPUTS
+from rbxcompose.body.model import BodyJoint
 from rbxcompose.config import Config
 from rbxcompose.controller_interface import ControllerConfig, controller_names, controller_type
 from rbxcompose.findings import Finding, Related, Span, kind
@@ -13,8 +16,9 @@ from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, a
 from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
 from rbxcompose.plugins import BROKEN, BrokenPluginError
 from rbxcompose.references import CONTROLLER
-from rbxcompose.sections.actuators import actuators
-from rbxcompose.sections.joints import joints
+from rbxcompose.sections.actuators import actuators, model_of
+from rbxcompose.sections.body import body
+from rbxcompose.sections.joints import held_limits, joints
 
 NOT_DRIVEN = kind(
     "RBX2215",
@@ -57,6 +61,51 @@ base without an extent.
 Bad: `hand: {type: gripper, ..., finger_length: 2 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
 Good: `hand: {type: gripper, ..., finger_length: 6 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
 """,
+)
+NO_WHOLE_TURN = kind(
+    "RBX2280",
+    """A servo that does not see a whole turn is to be a wheel or a spindle
+
+Servos of the families AX, RX, EX and the XL-320 turn without an end, but they do not tell where they are in a part of
+each turn. So nobody knows the way of a wheel, or the height of a lift.
+
+Bad: `left_servo: {bus: servos, model: AX-12, id: 1, mode: velocity}` for a wheel of a `diff_drive`.
+Good: `left_servo: {bus: servos, model: XL430-W250, id: 1, mode: velocity}`
+""",
+)
+WRONG_KIND = kind(
+    "RBX2285",
+    """A controller leads a joint of another kind than it can
+
+A wheel turns without an end: in the URDF its joint is `continuous`. What a `linear` controller drives up and down
+slides: its joint is `prismatic`.
+
+Bad: `wheels: {type: diff_drive, left: left_wheel, ...}`, where `left_wheel` has `type="revolute"`.
+Good: the same, where the URDF has `<joint name="left_wheel" type="continuous">`.
+""",
+)
+BEYOND_LIMITS = kind(
+    "RBX2290",
+    """A controller asks for positions that its joint does not reach
+
+The joint would stop at its limit, and what the controller wants would never be done. The limits are those of the body,
+and those under `joints:`, which can only be tighter. Angles of a gripper follow from its `opening` and its fingers.
+
+Bad: `hand: {type: gripper, ..., opening: [0 cm, 9 cm]}`, for which the finger would turn farther than its `upper`.
+Good: `hand: {type: gripper, ..., opening: [0 cm, 5 cm]}`
+""",
+)
+NO_ITEM = kind(
+    "RBX2291",
+    """A servo has no such item
+
+The model of a servo decides which items its memory has: a light, and ports for sensors in some models. Only what moves
+nothing can be switched by a controller; everything can be read.
+
+Bad: `lamp: {type: gpio, actuator: pan_servo, item: lde, direction: out}`
+Good: `lamp: {type: gpio, actuator: pan_servo, item: led, direction: out}`
+""",
+    is_fixable=True,
 )
 
 
@@ -140,11 +189,16 @@ def _mistakes(
     root = reading.contents.root
     here, cls = key_span(root, ("controllers", name)), controller_type(one.type)
     yield from _undriven(reading, name, one)
+    yield from _unfit(reading, name, one)
+    yield from _blind(reading, name, one)
     if name in reading.contents.of(joints):
         yield NAME_OF_JOINT.at(here, f"'{name}' is a joint and a controller")
     if (mistake := cls.mistake(one)) is not None:
         field, reason = mistake
         yield CANNOT_WORK.at(key_span(root, ("controllers", name, field)), f"controller '{name}': {reason}")
+    else:
+        yield from _beyond(reading, name, one)
+        yield from _unknown_items(reading, name, one)
     for joint in one.led if one.start == "active" else ():
         other, span = owners.setdefault(joint, (name, here))
         if other != name:
@@ -178,6 +232,73 @@ def _undriven(reading: Reading[ControllerConfig], name: str, one: ControllerConf
             )
 
 
+def _unfit(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield a finding for each joint whose kind the controller cannot lead."""
+    description, wanted = reading.contents.of(body), controller_type(one.type).kinds
+    known = description.body.joints if description else {}
+    for joint in one.led if wanted else ():
+        if joint in known and known[joint].kind not in wanted:
+            kinds = " or ".join(sorted(wanted))
+            message = f"'{joint}' is {known[joint].kind} in the body, and '{name}' leads joints that are {kinds}"
+            related = [Related(known[joint].span, "the joint")]
+            yield WRONG_KIND.at(_place(reading, name, joint), message, related=related)
+
+
+def _blind(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield a finding for each servo that cannot tell how far its joint turns."""
+    driven, servos = reading.contents.of(joints), reading.contents.of(actuators)
+    if controller_type(one.type).interface != "velocity":
+        return
+    for servo in (each for joint in one.led if joint in driven for each in driven[joint].servos if each in servos):
+        model = model_of(reading.contents, servos[servo])
+        if model is not None and model.family.span < math.tau - model.per_tick:
+            degrees = round(math.degrees(model.family.span))
+            message = f"'{name}' needs to know how far '{servo}' turns, and an {model.name} tells {degrees} of 360 deg"
+            span = value_span(reading.contents.root, ("actuators", servo, "model"))
+            help_text = "take a model that sees the whole turn, such as XL430-W250 or MX-28"
+            here = Related(key_span(reading.contents.root, ("controllers", name)), "the controller")
+            yield NO_WHOLE_TURN.at(span, message, help=help_text, related=[here])
+
+
+def _beyond(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield findings on joints that the controller would move beyond their limits."""
+    driven, description = reading.contents.of(joints), reading.contents.of(body)
+    known = description.body.joints if description else {}
+    for joint, (least, greatest) in controller_type(one.type).asks(one).items():
+        if joint not in driven:
+            continue
+        limits = held_limits(driven[joint], known.get(joint))
+        is_below = least < limits.least - _ROUNDING
+        is_above = greatest > limits.greatest + _ROUNDING
+        if is_below or is_above:
+            show = _shown(known.get(joint))
+            message = f"the controller '{name}' moves '{joint}' from {show(least)} to {show(greatest)}"
+            bounds = " to ".join("any" if end is None else show(end) for end in (limits.lower, limits.upper))
+            yield BEYOND_LIMITS.at(_place(reading, name, joint), f"{message}, beyond its limits: {bounds}")
+
+
+def _unknown_items(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield findings on items that the model of a servo lacks, or that may not be switched."""
+    servos = reading.contents.of(actuators)
+    for used in one.used:
+        model = model_of(reading.contents, servos[used.actuator]) if used.actuator in servos else None
+        valid = [item for item in model.items if item in OUTPUTS or not used.is_written] if model else []
+        if model is not None and used.item not in valid:
+            span = value_span(reading.contents.root, ("controllers", name, used.field))
+            is_there = used.item in model.items
+            message = f"'{used.item}' cannot be switched" if is_there else f"{model.name} has no item '{used.item}'"
+            what = "items that can be switched" if used.is_written else "its items"
+            yield NO_ITEM.misspelt(span, message, used.item, valid, what)
+
+
+def _shown(joint: BodyJoint | None) -> Callable[[float], str]:
+    """Return how positions of a joint are written."""
+    if joint is not None and joint.kind == "prismatic":
+        return lambda position: f"{position:.4g} m"
+    return lambda position: f"{math.degrees(position):.4g} deg"
+
+
+_ROUNDING = 1e-4  # [rad or m], less than a tick
 _PLURAL = {"position": "positions", "velocity": "velocities"}
 
 

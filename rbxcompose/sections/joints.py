@@ -244,6 +244,11 @@ def limits_of(one: JointModel, joint: BodyJoint | None) -> Tightened:
     return tightened(_body_limits(joint), MotionLimits(least, greatest, velocity, acceleration))
 
 
+def held_limits(one: JointModel, joint: BodyJoint | None) -> MotionLimits:
+    """Return the limits that hold; none for a joint whose limits are a mistake, which is told."""
+    return limits_of(one, joint).limits or MotionLimits()
+
+
 def _servos(
     reading: Reading[dict[str, JointModel]], name: str, one: JointModel, users: dict[str, str]
 ) -> Iterator[Finding]:

@@ -30,6 +30,7 @@ from rbxcompose.sdk import (
     Out,
     PlaceName,
     Ratio,
+    RollsOn,
     ServesAction,
     Setting,
     Speed,
@@ -117,6 +118,34 @@ class FixedWheels(Wheels):
     def capabilities(cls, config: WheelsConfig) -> tuple[Capability, ...]:
         """Return its limits."""
         return (Drives("velocity", max_speed=Setting(0.5), stops_after=Setting(0.01), drops_above=Setting(3.0)),)
+
+
+class RollersConfig(WheelsConfig):
+    """A base with wheels in its body."""
+
+    port_wheel: str = "l_wheel_joint"
+    """To the left."""
+    starboard_wheel: str = "r_wheel_joint"
+    """To the right."""
+    track: Length = 0.34
+    """Between them."""
+    size: Length = 0.062
+    """Of both."""
+
+
+@component("toy_rollers")
+class Rollers(Component[RollersConfig]):
+    """One whose wheels are known."""
+
+    simulated = True
+    velocity = In(Twist, "cmd_vel", qos="command")
+
+    @classmethod
+    def capabilities(cls, config: RollersConfig) -> tuple[Capability, ...]:
+        """Return its speed and its wheels."""
+        left, right = Setting(config.port_wheel, "port_wheel"), Setting(config.starboard_wheel, "starboard_wheel")
+        wheels = RollsOn(left, right, Setting(config.track, "track"), Setting(config.size, "size"))
+        return Drives("velocity", max_speed=Setting(config.fastest, "fastest")), wheels
 
 
 class PilotConfig(Config):

@@ -146,3 +146,22 @@ def test_a_capability_of_what_is_not_there_is_an_error_of_its_author(
     thing = strangers.declaring("toy_wrong", capability)
     with pytest.raises(ValueError, match=told):
         found(f"  one: {{type: {thing.type_name}}}\n", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("setting", "code"),
+    [
+        ("track: 40 cm", "RBX2281"),
+        ("size: 5 cm", "RBX2281"),
+        ("port_wheel: r_wheel_joint", "RBX2282"),
+        ("fastest: 2 m/s", "RBX2283"),
+    ],
+)
+def test_a_strangers_wheels_are_compared_with_those_of_the_body(setting: str, code: str, tmp_path: Path) -> None:
+    other = "\n    starboard_wheel: l_wheel_joint" if setting.startswith("port") else ""
+    text = (
+        f"{HEAD}body: {{xacro: rbx:parts/body/box_base.urdf.xacro}}\ninclude: {{teleop: rbx:parts/teleop.yaml}}\n"
+        f"components:\n  base:\n    type: toy_rollers\n    {setting}{other}\n"
+    )
+    [finding] = check_text(text, tmp_path).compilation.report
+    assert (finding.code, finding.span and finding.span.line) == (code, 9)

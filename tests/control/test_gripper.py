@@ -14,7 +14,7 @@ from rbxcompose.control.gripper import (
     CalibratedGripper,
     DualGripper,
     FingerGeometry,
-    Grip,
+    GripAttempt,
     GripOutcome,
     GripperModel,
     GripPolicy,
@@ -53,7 +53,7 @@ def test_any_measured_angle_has_an_opening_within_the_range(name: str, angle: fl
 @pytest.mark.parametrize("opening", [-0.001, 0.2, math.nan])
 def test_an_opening_outside_of_the_range_is_refused_with_the_reason(name: str, opening: float) -> None:
     with pytest.raises(ValueError, match="it opens from 0 m to"):
-        Grip(MODELS[name], opening, GripPolicy())
+        GripAttempt(MODELS[name], opening, GripPolicy())
 
 
 def test_the_fingers_of_a_dual_gripper_turn_in_opposite_directions() -> None:
@@ -78,7 +78,7 @@ def test_a_gripper_that_cannot_be_is_refused_with_the_reason(build: Callable[[],
 
 def close_on(block: float, policy: GripPolicy, wanted: float = 0.0) -> tuple[GripOutcome | None, float]:
     """Close from 6 cm at 5 cm/s on a block [m]; return the outcome, and when it came."""
-    grip, opening, now = Grip(PARALLEL, wanted, policy), 0.06, 0.0
+    grip, opening, now = GripAttempt(PARALLEL, wanted, policy), 0.06, 0.0
     for _ in range(1000):
         outcome = grip.step(now, PARALLEL.angles(opening), 0.4)
         if outcome is not None:
@@ -108,9 +108,9 @@ def test_a_gripper_that_arrives_has_reached_its_goal() -> None:
 
 
 def test_a_slow_gripper_does_not_stall_and_a_silent_one_is_not_judged() -> None:
-    grip = Grip(PARALLEL, 0.0, GripPolicy())
+    grip = GripAttempt(PARALLEL, 0.0, GripPolicy())
     for index in range(300):
         assert grip.step(index * 0.1, PARALLEL.angles(0.06 - index * 0.00019)) is None
-    grip = Grip(PARALLEL, 0.0, GripPolicy())
+    grip = GripAttempt(PARALLEL, 0.0, GripPolicy())
     for index in range(300):
         assert grip.step(index * 0.1, (math.nan,)) is None

@@ -103,3 +103,16 @@ def test_readings_that_cannot_be_do_not_count_and_it_is_said_why() -> None:
     assert odometry.update(501.0, 1.0, 0.2) is None
     assert odometry.pose.x == pytest.approx(0.04)
     assert odometry.jumps == 1
+
+
+def test_velocities_are_averaged_over_the_window_and_a_late_reading_is_no_jump() -> None:
+    policy = OdometryPolicy(greatest_speed=1.0, resolution=6e-5, window=0.1)
+    odometry = WheelOdometry(GEOMETRY, policy)
+    for index in range(40):
+        tick = math.floor(0.3 * 0.01 * index / 6e-5) * 6e-5 / 0.04  # as a servo tells it
+        assert odometry.update(tick, tick, 0.01 * index) is None
+    assert odometry.velocity.linear == pytest.approx(0.3, abs=1e-3)
+    assert 0.0 < odometry.velocity_covariance[0, 0] < 1e-3
+    at = 0.3 * 0.4 / 0.04
+    assert odometry.update(at, at, 0.3901) is None
+    assert odometry.update(at + 10.0, at + 10.0, 0.41) is not None

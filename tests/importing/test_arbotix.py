@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import re
+import math
 from pathlib import Path
 
 import pytest
 
+from rbxcompose.controllers.gripper import GripperConfig, GripperController, model_of
 from rbxcompose.testing import check_text
 from rbxcompose.testing.golden import Golden
 from tests.importing.imports import FILES, import_files, import_texts
 
 GOLDEN = {"head": ["head"], "arm": ["head", "arm", "hand"], "base": ["base"]}
-GRIPPER = re.compile(r"^  gripper_controller:.*\n(    .*\n)+", re.MULTILINE)
 URDF = """<robot name="tried">
   <link name="base_footprint"/>
 {joints}
@@ -36,7 +36,7 @@ def test_what_is_written_and_what_is_told(name: str, repository: Path, golden: G
 @pytest.mark.parametrize("name", GOLDEN)
 def test_with_a_body_the_robot_has_no_mistake(name: str, repository: Path, tmp_path: Path) -> None:
     found = import_files([FILES / f"{one}.yaml" for one in GOLDEN[name]], name)
-    text = GRIPPER.sub("", found.text).replace("# body:", "body:")  # grippers are no controllers of manifests yet
+    text = found.text.replace("# body:", "body:")
     joints = "\n".join(JOINT.format(name=one) for one in found.data.get("joints", {}))
     checked = check_text(text, tmp_path, others={"robot.urdf": URDF.format(joints=joints)})
     assert checked.plan.robot == name
@@ -71,23 +71,32 @@ def test_parameters_below_the_names_of_programs_are_found(tmp_path: Path) -> Non
     text = "arbotix:\n  joints: {finger: {id: 1}}\nhand:\n  model: parallel\n  joint: finger\n  scale: -12.5\n"
     found = import_texts(tmp_path, text)
     assert list(found.data["joints"]) == ["finger"]
-    hand = {"type": "gripper", "model": "parallel", "joint": "finger", "scale": -12.5}
+    hand = {"type": "gripper", "model": "parallel", "joint": "finger", "travel": "0.5026548 m", "invert": True}
     assert found.data["controllers"] == {"hand": hand}
+    settings = GripperConfig.model_validate(hand | {"opening": ["0 mm", "50 mm"]})
+    assert GripperController.mistake(settings) is None
+    assert model_of(settings).angles(0.02) == pytest.approx((-12.5 * 0.02,), rel=1e-6)
 
 
 def test_a_file_of_gripper_parameters_gives_the_gripper_its_name(tmp_path: Path) -> None:
     text = "model: dualservo\ncenter_left: 0.3\ninvert_right: yes\njoint_left: a\njoint_right: b\nmax_opening: 0.04\n"
     found = import_texts(tmp_path, "joints: {a: {id: 1}, b: {id: 2}}\n", text)
-    assert found.data["controllers"]["file_2"] == {
+    hand = found.data["controllers"]["file_2"]
+    assert hand == {
         "type": "gripper",
         "model": "dual",
-        "joints": ["a", "b"],
+        "left": "a",
+        "right": "b",
         "pad_width": "10 mm",
         "finger_length": "20 mm",
         "opening": ["0 mm", "40 mm"],
-        "center": ["0.3 rad", "0 deg"],
-        "invert": [False, True],
+        "center_left": "0.3 rad",
+        "invert_right": True,
     }
+    settings = GripperConfig.model_validate(hand)
+    assert GripperController.mistake(settings) is None
+    angle = math.asin((0.03 - 0.01) / (2 * 0.02))
+    assert model_of(settings).angles(0.03) == pytest.approx((angle + 0.3, angle))
 
 
 @pytest.mark.parametrize("given", ["min_opening: -0.8, max_opening: 0.5", "max_opening: 0.5", "min_opening: 0.09"])

@@ -8,6 +8,7 @@ from rbxcompose.msgs.hashes import type_hash
 from tests.msgs.samples import JAZZY, MESSAGES, ORACLE, STRUCTURES
 
 FIBONACCI = "example_interfaces/action/Fibonacci"
+GRIP = "rbxcompose_msgs/action/Grip"
 NAVIGATE = "nav2_msgs/action/NavigateToPose"
 RECHARGE = "rbxcompose_msgs/action/Recharge"
 MOVE = "rbxcompose_msgs/action/MoveJoints"
@@ -85,6 +86,10 @@ FROZEN = {
     f"{MOVE}_SendGoal": "41a4e6a889099ce9ac66f60f88daf4d353e1ba5710104f036636c2378f03f676",
     f"{MOVE}_GetResult": "e5f5e828f2bba75667a29187c2237d0639b619086d8441c9f6205e4caba756bf",
     f"{MOVE}_FeedbackMessage": "9dd7601fae1f7c7a59008afb2f1601ae27a26147169558dad1269ed14e8425f3",
+    GRIP: "9240acfef75880f16ee62f47823aed2f9c44339c3d618588ab2de2f0f670c22b",
+    f"{GRIP}_SendGoal": "2a37a96f46c197838e370cc8474c833ea12ff61db1d89a6a129b8dfa5ef3bb47",
+    f"{GRIP}_GetResult": "4b2e3d6673904982a3af80a0884054fc4d991e41fb7f9dc66c08bb7bf9ac6b93",
+    f"{GRIP}_FeedbackMessage": "1dd68900fdb9f5ecfb5fab958635eeaf0c233206fdccfc69dde9fdc2b01d92df",
     "rbxcompose_msgs/srv/SetBatteryLevel": "f3de3ec6a24f423726cfed90fc0099d964acc55ca8091b092569b33f71b4cf2a",
 }
 

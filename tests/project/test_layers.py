@@ -48,6 +48,7 @@ ABOVE = {
     "actuation": "control",
     "body": "",
     "bus": "sdk.bound",
+    "bus_types": "actuation",
     "check_runner": "missions.analysis model.robot",
     "checks": "actuation body.model check_runner composition diagnostics.core missions model sdk sections",
     "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
@@ -59,7 +60,8 @@ ABOVE = {
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
     "components": "actuation body control controller_interface controller_manager controller_requests diagnostics "
-    "executive missions mux.core navigation.go_to sdk servo_bus_config sim twins",
+    "executive missions mux.core navigation.go_to sdk servo_bus_config servo_report sim twins",
+    "servo_report": "actuation control",
     "composition": "body.description sections",
     "control": "",
     "diagnostics": "",
@@ -85,8 +87,8 @@ ABOVE = {
     "scaffold": "actuation.servo_models composition missions sdk",
     "schema": "controller_interface missions sdk sections",
     "sdk": "",
-    "sections": "actuation.serial_ports actuation.servo_models body control.calibration control.limits "
-    "controller_interface sdk twins.servo_faults",
+    "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models body "
+    "control.calibration control.limits controller_interface sdk twins.servo_faults",
     "servo_bus_config": "actuation control controller_interface twins.fault_script",
     "sim": "",
     "skills": "sdk",
@@ -100,7 +102,7 @@ TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
 }
-TYPE_CHECKING_BLOCKS = 12
+TYPE_CHECKING_BLOCKS = 13
 
 
 def imports(path: Path) -> set[str]:

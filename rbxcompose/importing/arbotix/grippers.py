@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -56,9 +57,8 @@ def read_gripper(name: str, told: ForeignMap) -> ArbotixGripper | None:
     kind_of = MODELS[model.value]
     joints = tuple(told.text(key) or Given(usual, told.span) for key, usual in _JOINTS[kind_of].items())
     lines: Lines = {"type": ("gripper", ""), "model": (kind_of, place(model.span))}
-    names = [word(one.value) for one in joints]
-    at = place(joints[0].span)
-    lines |= {"joints": (flow_list(names), f"{at}: left, right")} if len(names) > 1 else {"joint": (names[0], at)}
+    keys = ("left", "right") if len(joints) > 1 else ("joint",)
+    lines |= {key: (word(one.value), place(one.span)) for key, one in zip(keys, joints, strict=True)}
     lines |= _scale(told) if kind_of == "parallel" else _geometry(told)
     lines |= _two_sides(told) if kind_of == "dual" else _one_side(told, kind_of)
     told.tell_others()
@@ -102,7 +102,9 @@ def _scale(told: ForeignMap) -> Lines:
         scale = None
     value = scale.value if scale else 1.0
     where = place(scale.span) if scale else _DRIVER
-    return {"scale": (number(value), f"{where}, in rad/m; how far it opens is not in the file: write 'opening'")}
+    words = f"{where}: {number(value)} rad/m; how far it opens is not in the file: write 'opening'"
+    lines = {"travel": (length(round(math.tau / abs(value), 7)), words)}
+    return lines if value > 0 else lines | {"invert": (flag(True), where)}
 
 
 def _one_side(told: ForeignMap, kind_of: str) -> Lines:
@@ -114,11 +116,11 @@ def _one_side(told: ForeignMap, kind_of: str) -> Lines:
 
 
 def _two_sides(told: ForeignMap) -> Lines:
-    centers = [told.number(key) for key in ("center_left", "center_right")]
-    inverts = [told.flag(key) for key in ("invert_left", "invert_right")]
     lines: Lines = {}
-    if at := next((place(one.span) for one in centers if one), ""):
-        lines["center"] = (flow_list([angle(one.value if one else 0.0) for one in centers]), f"{at}: left, right")
-    if at := next((place(one.span) for one in inverts if one and one.value), ""):
-        lines["invert"] = (flow_list([flag(bool(one and one.value)) for one in inverts]), f"{at}: left, right")
+    for key in ("center_left", "center_right"):
+        if (center := told.number(key)) is not None:
+            lines[key] = (angle(center.value), place(center.span))
+    for key in ("invert_left", "invert_right"):
+        if (invert := told.flag(key)) is not None and invert.value:
+            lines[key] = (flag(True), place(invert.span))
     return lines

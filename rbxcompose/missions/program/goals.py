@@ -20,7 +20,7 @@ from rbxcompose.msgs.plain import from_plain, to_plain
 from rbxcompose.msgs.stamps import to_duration, to_seconds
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.types import Action, Message, Service
-from rbxcompose.units import NUMBER, TIME
+from rbxcompose.units import NUMBER, TIME, Dimension
 
 M = TypeVar("M", bound=Message)
 
@@ -49,14 +49,16 @@ def skill_of(
     pausable: bool = False,
     outcomes: Mapping[str, str] = MappingProxyType({}),
     entries: ArrayEntries | None = None,
+    measures: Mapping[str, Dimension] = MappingProxyType({}),
 ) -> Skill:
     """Return an action as a skill: the fields of its goal are the arguments, the first one is the main one.
 
-    A field that is not a pose, time, text, flag or number is not an argument and keeps its zero value. A main argument
-    that is a pose or a time is required. With `entries`, those are arguments, too, and none is the main one.
+    A field that is not a pose, time, text, flag or number is not an argument and keeps its zero value. `measures` are
+    the dimensions of numbers. A main argument that is a pose, a time or has a dimension is required. With `entries`,
+    those are arguments, too, and none is the main one.
     """
-    results = typed_fields(action.Result)
-    return Skill(name, *_asked(action.Goal, entries), claims, restartable, pausable, dict(outcomes), results, entries)
+    asked, results = _asked(action.Goal, entries, measures), typed_fields(action.Result)
+    return Skill(name, *asked, claims, restartable, pausable, dict(outcomes), results, entries)
 
 
 def topic_skill(
@@ -86,13 +88,18 @@ def service_skill(service: type[Service[Any, Any]], name: str) -> Skill | None:
     return Skill(name, arguments, next(iter(arguments), ""), results=results)
 
 
-def _asked(message: type[Message], entries: ArrayEntries | None) -> tuple[dict[str, Type], str, frozenset[str]]:
+def _asked(
+    message: type[Message],
+    entries: ArrayEntries | None = None,
+    measures: Mapping[str, Dimension] = MappingProxyType({}),
+) -> tuple[dict[str, Type], str, frozenset[str]]:
     """Return the arguments that a message has fields or entries for, the main one, and the required ones."""
-    arguments = typed_fields(message)
+    arguments = typed_fields(message) | {name: quantity_of(one) for name, one in measures.items()}
     if entries is not None:
         return {name: quantity_of(one) for name, one in entries.each.items()} | arguments, "", frozenset()
     main = next(iter(arguments), "")
-    needed = frozenset({main} if main and message.FIELDS[main] in (STAMPED, POSED, LASTING) else ())
+    is_needed = main in measures or (main and message.FIELDS[main] in (STAMPED, POSED, LASTING))
+    needed = frozenset({main} if is_needed else ())
     return arguments, main, needed
 
 

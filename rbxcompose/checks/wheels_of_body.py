@@ -1,0 +1,40 @@
+"""A base whose wheels are others than those of the body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.check_runner import check
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.model.base_wheels import rolling_bases
+from rbxcompose.model.flow import setting_span
+from rbxcompose.model.robot import Robot
+from rbxcompose.units import LENGTH, format_quantity
+
+TOLERANCE = 0.02  # of a length, within which two count as the same
+
+
+@check("RBX2281", Severity.WARNING)
+def wheels_of_body(robot: Robot) -> Iterator[Finding]:
+    """The wheels of a base are others than those of its body
+
+    The odometry of a base comes from the radius and the distance of its wheels. If the URDF has other ones, one of both
+    is wrong: the robot turns too far, or not far enough, and does not know it. Lengths that differ by 2 % are told.
+
+    Bad: `wheel_distance: 26 cm`, where the joints of the wheels are at `xyz="0 0.1 0"` and `xyz="0 -0.1 0"`.
+    Good: `wheel_distance: 20 cm`
+    """
+    for base in rolling_bases(robot):
+        rolls, left = base.rolls, base.left
+        lengths = [("wheels are %s apart", rolls.wheel_distance, abs(base.wheel_distance))]
+        if rolls.wheel_radius and left.radius is not None:
+            lengths.append(("wheels have a radius of %s", rolls.wheel_radius, left.radius))
+        for words, setting, length in lengths:
+            if abs(setting.value - length) > TOLERANCE * max(setting.value, length):
+                wanted, there = format_quantity(setting.value, LENGTH), format_quantity(length, LENGTH)
+                yield wheels_of_body.at(
+                    setting_span(robot, (base.component, setting.field)),
+                    f"the {words % wanted}, in the body {there}",
+                    help="measure them, and correct the one that is wrong",
+                    related=[Related(left.joint.span, "the left wheel")],
+                )

@@ -1,0 +1,66 @@
+"""The services of joints: speeds, relaxing, enabling; one by one and all at once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
+from rbxcompose.msgs.std_msgs import Float64
+from rbxcompose.msgs.std_srvs import SetBool, Trigger
+from rbxcompose.sdk.bound import Outcome, Reply
+from tests.components.test_servo_bus import CONFIG, TICK, Head
+
+
+@pytest.fixture(params=["servo", "ideal"])
+def head(request: pytest.FixtureRequest) -> Head:
+    return Head(twin=request.param)
+
+
+@pytest.mark.parametrize("model", ["AX-12", "MX-28", "XL430-W250"])
+def test_a_speed_is_one_in_radians_whatever_the_ticks_of_the_model(model: str) -> None:
+    limits = {"lower": -2.0, "upper": 2.0, "velocity": 3.0, "acceleration": 100.0}
+    one = Head(joints=CONFIG["joints"] | {"pan": {**limits, "servos": [{"id": 1, "model": model}]}})
+    one.ask("/pan/set_speed", SetSpeed, SetSpeed.Request(speed=0.5))
+    one.commands["pan"](Float64(data=1.5))
+    one.robot.advance(0.5)
+    begin = one.at["pan"]
+    one.robot.advance(2.0)
+    assert one.at["pan"] - begin == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, float("nan")])
+def test_a_speed_that_is_none_is_refused(head: Head, speed: float) -> None:
+    told: list[Reply[SetSpeed.Response]] = []
+    head.robot.bus.client("me", "/pan/set_speed", SetSpeed)(SetSpeed.Request(speed=speed), told.append)
+    head.robot.advance(0.1)
+    assert told[0].response is not None
+    assert not told[0].response.success
+
+
+def test_a_joint_that_is_relaxed_ends_the_trajectory_of_its_group(head: Head) -> None:
+    head.follow((1.0, 1.0, 3.0))
+    head.robot.advance(1.0)
+    head.ask("/pan/relax", Trigger, Trigger.Request())
+    head.robot.advance(1.0)
+    assert head.ended
+    assert head.ended.outcome is Outcome.ABORTED
+    assert head.ended.result
+    assert "'pan' was relaxed" in head.ended.result.error_string
+    driver: Any = head.robot.component("servos")
+    assert str(driver.cycle.drives["pan"].mode) == "relaxed"
+
+
+def test_all_joints_are_relaxed_and_disabled_at_once(head: Head) -> None:
+    driver: Any = head.robot.component("servos")
+    for name in ("pan", "tilt"):
+        head.commands[name](Float64(data=0.3))
+    head.robot.advance(1.0)
+    head.ask("/servos/relax_all", Trigger, Trigger.Request())
+    assert {str(one.mode) for one in driver.cycle.drives.values()} == {"relaxed"}
+    head.ask("/servos/enable_all", SetBool, SetBool.Request(data=False))
+    head.commands["pan"](Float64(data=0.0))
+    head.robot.advance(1.0)
+    assert {str(one.mode) for one in driver.cycle.drives.values()} == {"disabled"}
+    assert head.at["pan"] == pytest.approx(0.3, abs=TICK)
