@@ -18,7 +18,12 @@ from rbxcompose.twins.servo_twin import TwinBus
 from tests.sections.test_servo_sections import BODY, HEAD, SERVOS
 
 TOYS = {"TOY-1": replace(servo_models()["XL430-W250"], name="TOY-1", number=9999)}
-CHANGES = {"type: dynamixel": "type: toy_bus, port: /dev/toys", "XL430-W250": "TOY-1", "AX-12": "toy 1", "neutral: 500": "neutral: 2000"}
+CHANGES = {
+    "type: dynamixel": "type: toy_bus, port: /dev/toys",
+    "XL430-W250": "TOY-1",
+    "AX-12": "toy 1",
+    "neutral: 500": "neutral: 2000",
+}
 ROBOT = reduce(lambda text, change: text.replace(*change), CHANGES.items(), HEAD + SERVOS)
 
 
