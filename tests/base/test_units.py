@@ -20,8 +20,8 @@ from rbxcompose.units import (
 )
 
 LISTED = (
-    "m cm mm km in s ms us min h m/s cm/s km/h m/s^2 m/s^3 rad deg rad/s deg/s rpm rad/s^2 deg/s^2 rad/s^3 deg/s^3 Hz kHz % kg g N Nm V mV "
-    "A mA W Wh Ah degC l ml B kB MB bit/s kbit/s Mbit/s"
+    "m cm mm km in s ms us min h m/s cm/s km/h m/s^2 m/s^3 rad deg rad/s deg/s rpm rad/s^2 deg/s^2 rad/s^3 deg/s^3 "
+    "Hz kHz % kg g N Nm V mV A mA W Wh Ah degC l ml B kB MB bit/s kbit/s Mbit/s"
 )
 
 
