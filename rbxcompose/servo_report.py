@@ -44,7 +44,7 @@ def report(
     drives: Mapping[str, JointDrive], controllers: Mapping[str, str], periods: Periods, *, is_lost: bool
 ) -> ServoReport:
     """Return how the joints are, with the notes of controllers."""
-    notes = {name: one.condition.note or one.refused for name, one in drives.items()} | dict(controllers)
+    notes = {name: one.condition.note or one.refused or one.clamped for name, one in drives.items()} | dict(controllers)
     notes = {name: words for name, words in notes.items() if words}
     bad = [name for name, one in drives.items() if one.mode in (JointMode.FAULT, JointMode.RESTING)]
     level = Level.ERROR if bad or is_lost else Level.WARN if notes else Level.OK

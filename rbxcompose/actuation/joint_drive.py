@@ -51,6 +51,8 @@ class JointDrive(ABC):
         self.voltage: float | None = None
         self.refused = ""
         """Why the last command was refused; empty after one that was not."""
+        self.clamped = ""
+        """How the last single command was changed; empty if it was not."""
         self._positions: dict[int, float] = {}  # of each servo, as the joint counts
         self._ticks: dict[int, int] = {}  # of wheels, without their jumps after each turn
         self._stamps: dict[int, float] = {}
