@@ -22,4 +22,15 @@ class MissionWaits:
     message: str
 
 
-RobotEvent = MissionOver | MissionWaits
+@dataclass(frozen=True, slots=True)
+class RobotHeld:
+    """A component needs the robot to stand still, for a `reason`: it is stopped, and not released until that is over.
+
+    An empty reason tells that it is over; the robot still stays stopped until somebody releases it.
+    """
+
+    component: str
+    reason: str
+
+
+RobotEvent = MissionOver | MissionWaits | RobotHeld

@@ -19,6 +19,10 @@ from rbxcompose.control.joint_states import JointPolicy, ThermalPolicy
 from rbxcompose.control.limits import MotionLimits
 from rbxcompose.control.transmission import Gear, Measured
 from rbxcompose.controller_interface import ControllerConfig, controller_type
+from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
+from rbxcompose.msgs.std_msgs import Float64
+from rbxcompose.msgs.std_srvs import SetBool, Trigger
+from rbxcompose.sdk.ports import In, Port, Serves
 from rbxcompose.twins.fault_script import TwinFault
 
 
@@ -33,6 +37,8 @@ class JointServoConfig(Config):
     """The tick at angle 0; without it the middle of its range."""
     invert: bool = False
     """Whether it turns the other way round than the joint."""
+    torque: float = 1.0
+    """Share of its torque that it may use."""
 
 
 class DrivenJointConfig(Config):
@@ -168,6 +174,22 @@ class ServoBusConfig(Config):
         return JointPolicy(cycle, fault_after=max(0.5, 3 * cycle), on_start=self.on_start, thermal=thermal)
 
 
+def joint_ports(config: ServoBusConfig) -> dict[str, Port[Any]]:
+    """Return the ports of each joint and those for all, by name."""
+    found: dict[str, Port[Any]] = {
+        "relax_all": Serves(Trigger, f"{config.name}/relax_all"),
+        "enable_all": Serves(SetBool, f"{config.name}/enable_all"),
+    }
+    for name, one in config.joints.items():
+        if one.mode == "position" and not one.mimic:
+            found[f"{name}_command"] = In(Float64, f"{name}/command", qos="command", is_open=True)
+            found[f"{name}_set_speed"] = Serves(SetSpeed, f"{name}/set_speed")
+        found[f"{name}_relax"] = Serves(Trigger, f"{name}/relax")
+        found[f"{name}_enable"] = Serves(SetBool, f"{name}/enable")
+        found[f"{name}_reboot"] = Serves(Trigger, f"{name}/reboot", skill=f"reboot_{name}")
+    return found
+
+
 def item_of(config: ServoBusConfig, actuator: str, name: str, is_read: bool, setup: Mapping[str, int]) -> ServoItem:
     """Return an item of a servo that a controller uses."""
     servo = config.used[actuator]
@@ -201,4 +223,4 @@ def servo_joint(name: str, config: DrivenJointConfig, servos: Iterable[JointServ
 
 def _servo(config: JointServoConfig, model: ServoModel) -> JointServo:
     neutral = model.family.centre if config.neutral is None else config.neutral
-    return JointServo(config.id, model, neutral, config.invert)
+    return JointServo(config.id, model, neutral, config.invert, config.torque)

@@ -2,7 +2,9 @@
 
 A row is `NAME ADDRESS SIZE UNIT CODING`: size in bytes, unit as in `UNITS` or `-`, coding as in `Coding`. A name means
 the same in all tables: `goal_speed` limits the speed towards a goal position (0: no limit), `goal_velocity` is the
-speed of a wheel, `present_load` is a current where the unit says so.
+speed of a wheel, `present_load` is a current where the unit says so. `torque_limit` and `max_torque` are shares of the
+supply that the motor gets at most; in protocol 2.0 the e-manual calls them Goal PWM, which is a limit in all modes but
+that of PWM, and PWM Limit. `velocity_limit` is the fastest `goal_velocity` that a servo takes.
 """
 
 from __future__ import annotations
@@ -25,6 +27,9 @@ UNITS: Mapping[str, tuple[float, str]] = MappingProxyType(
         "2us": (2e-6, "s"),
         "20ms": (0.02, "s"),
         "0.1%": (0.001, "1"),
+        "1/1023": (1 / 1023, "1"),
+        "1/885": (1 / 885, "1"),
+        "1/2009": (1 / 2009, "1"),
         "1mA": (0.001, "A"),
         "2.69mA": (0.00269, "A"),
         "0.111rpm": (0.111 * _RPM, "rad/s"),
@@ -47,7 +52,7 @@ return_delay 5 1 2us u
 min_position 6 2 tick u
 max_position 8 2 tick u
 temperature_limit 11 1 degC u
-max_torque 14 2 0.1% u
+max_torque 14 2 1/1023 u
 status_return_level 16 1 - u
 shutdown 18 1 - u
 torque_enable 24 1 - u
@@ -55,7 +60,7 @@ led 25 1 - u
 goal_position 30 2 tick u
 goal_speed 32 2 SPEED u
 goal_velocity 32 2 SPEED d
-torque_limit 34 2 0.1% u
+torque_limit 34 2 1/1023 u
 present_position 36 2 tick u
 present_speed 38 2 SPEED d
 present_load 40 2 0.1% d
@@ -76,7 +81,7 @@ min_position 6 2 tick u
 max_position 8 2 tick u
 operating_mode 11 1 - u
 temperature_limit 12 1 degC u
-max_torque 15 2 0.1% u
+max_torque 15 2 1/1023 u
 status_return_level 17 1 - u
 shutdown 18 1 - u
 torque_enable 24 1 - u
@@ -84,7 +89,7 @@ led 25 1 - u
 goal_position 30 2 tick u
 goal_speed 32 2 0.111rpm u
 goal_velocity 32 2 0.111rpm d
-torque_limit 35 2 0.1% u
+torque_limit 35 2 1/1023 u
 present_position 37 2 tick u
 present_speed 39 2 0.111rpm d
 present_load 41 2 0.1% d
@@ -102,18 +107,21 @@ return_delay 9 1 2us u
 operating_mode 11 1 - u
 homing_offset 20 4 tick s
 temperature_limit 31 1 degC u
+max_torque 36 2 PWM u
+velocity_limit 44 4 VELOCITY u
 max_position 48 4 tick u
 min_position 52 4 tick u
 shutdown 63 1 - u
 """
 _X = (
-    _TWO_LOW
+    _TWO_LOW.replace("PWM", "1/885").replace("VELOCITY", "0.229rpm")
     + """
 torque_enable 64 1 - u
 led 65 1 - u
 status_return_level 68 1 - u
 hardware_error 70 1 - u
 bus_watchdog 98 1 20ms s
+torque_limit 100 2 1/885 s
 goal_velocity 104 4 0.229rpm s
 profile_acceleration 108 4 214.577rev/min2 u
 goal_speed 112 4 0.229rpm u
@@ -136,13 +144,14 @@ external_port_data_2 154 2 - u
 external_port_data_3 156 2 - u
 """
 _P = (
-    _TWO_LOW.replace(" 4 tick u", " 4 tick s")
+    _TWO_LOW.replace(" 4 tick u", " 4 tick s").replace("PWM", "1/2009").replace("VELOCITY", "0.01rpm")
     + """
 torque_enable 512 1 - u
 led 513 1 - u
 status_return_level 516 1 - u
 hardware_error 518 1 - u
 bus_watchdog 546 1 20ms s
+torque_limit 548 2 1/2009 s
 goal_current 550 2 1mA s
 goal_velocity 552 4 0.01rpm s
 profile_acceleration 556 4 1rev/min2 u

@@ -247,8 +247,9 @@ class DynamixelBus:
     def reboot(self, id: int) -> bool:
         """Start a servo again, torque off; return whether it did, which only those of protocol 2.0 can."""
         with self._in_use() as port:
-            result, error = self._packets[self.servos[id].protocol].reboot(port, id)
-        return bool(result == COMM_SUCCESS and error == 0)
+            packets = self._packets[self.servos[id].protocol]
+            result, error = packets.reboot(port, id)
+        return bool(result == COMM_SUCCESS and not packets.is_refusal(error))
 
     def verify(self) -> dict[int, FoundServo | None]:
         """Return who answers at the id of each servo, None where nobody does."""

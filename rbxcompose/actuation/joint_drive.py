@@ -14,6 +14,7 @@ from rbxcompose.control.joint_state_machine import step_joint
 from rbxcompose.control.joint_states import (
     WITH_TORQUE,
     BringToRest,
+    Enable,
     Hold,
     JointCondition,
     JointInputs,
@@ -53,6 +54,8 @@ class JointDrive(ABC):
         """Why the last command was refused; empty after one that was not."""
         self.clamped = ""
         """How the last single command was changed; empty if it was not."""
+        self.hindrance = ""
+        """Why it takes no commands for a while; empty if it does."""
         self._positions: dict[int, float] = {}  # of each servo, as the joint counts
         self._ticks: dict[int, int] = {}  # of wheels, without their jumps after each turn
         self._stamps: dict[int, float] = {}
@@ -137,9 +140,17 @@ class JointDrive(ABC):
         if self.limiter is not None and math.isfinite(self.measured.position):
             self.limiter.put(self.measured.position)
 
+    @property
+    def error(self) -> str:
+        """Return what its servos report, such as `overload`; empty if nothing."""
+        return ", ".join(words for words in self._errors.values() if words)
+
     def ask(self, request: JointRequest) -> None:
         """Take a request for the next cycle."""
-        self._requests.append(request)
+        if self.hindrance and not isinstance(request, Relax | Enable):
+            self.refused = self.hindrance
+        else:
+            self._requests.append(request)
 
     def relax(self) -> None:
         """Switch torque off in the next cycle, until the next command."""
@@ -159,8 +170,8 @@ class JointDrive(ABC):
 
     def step(self, now: float, dt: float) -> list[Writes]:
         """Return what is to be written in the cycle that ends `dt` [s] from `now`, one after the other."""
-        error = ", ".join(words for words in self._errors.values() if words)
-        inputs = JointInputs(self.measured.position, self.measured_at, self.temperature, error, tuple(self._requests))
+        found = tuple(self._requests)
+        inputs = JointInputs(self.measured.position, self.measured_at, self.temperature, self.error, found)
         self._requests.clear()
         self.condition, actions = step_joint(self.condition, inputs, now, self.policy)
         writes: list[Writes] = []

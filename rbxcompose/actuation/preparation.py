@@ -59,6 +59,11 @@ def has_fired(values: Mapping[str, int]) -> bool:
     return values.get(WATCHDOG) == _FIRED
 
 
+def is_unarmed(values: Mapping[str, int]) -> bool:
+    """Return whether a servo has no watchdog: it has started again."""
+    return values.get(WATCHDOG) == 0
+
+
 def _changes(joint: ServoJoint, servo: JointServo, values: Mapping[str, int]) -> dict[str, int]:
     """Return what differs from what the joint needs; ranges of positions that somebody has set are kept."""
     if modes := servo.model.family.modes:

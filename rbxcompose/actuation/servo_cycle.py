@@ -8,10 +8,12 @@ from itertools import zip_longest
 from typing import Protocol
 
 from rbxcompose.actuation.bus import ServoBus
-from rbxcompose.actuation.cycle_items import FAST, slow_items
+from rbxcompose.actuation.cycle_items import FAST, SELDOM, slow_items
 from rbxcompose.actuation.joint_drive import JointDrive, Writes
-from rbxcompose.actuation.preparation import arm, has_fired
+from rbxcompose.actuation.preparation import arm, has_fired, is_unarmed
 from rbxcompose.actuation.servo_items import ServoItem, use_next
+from rbxcompose.actuation.servo_joint import JointServo
+from rbxcompose.actuation.torque_limits import LIMIT, TorqueLimits
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.joint_states import Relax
 
@@ -45,6 +47,10 @@ class ServoCycle:
     """Whether all joints rest when one is too hot."""
     items: list[ServoItem] = field(default_factory=list)
     """Items of servos that controllers use themselves."""
+    torques: TorqueLimits = field(default_factory=TorqueLimits)
+    """The torque limits of the servos."""
+    notes: list[str] = field(default_factory=list)
+    """What has happened to servos, for people; whoever tells it clears it."""
     _turn: int = 0  # whose slow items are read next
 
     @property
@@ -90,14 +96,31 @@ class ServoCycle:
             return
         for id_, reading in self.bus.read(list(drives), FAST).items():
             drives[id_].take(id_, reading)
-        id_ = list(drives)[self._turn % len(drives)]
         self._turn += 1
+        if self._turn % SELDOM == 0:
+            self._keep_torque(list(drives)[self._turn // SELDOM % len(drives)], drives)
+            return
+        id_ = list(drives)[self._turn % len(drives)]
         items = slow_items(drives[id_].joint.servo(id_).model)
         if (slow := self.bus.read([id_], items).get(id_)) is not None:
             drives[id_].take(id_, slow)
-            if has_fired(slow.values):
-                drives[id_].was_cut()
-                arm(self.bus, drives[id_].joint.servo(id_), self.watchdog)
+            self._care(drives[id_], drives[id_].joint.servo(id_), slow.values)
+
+    def _keep_torque(self, id: int, drives: Mapping[int, JointDrive]) -> None:
+        """Write the torque limit of a servo again, if it has forgotten it without its supply."""
+        drive, servo = drives[id], drives[id].joint.servo(id)
+        if LIMIT not in servo.model.items or drive.hindrance or drive.error:
+            return
+        reading = self.bus.read([id], [LIMIT]).get(id)
+        if reading is not None and (note := self.torques.keep(self.bus, servo, reading.values)):
+            self.notes.append(note)
+
+    def _care(self, drive: JointDrive, servo: JointServo, values: Mapping[str, int]) -> None:
+        """Arm a watchdog that has stopped a servo, or that it has forgotten without its supply."""
+        if has_fired(values):
+            drive.was_cut()
+        if has_fired(values) or is_unarmed(values):
+            arm(self.bus, servo, self.watchdog)
 
     def _mimic(self) -> None:
         """Let joints follow those which they mimic, with and without torque."""

@@ -22,6 +22,8 @@ class JointServo:
     model: ServoModel
     neutral: int
     is_inverted: bool = False
+    torque: float = 1.0
+    """Share of the most torque that it may use."""
 
     @property
     def per_tick(self) -> float:

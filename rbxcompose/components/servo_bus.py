@@ -9,16 +9,16 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from rbxcompose.actuation.bus import ServoBus as Bus
 from rbxcompose.actuation.bus_types import bus_type
+from rbxcompose.actuation.joint_drive import JointDrive
 from rbxcompose.actuation.periods import Periods
 from rbxcompose.actuation.port_errors import PortError
 from rbxcompose.actuation.position_drive import PositionDrive
 from rbxcompose.actuation.preparation import prepare, with_torque
 from rbxcompose.actuation.priority import be_prompt
+from rbxcompose.actuation.reboots import Reboots
 from rbxcompose.actuation.servo_cycle import ServoCycle
 from rbxcompose.actuation.servo_items import ServoItem, set_up
-from rbxcompose.actuation.servo_joint import ServoJoint
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.control.joint_states import Enable, Hold, JointMode, MoveTo
 from rbxcompose.controller_interface import controller_type
@@ -26,18 +26,15 @@ from rbxcompose.controller_manager import ControllerManager, ControllerSeat
 from rbxcompose.controller_requests import ControllerState, ListControllers, SwitchControllers
 from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.requests import Refused, answers
-from rbxcompose.sdk import Component, In, Out, Port, Serves, ServesAction, component
+from rbxcompose.sdk import Component, Later, Out, Port, Serves, ServesAction, component
 from rbxcompose.sdk.capabilities import Capability, NeedsExtra, OpensPort, Setting, within
 from rbxcompose.sdk.component import Context
-from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, item_of, mimics_of
+from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, item_of, joint_ports, mimics_of
+from rbxcompose.servo_bus_line import open_bus
 from rbxcompose.servo_report import joint_state, report
-from rbxcompose.twins.fault_script import FaultScript, InjectFault
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_stage import twin_of, twin_servos
-from rbxcompose.twins.servo_twin import TwinBus
+from rbxcompose.twins.fault_script import InjectFault
 
 GONE = "the bus of servos has gone"
 REOPEN = 0.5  # [s] between attempts to find a port that has gone
@@ -49,9 +46,10 @@ PUBLISHED = 50.0  # [Hz] of joint states, at most
 class ServoBusDriver(Component[ServoBusConfig]):
     """Reads and writes the servos of a bus, keeps their joints within limits, and runs controllers that lead them.
 
-    Each joint has a topic `JOINT/command` [rad], and the services `JOINT/relax`, `JOINT/enable` and `JOINT/set_speed`;
-    `BUS/relax_all` and `BUS/enable_all` are for all. A joint starts relaxed; the first command switches its torque on,
-    where it is.
+    Each joint has a topic `JOINT/command` [rad], and the services `JOINT/relax`, `JOINT/enable`, `JOINT/reboot` and
+    `JOINT/set_speed`; `BUS/relax_all` and `BUS/enable_all` are for all. A joint starts relaxed; the first command
+    switches its torque on, where it is. A servo that has shut down must be rebooted before it takes torque again, in
+    missions by the skill `reboot_JOINT`.
 
     Example:
         servos: {type: servo_bus, twin: servo, joints: {pan: {servos: [{id: 1, model: AX-12}]}}}
@@ -64,15 +62,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
     @classmethod
     def ports(cls, config: ServoBusConfig) -> dict[str, Port[Any]]:
         """Return the ports: for each joint, for all, and those of the controllers."""
-        found = super().ports(config)
-        found["relax_all"] = Serves(Trigger, f"{config.name}/relax_all")
-        found["enable_all"] = Serves(SetBool, f"{config.name}/enable_all")
-        for name, one in config.joints.items():
-            if one.mode == "position" and not one.mimic:
-                found[f"{name}_command"] = In(Float64, f"{name}/command", qos="command", is_open=True)
-                found[f"{name}_set_speed"] = Serves(SetSpeed, f"{name}/set_speed")
-            found[f"{name}_relax"] = Serves(Trigger, f"{name}/relax")
-            found[f"{name}_enable"] = Serves(SetBool, f"{name}/enable")
+        found = super().ports(config) | joint_ports(config)
         for name, setup in config.controllers.items():
             ports = controller_type(setup.type).ports(name, setup.config)
             found |= {f"{name}_{port}": one for port, one in ports.items()}
@@ -102,6 +92,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         for joint in config.joints:
             setattr(self, f"on_{joint}_relax", partial(self.relax, joint))
             setattr(self, f"on_{joint}_enable", partial(self.enable, joint))
+            setattr(self, f"on_{joint}_reboot", partial(self.reboot, joint))
             setattr(self, f"on_{joint}_set_speed", partial(self.set_speed, joint))
         self.owners: dict[str, tuple[str, str]] = {}  # the controller of a port, and the port's name there
         for controller, setup in config.controllers.items():
@@ -117,10 +108,15 @@ class ServoBusDriver(Component[ServoBusConfig]):
         config, self.at_end = self.config, ExitStack()
         self.period = 1.0 / config.rate
         self.periods = Periods(self.period)
-        self.faults: FaultScript | None = None
         drives, mimics = drives_of(config), mimics_of(config.joints)
-        bus = self.opened([one.joint for one in drives.values()])
-        self.cycle = ServoCycle(bus, drives, mimics, config.watchdog, config.thermal.scope == "bus")
+        is_real_time = isinstance(self.context.clock, MonotonicClock)
+        joints = [one.joint for one in drives.values()]
+        opened = open_bus(config, joints, lambda: self.now, self.at_end, is_real_time=is_real_time)
+        if opened.note:
+            self.warn(opened.note)
+        self.faults = opened.faults
+        self.cycle = ServoCycle(opened.bus, drives, mimics, config.watchdog, config.thermal.scope == "bus")
+        self.reboots = Reboots(opened.bus, self.prepare)
         seats = {
             name: ControllerSeat(self, name, {joint: drives[joint] for joint in one.config.led})
             for name, one in config.controllers.items()
@@ -132,32 +128,15 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.told_at, self.published_at = -math.inf, -math.inf
         self.is_parking = False
 
-    def opened(self, joints: list[ServoJoint]) -> Bus:
-        """Return the bus: that of the port, or simulated servos."""
-        config, path = self.config, self.config.port
-        if config.twin:
-            has_bytes = config.twin == "pty" and isinstance(self.context.clock, MonotonicClock)
-            if config.twin == "pty" and not has_bytes:
-                self.warn("bytes need real time, so servos are simulated without them")
-            servos = twin_servos(joints, is_ideal=config.twin == "ideal", noise=config.noise, seed=config.seed)
-            servos |= {f"servo {id_}": [FakeServo(one, id_)] for id_, one in config.lone.items()}
-            twin = self.at_end.enter_context(twin_of(servos, lambda: self.now, has_bytes=has_bytes))
-            self.faults = FaultScript(config.faults.values(), servos, twin)
-            if isinstance(twin, TwinBus):
-                return twin
-            path = str(twin.path)
-        known = {servo.id: servo.model for joint in joints for servo in joint.servos}
-        bus = bus_type(config.kind).open(path, known | config.lone, baud=config.baud, clock=lambda: self.now)
-        self.at_end.callback(bus.close)
-        return bus
-
-    def prepare(self) -> None:
-        """Set the modes of the servos."""
-        joints = [drive.joint for drive in self.cycle.drives.values()]
+    def prepare(self, *drives: JointDrive) -> None:
+        """Set the modes of the servos of some joints, or of all, and of those that controllers use."""
         bus, config = self.cycle.bus, self.config
+        joints = [drive.joint for drive in drives or self.cycle.drives.values()]
         told = prepare(bus, joints, config.watchdog, config.return_delay)
         for text in (*told, *set_up(self.cycle.items, bus)):
             self.info(text)
+        for servo in (servo for joint in joints for servo in joint.servos):
+            self.cycle.torques.write(bus, servo)
 
     def activate(self) -> None:
         """Begin the cycles; torque that an earlier driver has left on is kept if that is what the end is to be."""
@@ -202,6 +181,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.lost_at = -math.inf
         self.periods.begin(self.now)
         self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.leading)
+        self.reboots.step(self.now)
+        while self.cycle.notes:
+            self.info(self.cycle.notes.pop(0))
         if self.now - self.published_at >= 1 / PUBLISHED - 1e-9:
             self.published_at = self.now
             self.publish()
@@ -274,6 +256,23 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.controllers.let_go(name, self.now, f"joint '{name}' was relaxed")
         self.cycle.drives[name].relax()
 
+    def reboot(self, name: str, request: Trigger.Request) -> Later[Trigger.Response]:
+        """Start the servos of a joint again, which a servo that has shut down needs; then it is relaxed."""
+        response = Later[Trigger.Response]()
+        self.controllers.let_go(name, self.now, f"the servos of joint '{name}' are started again")
+        try:
+            if self.lost_at > -math.inf:
+                raise Refused(GONE)
+            self.reboots.begin(
+                self.cycle.drives[name],
+                self.now,
+                lambda reason: response.reply(Trigger.Response(success=not reason, message=reason)),
+            )
+        except PortError as error:
+            self.lose(error)
+            raise Refused(str(error)) from None
+        return response
+
     def on_relax_all(self, request: Trigger.Request) -> Trigger.Response:
         """Relax all joints."""
         for name in self.cycle.drives:
@@ -333,13 +332,14 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.lost_at = self.now
         self.periods.pause()
         self.halt(GONE)
+        self.reboots.fail(GONE)
 
     def halt(self, reason: str) -> None:
         """End what all controllers do, and bring the joints to rest."""
         for controller in self.controllers.active:
             controller.halt(self.now, reason)
         for drive in self.cycle.drives.values():
-            if drive.mode is JointMode.ACTIVE:
+            if drive.mode is JointMode.ACTIVE and drive.has_torque:
                 drive.ask(Hold())
 
     @property

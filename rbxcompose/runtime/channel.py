@@ -7,7 +7,7 @@ import socket
 from dataclasses import dataclass, field
 from typing import Any, get_args
 
-from rbxcompose.robot_events import MissionOver
+from rbxcompose.robot_events import MissionOver, RobotHeld
 from rbxcompose.typed_json import Family
 
 _CHUNK = 65536
@@ -222,6 +222,7 @@ ChannelWord = (
     | AtRest
     | Failed
     | MissionOver
+    | RobotHeld
     | Repeated
     | TimeIsUp
     | Answered

@@ -24,8 +24,8 @@ from rbxcompose.levels import Level
 from rbxcompose.msgs.entries import ArrayEntries
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Command, Query, Refused, answers
-from rbxcompose.robot_events import MissionOver, MissionWaits
-from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal, ServedGoal
+from rbxcompose.robot_events import MissionOver, MissionWaits, RobotHeld
+from rbxcompose.sdk.bound import Ended, Later, Outcome, Reply, SentGoal, ServedGoal
 from rbxcompose.sdk.capabilities import (
     Capability,
     Charges,
@@ -68,6 +68,7 @@ __all__ = [
     "Frequency",
     "In",
     "JointName",
+    "Later",
     "Length",
     "Level",
     "LinkName",
@@ -90,6 +91,7 @@ __all__ = [
     "Ratio",
     "Refused",
     "Reply",
+    "RobotHeld",
     "RollsOn",
     "RunsMissions",
     "Secret",

@@ -64,6 +64,28 @@ class Reply(Generic[R]):
     error: str = ""
 
 
+class Later(Generic[R]):
+    """What a component returns for a request if it knows the response only later; then it calls `reply`, once."""
+
+    def __init__(self) -> None:
+        self._response: R | None = None
+        self._then: Callable[[R], None] | None = None
+
+    def reply(self, response: R) -> None:
+        """Send the response."""
+        self._response = response
+        self._send()
+
+    def then(self, send: Callable[[R], None]) -> None:
+        """Let `send` have the response, as soon as it is known."""
+        self._then = send
+        self._send()
+
+    def _send(self) -> None:
+        if self._then is not None and self._response is not None:
+            self._then(self._response)
+
+
 class Caller(Protocol[Q_contra, R]):
     """Calls a service; the reply arrives later, on the same thread."""
 

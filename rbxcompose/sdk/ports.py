@@ -160,7 +160,7 @@ class SendsOrders(Out[M]):
 
 
 class Serves(Port[None]):
-    """Serves requests: the method `on_<port>` takes a request and returns the response.
+    """Serves requests: the method `on_<port>` takes a request and returns the response, or a `Later` that tells it.
 
     It is a skill of missions if the response has a flag `success`; `skill` is as in `ServesAction`.
     """

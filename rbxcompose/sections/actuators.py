@@ -9,7 +9,7 @@ from pydantic import Field
 
 from rbxcompose.actuation.bus_types import DYNAMIXEL, BusType, bus_type, bus_type_names
 from rbxcompose.actuation.servo_models import ServoModel
-from rbxcompose.config import Config, Name
+from rbxcompose.config import Config, Name, Ratio
 from rbxcompose.findings import Finding, Related, Span, kind
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
@@ -102,6 +102,8 @@ class ActuatorModel(Config):
     """Whether it turns the other way round than its joint."""
     mode: Literal["position", "velocity"] = "position"
     """Whether it is given positions, or velocities as a wheel or a spindle is."""
+    torque: Ratio = Field(1.0, gt=0, le=1)
+    """Share of its most torque that it may use, such as `60 %`; with less it is slower, too."""
 
 
 def _details(read: Mapping[str, ActuatorModel]) -> dict[str, str]:

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, WithJsonSchema
 
 from rbxcompose.actuation.bus_types import bus_type_names
+from rbxcompose.actuation.torques import share_of
 from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.config import Angle, BitRate, Config, Frequency, Time
 from rbxcompose.controller_interface import ControllerConfig, controller_type
@@ -24,7 +25,7 @@ from rbxcompose.sections.body import body
 from rbxcompose.sections.controllers import controllers
 from rbxcompose.sections.devices import port_name
 from rbxcompose.sections.faults import buses_of_joints, faults_of
-from rbxcompose.sections.joints import JointModel, held_limits, joints, table_of
+from rbxcompose.sections.joints import JointModel, effort_of, held_limits, joints, table_of
 from rbxcompose.sections.safety import safety
 
 BusTypeName = Annotated[str, WithJsonSchema({"type": "string", "enum": bus_type_names()})]
@@ -148,7 +149,7 @@ def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorMod
     limits = held_limits(driven, joint)
     mimic = joint.mimic if joint else None
     return {
-        "servos": [_servo(one) for one in servos],
+        "servos": [_servo(one) | {"torque": min(one.torque, _share(driven, servos))} for one in servos],
         "mode": servos[0].mode,
         "ratio": math.tau / driven.travel if driven.travel else driven.ratio,
         "offset": driven.offset,
@@ -162,6 +163,12 @@ def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorMod
         "multiplier": mimic.multiplier if mimic else 1.0,
         "mimic_offset": mimic.offset if mimic else 0.0,
     }
+
+
+def _share(driven: JointModel, servos: list[ActuatorModel]) -> float:
+    """Return the share of their torque that the effort of their joint leaves to servos."""
+    limit, most = driven.limits.effort, effort_of(driven, servos)
+    return share_of(limit.value, most) if limit is not None and most is not None else 1.0
 
 
 @section(

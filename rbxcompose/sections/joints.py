@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any
 
 from pydantic import PlainValidator, WithJsonSchema
 
+from rbxcompose.actuation.servo_models import model_named
+from rbxcompose.actuation.torques import joint_effort, steepest
 from rbxcompose.body.model import BodyJoint
 from rbxcompose.config import Angle, Config, JointName, Length, Name
 from rbxcompose.control.calibration import Calibration
@@ -24,8 +27,10 @@ from rbxcompose.units import (
     ANGLE,
     ANGULAR_ACCELERATION,
     ANGULAR_SPEED,
+    FORCE,
     LENGTH,
     SPEED,
+    TORQUE,
     Dimension,
     Quantity,
     UnitError,
@@ -84,6 +89,7 @@ def _either(turning: Dimension, sliding: Dimension) -> PlainValidator:
 JointPosition = Annotated[Quantity, _either(ANGLE, LENGTH)]
 JointSpeed = Annotated[Quantity, _either(ANGULAR_SPEED, SPEED)]
 JointAcceleration = Annotated[Quantity, _either(ANGULAR_ACCELERATION, ACCELERATION)]
+JointEffort = Annotated[Quantity, _either(TORQUE, FORCE)]
 
 
 class DrivenLimitsModel(Config):
@@ -95,6 +101,8 @@ class DrivenLimitsModel(Config):
     """Largest speed."""
     acceleration: JointAcceleration | None = None
     """Largest acceleration."""
+    effort: JointEffort | None = None
+    """Largest torque or force; those of the body's URDF are often fillers, and are not enforced."""
 
 
 class CalibrationPointModel(Config):
@@ -195,13 +203,13 @@ def _of_body(root: MappingNode, name: str, one: JointModel, joint: BodyJoint) ->
         span = value_span(root, ("joints", name, "travel"))
         yield NOT_TOGETHER.at(span, f"joint '{name}' turns: 'travel' is for joints that slide")
     for path, written in _quantities(one):
-        if written.dimension not in ((LENGTH, SPEED, ACCELERATION) if slides else _TURNING):
+        if written.dimension not in ((LENGTH, SPEED, ACCELERATION, FORCE) if slides else _TURNING):
             words = "slides" if slides else "turns"
             span = value_span(root, ("joints", name, *path))
             yield WRONG_TYPE.at(span, f"joint '{name}' {words}, and this is {written.dimension.phrase}")
 
 
-_TURNING = (ANGLE, ANGULAR_SPEED, ANGULAR_ACCELERATION)
+_TURNING = (ANGLE, ANGULAR_SPEED, ANGULAR_ACCELERATION, TORQUE)
 
 
 def _no_motion(one: JointModel, joint: BodyJoint | None) -> Iterator[tuple[str, str, str]]:
@@ -268,7 +276,7 @@ def _quantities(one: JointModel) -> Iterator[tuple[KeyPath, Quantity]]:
     limits = one.limits
     for index, position in enumerate(limits.position or ()):
         yield ("limits", "position", index), position
-    for name in ("velocity", "acceleration"):
+    for name in ("velocity", "acceleration", "effort"):
         if (value := getattr(limits, name)) is not None:
             yield ("limits", name), value
     for index, point in enumerate(one.calibration):
@@ -287,3 +295,10 @@ def _no_table(one: JointModel) -> str:
 def table_of(one: JointModel) -> tuple[tuple[float, float], ...]:
     """Return the calibration: angles of the servo and positions of the joint, in SI."""
     return tuple(sorted((point.servo, point.joint.value) for point in one.calibration))
+
+
+def effort_of(one: JointModel, servos: Iterable[ActuatorModel]) -> float | None:
+    """Return the most that its servos exert on a joint [Nm or N], None if that is not known of one of them."""
+    models = [model for servo in servos if (model := model_named(servo.model))]
+    gear = math.tau / one.travel if one.travel else one.ratio
+    return joint_effort(models, steepest(table_of(one)) if one.calibration else gear)

@@ -1,7 +1,8 @@
-"""The section `safety`: what happens to the torque of joints."""
+"""The section `safety`: what happens to the torque of joints, and the emergency stop."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal
 
 from pydantic import Field
@@ -9,8 +10,10 @@ from pydantic import Field
 from rbxcompose.config import AngularSpeed, Config, JointName, Temperature, Time
 from rbxcompose.findings import kind
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import Reading
+from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import key_span
+from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
+from rbxcompose.sections.faults import buses_of_joints
 from rbxcompose.sections.joints import JointPosition
 
 THERMAL_ORDER = kind(
@@ -65,6 +68,17 @@ class ThermalModel(Config):
     """Whether a joint that is too hot rests alone, or all joints of its bus with it."""
 
 
+class EstopModel(Config):
+    """An emergency stop: a topic that tells whether it is pressed."""
+
+    topic: str = "estop"
+    """Where messages of `std_msgs/Bool` come; the first that is true stops the robot until `release`."""
+    deadline: Time = Field(0.5, gt=0)
+    """Silence after which the robot is stopped, too, counted from the start."""
+    what: Literal["hold", "relax"] = "hold"
+    """Whether joints then hold or lose their torque."""
+
+
 class SafetyModel(Config):
     """What joints do without commands."""
 
@@ -80,11 +94,21 @@ class SafetyModel(Config):
     """Largest speed of single commands, until `set_speed` gives a joint another one."""
     thermal: ThermalModel = ThermalModel()
     """When joints are too hot, and what happens then."""
+    estop: EstopModel | None = None
+    """The emergency stop, if there is one."""
 
 
-@section("safety", SafetyModel, order=35, shared=((), ("park",)))
+def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
+    """Yield the component that stops the robot."""
+    if (estop := contents.of(safety).estop) is not None:
+        relaxed = sorted(set(buses_of_joints(contents).values())) if estop.what == "relax" else []
+        config = {"topic": estop.topic, "deadline": estop.deadline, "relaxes": relaxed}
+        yield WantedComponent("estop", "estop", config, ("safety", "estop"))
+
+
+@section("safety", SafetyModel, order=35, shared=((), ("park",)), components=_components)
 def safety(reading: Reading[SafetyModel]) -> SafetyModel:
-    """What happens to the torque of joints at the start, at the end, and when they are too hot.
+    """What happens to the torque of joints at the start, at the end, and when they are too hot; the emergency stop.
 
     Example:
         safety:

@@ -22,7 +22,7 @@ _SHUTDOWN = {1: 36, 2: 52}  # masks of the bits that switch torque off
 _SIZE = 1024  # [B] of memory
 _RIGHT, _FAILED, _RANGE, _LIMIT, _ACCESS = 0, 1, 4, 6, 7  # results in protocol 2.0
 _ONE_RESULTS = {_RIGHT: 0, _FAILED: 0, _RANGE: 8, _LIMIT: 2, _ACCESS: 8}  # the nearest of protocol 1.0
-_GOALS = ("goal_position", "goal_speed", "goal_velocity", "goal_current")
+_GOALS = ("goal_position", "goal_speed", "goal_velocity", "goal_current", "torque_limit")
 _READ_ONLY = ("model_number", "firmware", "moving", "hardware_error")
 
 
@@ -39,6 +39,7 @@ class _Orders:
     hottest: int
     shutdown: int
     patience: float | None
+    strength: float  # of the most torque
 
 
 class FakeServo:
@@ -83,7 +84,7 @@ class FakeServo:
         first = {"model_number": self.model.number, "firmware": 45, "id": id, "return_delay": 250}
         first |= {"baud": self.model.code_of(baud) or 0, "status_return_level": 2, "temperature_limit": 80}
         first |= {"shutdown": _SHUTDOWN[self.model.protocol]}
-        first |= {"max_torque": 1023, "torque_limit": 1023}
+        first |= dict.fromkeys(("max_torque", "torque_limit"), self.model.to_raw("torque_limit", 1.0))
         first |= {"min_position": 0, "max_position": family.ticks - 1, "goal_position": family.centre}
         if family.table == "P":
             first |= {"min_position": -family.ticks // 2, "max_position": family.ticks // 2}
@@ -120,8 +121,7 @@ class FakeServo:
     @property
     def has_torque(self) -> bool:
         """Tell whether its motor may pull: torque is on, and not limited to nothing."""
-        is_limited = "torque_limit" in self.model.items and self.get("torque_limit") == 0
-        return bool(self.get("torque_enable")) and not is_limited
+        return bool(self.get("torque_enable") and self.get("torque_limit"))
 
     def get(self, item: str) -> int:
         """Return the raw value of an item."""
@@ -151,6 +151,7 @@ class FakeServo:
                 self.get("temperature_limit"),
                 self.get("shutdown"),
                 self._si("bus_watchdog") if has_watchdog else None,
+                min(1.0, self._si("torque_limit")),
             )
         return self._known
 
@@ -190,14 +191,14 @@ class FakeServo:
         orders, motor = self._orders, self.motor
         if not orders.has_torque:
             motor.push(0.0)
-        elif self.faults.is_jammed:
+        elif self.faults.is_jammed or (abs(self._outer) > orders.strength and not motor.is_ideal):
             wanted = orders.speed if orders.is_wheel else orders.goal - motor.position
-            motor.push(math.copysign(1.0, wanted) if wanted else 0.0)
+            motor.push(math.copysign(orders.strength, wanted) if wanted else 0.0)
         elif not orders.is_wheel:
-            motor.approach(orders.goal, orders.fastest, orders.acceleration, dt)
+            motor.approach(orders.goal, orders.fastest, orders.acceleration, dt, orders.strength)
         else:
             circle = self.model.family.ticks if self.model.protocol == 1 else 0
-            motor.turn(orders.speed, orders.acceleration, dt, circle)
+            motor.turn(orders.speed, orders.acceleration, dt, circle, orders.strength)
 
     @property
     def _outer(self) -> float:
@@ -225,6 +226,8 @@ class FakeServo:
             self._is_shut_down = True
             if orders.has_torque:
                 self.set("torque_enable", 0)
+            if self.model.protocol == 1:
+                self.set("torque_limit", 0)
         elif self.model.protocol == 1:
             self._is_shut_down = False
 
@@ -281,6 +284,8 @@ class FakeServo:
             return _RANGE
         if item.name == "torque_enable" and raw and self._is_shut_down:
             return _FAILED
+        if item.name == "torque_limit" and self.model.protocol == 2 and abs(raw) > self.get("max_torque"):
+            return _LIMIT
         return _LIMIT if item.name == "goal_position" and not self._is_within(raw) else _RIGHT
 
     def _is_kept(self, item: ControlItem) -> bool:
@@ -299,6 +304,8 @@ class FakeServo:
         elif "torque_enable" in written and not was_on and self.get("torque_enable") and self.holds_on_enable:
             at = self.model.items["goal_position"]
             self.set("goal_position", max(at.least, min(at.most, round(self.motor.position))))
+        if "operating_mode" in written:
+            self.set("torque_limit", self.get("max_torque"))
         if self.motor.is_ideal:
             self.step(0.0, self.heard)
 
@@ -307,3 +314,4 @@ class FakeServo:
         self._errors, self._is_shut_down = 0, False
         for item in ("torque_enable", "bus_watchdog", "led", "goal_speed"):
             self.set(item, 0)
+        self.set("torque_limit", self.get("max_torque"))

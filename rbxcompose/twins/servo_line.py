@@ -111,8 +111,9 @@ class FakeLine:
                 result = servo.write(_number(given[:wide]), given[wide:])
                 return status(protocol, own, servo.alert | result)
             case wire.REBOOT if protocol == 2:
+                alert = servo.alert
                 servo.reboot()
-                return status(protocol, own, 0)
+                return status(protocol, own, alert)
         return status(protocol, own, servo.alert | _INSTRUCTION[protocol])
 
     def _read(self, servo: FakeServo, address: int, length: int) -> bytes:

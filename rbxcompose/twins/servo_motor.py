@@ -65,12 +65,12 @@ class ServoMotor:
         self.put(self.position)
         self.effort = effort
 
-    def turn(self, speed: float, acceleration: float, dt: float, circle: int = 0) -> None:
+    def turn(self, speed: float, acceleration: float, dt: float, circle: int = 0, share: float = 1.0) -> None:
         """Turn at a speed [ticks/s], which it reaches with an acceleration [ticks/s^2], 0 for the largest.
 
-        With a `circle` [ticks], positions begin again behind it.
+        With a `circle` [ticks], positions begin again behind it. `share` is how much of its torque it may use.
         """
-        strength, before = acceleration or self._strongest, self._speed
+        strength, before = self._strength(acceleration, share), self._speed
         ramp = abs(speed - before) / strength  # [s]
         is_there = ramp <= dt
         after = speed if is_there else before + math.copysign(strength * dt, speed - before)
@@ -81,14 +81,22 @@ class ServoMotor:
         self._aim, self._speed, self.velocity = self.position, after, after
         self._strain(0.0 if is_there else math.copysign(strength, speed - before))
 
-    def approach(self, goal: float, fastest: float, acceleration: float, dt: float) -> None:
-        """Turn towards a goal, at a speed [ticks/s] and an acceleration [ticks/s^2] at most, 0 for the largest."""
+    def _strength(self, acceleration: float, share: float) -> float:
+        """Return the acceleration that is wanted, as far as a share of its torque allows."""
+        most = self._strongest * share
+        return min(acceleration or most, most) if share < 1.0 else acceleration or most
+
+    def approach(self, goal: float, fastest: float, acceleration: float, dt: float, share: float = 1.0) -> None:
+        """Turn towards a goal, at a speed [ticks/s] and an acceleration [ticks/s^2] at most, 0 for the largest.
+
+        `share` is how much of its torque it may use: with less it accelerates less, and is slower.
+        """
         if dt < _INSTANT or (self.position == self._aim == goal and self._speed == 0.0):
             return
         count = max(1, math.ceil(dt / STEP - 1e-9))
         step = dt / count
-        strength = acceleration or self._strongest
-        fastest = min(fastest or self._fastest, self._fastest)
+        strength = self._strength(acceleration, share)
+        fastest = min(fastest or self._fastest, self._fastest * share)
         kept = math.exp(-step / self.traits.lag)
         for _ in range(count):
             self._lead(goal, fastest, strength * step, step)
@@ -135,14 +143,14 @@ class IdealMotor(ServoMotor):
         """Stay."""
         self.put(self.position)
 
-    def turn(self, speed: float, acceleration: float, dt: float, circle: int = 0) -> None:
+    def turn(self, speed: float, acceleration: float, dt: float, circle: int = 0, share: float = 1.0) -> None:
         """Turn at a speed [ticks/s] at once."""
         self.position += speed * dt
         if circle:
             self.position %= circle
         self.velocity = speed
 
-    def approach(self, goal: float, fastest: float, acceleration: float, dt: float) -> None:
+    def approach(self, goal: float, fastest: float, acceleration: float, dt: float, share: float = 1.0) -> None:
         """Be there."""
         self.put(goal)
 

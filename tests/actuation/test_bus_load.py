@@ -59,6 +59,9 @@ def measured(models: dict[int, str], baud: int, folder: Path, delay: float) -> f
             for id_, model in known.items()
         }
         cycle = ServoCycle(bus, {name: PositionDrive(joint, policy) for name, joint in joints.items()})
+        for joint in joints.values():
+            cycle.torques.write(bus, joint.servos[0])
+        line.taken = 0.0
         for number in range(4 + 2 * len(models)):
             for drive in cycle.drives.values():
                 drive.ask(MoveTo(0.9))

@@ -172,7 +172,7 @@ def test_an_alert_is_told_beside_the_values_and_named_by_the_hardware_error(conn
     assert (found[1].alert, found[2].alert) == (4, 128)
     port.line[2].heat_to(30)
     assert bus.write({2: {"torque_enable": 1}}, is_confirmed=True) == {2}
-    assert bus.reboot(2)
+    assert bus.reboot(2)  # its reply tells the alert, and is no refusal
     assert not bus.reboot(1)
     assert bus.write({2: {"torque_enable": 1}}, is_confirmed=True) == set()
 

@@ -60,7 +60,8 @@ ABOVE = {
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
     "components": "actuation body control controller_interface controller_manager controller_requests diagnostics "
-    "executive missions mux.core navigation.go_to sdk servo_bus_config servo_report sim twins",
+    "executive missions mux.core navigation.go_to sdk servo_bus_config servo_bus_line servo_report sim "
+    "twins.fault_script",
     "servo_report": "actuation control",
     "composition": "body.description sections",
     "control": "",
@@ -87,9 +88,10 @@ ABOVE = {
     "scaffold": "actuation.servo_models composition missions sdk",
     "schema": "controller_interface missions sdk sections",
     "sdk": "",
-    "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models body "
-    "control.calibration control.limits controller_interface sdk twins.servo_faults",
-    "servo_bus_config": "actuation control controller_interface twins.fault_script",
+    "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models "
+    "actuation.torques body control.calibration control.limits controller_interface sdk twins.servo_faults",
+    "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",
+    "servo_bus_line": "actuation servo_bus_config twins",
     "sim": "",
     "skills": "sdk",
     "twins": "actuation",

@@ -9,7 +9,7 @@ from rbxcompose.executive.requests import RunMission
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import BusPlan, Plan
 from rbxcompose.requests import as_data
-from rbxcompose.robot_events import MissionOver
+from rbxcompose.robot_events import MissionOver, RobotHeld
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.supervision.members import Phase
@@ -187,6 +187,19 @@ def test_a_process_that_comes_again_to_a_stopped_robot_is_told_so() -> None:
     stage.exit("mission")
     stage.scheduler.advance(stage.scheduler.now + 0.1)
     assert stage.forks[-1] == ("mission", True, True)
+
+
+def test_a_component_that_needs_the_robot_to_stand_still_stops_all_other_processes() -> None:
+    stage = Stage().start()
+    stage.speak("robot", RobotHeld("go_to", "a child is near"))
+    assert stage.conductor.is_stopped
+    assert stage.told(say.Stop) == ["world", "mission"]  # its own has stopped before it told
+    assert stage.conductor.latch.holds == {"go_to": "a child is near"}
+    stage.speak("robot", RobotHeld("go_to", ""))
+    assert stage.conductor.is_stopped
+    assert stage.conductor.latch.holds == {}
+    stage.conductor.release()
+    assert stage.told(say.Release) == ["world", "robot", "mission"]
 
 
 def test_a_stop_reaches_a_process_that_was_being_started_before_any_of_it_is_active() -> None:

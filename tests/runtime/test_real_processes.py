@@ -141,6 +141,18 @@ def test_commands_reach_the_running_robot(robot: Robot) -> None:
     assert robot.do("down", robot.name).returncode == 0
 
 
+def test_a_component_stops_the_robot_and_nobody_releases_it_before_the_reason_is_over(robot: Robot) -> None:
+    robot.up_detached(holds_at=0.5, holds_for=4.0)
+    eventually(lambda: all(robot.last_words(one)[-1] == "held" for one in ("first", "second")))
+    refused = robot.do("release")
+    assert refused.returncode != 0
+    assert "the robot must stand still: a toy is on the floor" in refused.stdout + refused.stderr
+    eventually(lambda: robot.do("release").returncode == 0)
+    eventually(lambda: all(robot.last_words(one)[-1] == "free again" for one in ("first", "second")))
+    assert [robot.texts(one).count("held") for one in ("first", "second")] == [1, 1]
+    assert robot.do("down").returncode == 0
+
+
 def test_a_second_up_is_a_finding(robot: Robot) -> None:
     robot.up_detached()
     pid = robot.supervisor().pid

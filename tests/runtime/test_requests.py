@@ -16,6 +16,7 @@ from rbxcompose.plan.dump import dump
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.requests import Command, Request, answers, as_data
 from rbxcompose.restarts import Restart
+from rbxcompose.robot_events import RobotHeld
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.folder import RobotState
 from rbxcompose.runtime.options import RunOptions
@@ -121,6 +122,14 @@ def test_release_opens_a_stop_and_nothing_else() -> None:
     desk.ask(StopRobot())
     assert desk.ask(ReleaseRobot())[1] is False
     assert desk.sent[-1] == ("mission", say.Release())
+
+
+def test_release_is_refused_with_the_reason_while_a_component_needs_the_robot_to_stand_still() -> None:
+    desk = Desk()
+    desk.conductor.heard("mission", RobotHeld("estop", "'estop' is pressed"))
+    assert desk.ask(ReleaseRobot()) == ("the robot must stand still: 'estop' is pressed", True)
+    desk.conductor.heard("mission", RobotHeld("estop", ""))
+    assert desk.ask(ReleaseRobot())[1] is False
 
 
 def test_the_status_comes_back_as_it_was() -> None:

@@ -10,7 +10,7 @@ import time
 from rbxcompose.cli.robots.run_view import run_plan
 from rbxcompose.plan.model import BusPlan, Instance, Plan
 from rbxcompose.runtime.options import RunOptions
-from rbxcompose.sdk import Component, Config, MissionOver, MissionWaits, component
+from rbxcompose.sdk import Component, Config, MissionOver, MissionWaits, RobotHeld, component
 
 SLOW = 5.0  # [s]
 
@@ -32,6 +32,10 @@ class ToyConfig(Config):
     """Takes long to configure."""
     dies_at: float = 0.0
     """When its process kills itself [s of robot time]; 0: never."""
+    holds_at: float = 0.0
+    """When it needs the robot to stand still [s of robot time]; 0: never."""
+    holds_for: float = 1.0
+    """How long it needs that [s]."""
     hangs_at: float = 0.0
     """When it hangs [s of robot time]; 0: never."""
 
@@ -49,6 +53,7 @@ class Toy(Component[ToyConfig]):
             raise OSError("no such device")
         self.steps = 0
         self.has_started = False
+        self.reason = ""
         self.is_moving = False
         self.rests_at = 0.0
 
@@ -84,6 +89,8 @@ class Toy(Component[ToyConfig]):
             self.info(f"step {self.steps}")
         if self.config.dies_at and self.now >= self.config.dies_at:
             signal.raise_signal(signal.SIGKILL)
+        if self.config.holds_at:
+            self.hold_still()
         if self.config.hangs_at and self.now >= self.config.hangs_at:
             time.sleep(60.0)
         if self.config.runs and self.has_started and self.now >= self.config.runs:
@@ -91,6 +98,13 @@ class Toy(Component[ToyConfig]):
             is_waiting = self.config.outcome == "waiting"
             end = MissionOver("toy", self.config.outcome)
             self.context.notify(MissionWaits("toy", "waits") if is_waiting else end)
+
+    def hold_still(self) -> None:
+        over = self.config.holds_at + self.config.holds_for
+        reason = "a toy is on the floor" if self.config.holds_at <= self.now < over else ""
+        if reason != self.reason:
+            self.reason = reason
+            self.context.notify(RobotHeld(self.name, reason))
 
     def deactivate(self) -> None:
         self.info("deactivated")

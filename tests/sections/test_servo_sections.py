@@ -69,6 +69,8 @@ WRONG = {
     + "faults:\n  one: {at: 1 s, fault: unplug, bus: more}\n",
     "a misspelt fault": SERVOS + "faults:\n  one: {at: 1 s, fault: overheet, joint: pan_joint}\n",
     "a joint that is unplugged": SERVOS + "faults:\n  one: {at: 1 s, fault: unplug, joint: pan_joint}\n",
+    "an effort that is a force": SERVOS.replace("{actuator: tilt}", "{actuator: tilt, limits: {effort: 3 N}}"),
+    "torque above all of it": SERVOS.replace("invert: true}", "invert: true, torque: 120 %}"),
     "two buses": SERVOS.replace("  servos: {", "  more: {type: dynamixel}\n  servos: {").replace(
         "{bus: servos, model: XL", "{bus: more, model: XL"
     ),
@@ -92,6 +94,27 @@ def test_a_bus_drives_its_joints_within_the_tighter_limits(tmp_path: Path) -> No
     pan, tilt = config.joints["pan_joint"], config.joints["tilt_joint"]
     assert (pan.lower, pan.upper, pan.velocity) == pytest.approx((-0.8727, 0.5236, 1.0472), abs=1e-4)
     assert (tilt.lower, tilt.upper, tilt.velocity, tilt.servos[0].invert) == (-1.0, 1.0, 2.0, True)
+
+
+@pytest.mark.parametrize(
+    ("actuator", "joint", "share"),
+    [
+        ("", "", 1.0),  # the effort of the body's URDF is not enforced
+        (", torque: 60 %", "", 0.6),
+        ("", ", limits: {effort: 0.3 Nm}", 0.2),
+        ("", ", ratio: 2, limits: {effort: 0.3 Nm}", 0.1),
+        (", torque: 10 %", ", limits: {effort: 0.3 Nm}", 0.1),
+        ("", ", limits: {effort: 1.5 Nm}", 1.0),
+    ],
+)
+def test_effort_becomes_a_share_of_the_torque_of_servos(
+    tmp_path: Path, actuator: str, joint: str, share: float
+) -> None:
+    text = SERVOS.replace("invert: true", f"invert: true{actuator}")
+    text = text.replace("{actuator: tilt}", f"{{actuator: tilt{joint}}}")
+    checked = check(tmp_path, text)
+    assert checked.codes == [], checked.text
+    assert driver_of(checked).joints["tilt_joint"].servos[0].torque == pytest.approx(share)
 
 
 def test_how_true_simulated_servos_are_is_told_at_the_bus(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from rbxcompose.config import Config
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.requests import Command, Query, Refused, Request, as_data
-from rbxcompose.robot_events import RobotEvent
+from rbxcompose.robot_events import RobotEvent, RobotHeld
 from rbxcompose.runtime.channel import Repeated
 from rbxcompose.runtime.process_group.frames import Frames
 from rbxcompose.runtime.process_group.handover import HandedOver, handed_over
@@ -63,6 +63,10 @@ class InstanceHome(Protocol):
     is_braking: bool
     has_started: bool
     doing: str
+
+    def stop(self) -> None:
+        """Hold everything that moves."""
+        ...
 
     @property
     def notify(self) -> Callable[[Repeated | RobotEvent], None]:
@@ -299,7 +303,9 @@ class Hosted:
         self.do("wake", self._made().wake)
 
     def notify(self, event: RobotEvent) -> None:
-        """Report something that concerns the whole robot to the supervisor."""
+        """Report something that concerns the whole robot to the supervisor; what must stop stops here at once."""
+        if isinstance(event, RobotHeld) and event.reason:
+            self.host.scheduler.at(self.clock.now(), self.instance.name, self.host.stop)
         self.host.notify(event)
 
     def repeat(self, requests: Sequence[Command]) -> None:

@@ -17,6 +17,7 @@ from rbxcompose.plan.model import Instance
 from rbxcompose.requests import Refused
 from rbxcompose.runtime.process_group.frames import Frames, Lookup
 from rbxcompose.runtime.process_group.worker import Call, Worker
+from rbxcompose.sdk.bound import Later
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import (
     Calls,
@@ -159,7 +160,8 @@ def _answer(request: ServedRequest[Any, Any], answer: Callable[[Any], Any], send
         send(partial(request.fail, f"{type(error).__name__}: {error}"))
         raise
     else:
-        send(partial(request.reply, response))
+        reply = response.then if isinstance(response, Later) else lambda then: then(response)
+        reply(lambda told: send(partial(request.reply, told)))
 
 
 def _at_once(call: Call) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan
-from rbxcompose.robot_events import MissionOver
+from rbxcompose.robot_events import MissionOver, RobotHeld
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.supervision.changes import WORLD, Changes
@@ -22,6 +22,7 @@ from rbxcompose.runtime.supervision.members import ConductorEffects, Member, Pha
 from rbxcompose.runtime.supervision.plan_change import LONGEST, Changing, WhenDone, text_of
 from rbxcompose.runtime.supervision.shutdown import END_BOUND, Closing, rest_time
 from rbxcompose.runtime.supervision.silence import LOOK, Silence
+from rbxcompose.runtime.supervision.stop_latch import StopLatch
 from rbxcompose.scheduler import Scheduler
 
 FINE, MISSION_FAILED, ROBOT_FAILED, INTERRUPTED = 0, 3, 4, 130
@@ -36,7 +37,6 @@ class Conductor:
         self, plan: Plan, options: RunOptions, scheduler: Scheduler, effects: ConductorEffects, *, router: str | None
     ) -> None:
         """Take `router`: the name of the router's process, or None if an existing router serves."""
-        self.is_stopped = False
         self.exit_code = FINE
         self.reason = ""  # why it went down
         self.endpoint = plan.bus.router
@@ -53,9 +53,15 @@ class Conductor:
         self._scheduler, self._effects = scheduler, effects
         names = [*([router] if router else []), *plan.groups]
         self.members = {name: Member(name) for name in names}
+        self.latch = StopLatch(effects, lambda: [self.members[group] for group in self.plan.groups])
         self._is_running = False  # everything has been active
         self._silence = Silence(effects, self._tell_lost, scheduler.now)
         self._closing: Closing | None = None  # set once the robot goes down
+
+    @property
+    def is_stopped(self) -> bool:
+        """Return whether everything that moves is held."""
+        return self.latch.is_stopped
 
     @property
     def phase(self) -> Phase:
@@ -145,6 +151,8 @@ class Conductor:
             case say.StoppedByBus() if not self.is_stopped:
                 self._effects.log(Level.WARN, "stop over the bus: everything that moves is held until 'release'")
                 self.stop()
+            case RobotHeld():
+                self.latch.heard(member, message)
             case say.AtRest():
                 member.is_at_rest = True
                 if self._closing:
@@ -170,7 +178,7 @@ class Conductor:
     def _configured(self, member: Member, endpoint: str | None) -> None:
         member.is_configured = True
         if member.is_stopped is not self.is_stopped:  # that changed after it was forked
-            self._tell_stop(member)
+            self.latch.tell(member)
         self._tell_blocked(member)
         if member.name == self._router and self.endpoint is None:
             self.endpoint = endpoint
@@ -304,21 +312,11 @@ class Conductor:
 
     def stop(self) -> None:
         """Hold everything that moves until `release`."""
-        self._set_stopped(True)
+        self.latch.set(True)
 
     def release(self) -> None:
         """Allow motion again."""
-        self._set_stopped(False)
-
-    def _set_stopped(self, is_stopped: bool) -> None:
-        self.is_stopped = is_stopped
-        for group in self.plan.groups:
-            if self.members[group].is_configured:
-                self._tell_stop(self.members[group])
-
-    def _tell_stop(self, member: Member) -> None:
-        member.is_stopped = self.is_stopped
-        self._effects.send(member.name, say.Stop() if self.is_stopped else say.Release())
+        self.latch.set(False)
 
     def _to_configured(self, message: say.ChannelOrder) -> None:
         for group in self.plan.groups:
@@ -358,6 +356,7 @@ class Conductor:
         """Apply the new plan, now that everything that stops has stopped."""
         self.plan, self.generation = changes.after, self.generation + 1
         fresh = {one.name: ("unconfigured", 0) for one in self.plan.instances if one.name in changes.starting}
+        self.latch.forget([one.name for one in self.plan.instances])
         self.states = {one.name: fresh.get(one.name) or self.states[one.name] for one in self.plan.instances}
 
     def _reconfigured(self, changing: Changing, process: str, refused: Mapping[str, str]) -> None:

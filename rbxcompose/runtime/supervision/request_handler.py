@@ -102,6 +102,8 @@ class RequestHandler:
     def _release(self) -> str:
         if not self._supervisor.conductor.is_stopped:
             raise Refused("the robot is not stopped")
+        if reasons := self._supervisor.conductor.latch.holds.values():
+            raise Refused(f"the robot must stand still: {'; '.join(reasons)}")
         self._tell("release: motion is allowed again")
         self._supervisor.conductor.release()
         return "released; 'mission resume' continues"

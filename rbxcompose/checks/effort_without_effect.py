@@ -1,0 +1,38 @@
+"""A limit of the effort of a joint that cannot be kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.actuation.servo_models import model_named
+from rbxcompose.actuation.torques import stall_torque
+from rbxcompose.check_runner import check
+from rbxcompose.findings import Finding, Severity
+from rbxcompose.manifest.tree import value_span
+from rbxcompose.model.robot import Robot
+from rbxcompose.sections.actuators import actuators
+from rbxcompose.sections.joints import joints
+
+
+@check("RBX2241", Severity.WARNING)
+def effort_without_effect(robot: Robot) -> Iterator[Finding]:
+    """A limit of the effort that has no effect
+
+    A servo is told the share of its torque that it may use. Where the e-manual gives no stall torque for its model, as
+    in the P series, nobody can tell which share a torque is. `torque` of the servo limits it without this.
+
+    Bad: `limits: {effort: 4 Nm}` of a joint that a PH54-200 turns.
+    Good: `torque: 20 %` of that servo, under `actuators`.
+    """
+    contents = robot.manifest.contents
+    servos = contents.of(actuators)
+    for name, one in contents.of(joints).items():
+        for each in one.servos if one.limits.effort is not None else ():
+            model = model_named(servos[each].model) if each in servos else None
+            if model is not None and stall_torque(model) is None:
+                yield effort_without_effect.at(
+                    value_span(contents.root, ("joints", name, "limits", "effort")),
+                    f"joint '{name}' has no limit of its effort: the stall torque of a {model.name} is not known",
+                    help=f"limit the servo '{each}' by its share: 'torque: 50 %'",
+                )
+                break
