@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
+from rbxcompose.actuation.bus_types import DYNAMIXEL, bus_type
 from rbxcompose.actuation.joint_drive import JointDrive
 from rbxcompose.actuation.position_drive import PositionDrive
 from rbxcompose.actuation.servo_cycle import JointMimic
 from rbxcompose.actuation.servo_items import ServoItem
 from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
-from rbxcompose.actuation.servo_models import ServoModel, model_named, servo_models
+from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.actuation.velocity_drive import VelocityDrive
 from rbxcompose.config import Config
 from rbxcompose.control.calibration import Calibration
@@ -107,6 +108,8 @@ class ServoBusConfig(Config):
 
     name: str = "servos"
     """Its name, which begins the topics of the services for all joints."""
+    kind: str = DYNAMIXEL
+    """What speaks on it."""
     port: str = ""
     """The serial port."""
     baud: int = 1_000_000
@@ -115,6 +118,8 @@ class ServoBusConfig(Config):
     """Cycles per second."""
     watchdog: float = 0.2
     """Silence of the bus after which servos stop by themselves, if they can [s]; 0 is never."""
+    return_delay: float | None = None
+    """Pause of servos before each reply, which is written into them [s]; None leaves theirs."""
     twin: Literal["", "ideal", "servo", "pty"] = ""
     """How its servos are simulated, if they are."""
     noise: float = 0.0
@@ -151,7 +156,14 @@ class ServoBusConfig(Config):
     def lone(self) -> dict[int, ServoModel]:
         """Return the models of servos that drive no joint, by id."""
         driving = {servo.id for joint in self.joints.values() for servo in joint.servos}
-        return {one.id: servo_models()[one.model] for one in self.used.values() if one.id not in driving}
+        return {one.id: self.model(one.model) for one in self.used.values() if one.id not in driving}
+
+    def model(self, name: str) -> ServoModel:
+        """Return a model of its servos. ValueError if there is none of that name."""
+        found = bus_type(self.kind).model(name)
+        if found is None:
+            raise ValueError(f"no servo is called '{name}'")
+        return found
 
     @property
     def policy(self) -> JointPolicy:
@@ -181,14 +193,15 @@ def joint_ports(config: ServoBusConfig) -> dict[str, Port[Any]]:
 def item_of(config: ServoBusConfig, actuator: str, name: str, is_read: bool, setup: Mapping[str, int]) -> ServoItem:
     """Return an item of a servo that a controller uses."""
     servo = config.used[actuator]
-    return ServoItem(servo.id, servo_models()[servo.model], name, is_read, setup)
+    return ServoItem(servo.id, config.model(servo.model), name, is_read, setup)
 
 
 def drives_of(config: ServoBusConfig) -> dict[str, JointDrive]:
     """Return a drive for each joint."""
     policy, drives = config.policy, dict[str, JointDrive]()
     for name, one in config.joints.items():
-        joint = servo_joint(name, one)
+        servos = [_servo(each, config.model(each.model)) for each in one.servos]
+        joint = servo_joint(name, one, servos)
         drives[name] = (
             VelocityDrive(joint, policy) if one.mode == "velocity" else PositionDrive(joint, policy, config.start_speed)
         )
@@ -200,18 +213,14 @@ def mimics_of(joints: Mapping[str, DrivenJointConfig]) -> dict[str, JointMimic]:
     return {name: JointMimic(one.mimic, one.multiplier, one.mimic_offset) for name, one in joints.items() if one.mimic}
 
 
-def servo_joint(name: str, config: DrivenJointConfig) -> ServoJoint:
-    """Return a joint with its servos. ValueError if there is no such model, or the calibration is none."""
-    servos = tuple(_servo(one) for one in config.servos)
+def servo_joint(name: str, config: DrivenJointConfig, servos: Iterable[JointServo]) -> ServoJoint:
+    """Return a joint with its servos. ValueError if the calibration is none."""
     limits = MotionLimits(config.lower, config.upper, config.velocity, config.acceleration)
     table = config.calibration
     transmission = Measured(Calibration(tuple(sorted(table)))) if table else Gear(config.ratio, config.offset)
-    return ServoJoint(name, servos, limits, transmission, config.is_continuous, config.mode)
+    return ServoJoint(name, tuple(servos), limits, transmission, config.is_continuous, config.mode)
 
 
-def _servo(config: JointServoConfig) -> JointServo:
-    model = model_named(config.model)
-    if model is None:
-        raise ValueError(f"no servo is called '{config.model}'")
+def _servo(config: JointServoConfig, model: ServoModel) -> JointServo:
     neutral = model.family.centre if config.neutral is None else config.neutral
     return JointServo(config.id, model, neutral, config.invert, config.torque)

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 from rbxcompose.actuation.bus import ServoBus
+from rbxcompose.actuation.bus_types import bus_type
 from rbxcompose.actuation.servo_joint import ServoJoint
 from rbxcompose.servo_bus_config import ServoBusConfig
 from rbxcompose.twins.fault_script import FaultScript
@@ -42,7 +43,7 @@ def open_bus(
     if config.twin:
         has_bytes = is_real_time and config.twin == "pty"
         servos = twin_servos(joints, is_ideal=config.twin == "ideal", noise=config.noise, seed=config.seed)
-        servos |= {f"servo {id_}": [FakeServo(one.name, id_)] for id_, one in config.lone.items()}
+        servos |= {f"servo {id_}": [FakeServo(one, id_)] for id_, one in config.lone.items()}
         twin = at_end.enter_context(twin_of(servos, now, has_bytes=has_bytes))
         faults = FaultScript(config.faults.values(), servos, twin)
         if isinstance(twin, TwinBus):
@@ -50,9 +51,7 @@ def open_bus(
             note = "bytes need real time, so servos are simulated without them" if is_other else ""
             return OpenedBus(twin, faults, note)
         path = str(twin.path)
-    from rbxcompose.actuation.dynamixel_bus import DynamixelBus  # needs the extra `servos`
-
     known = {servo.id: servo.model for joint in joints for servo in joint.servos}
-    bus = DynamixelBus(path, known | config.lone, baud=config.baud, clock=now)
+    bus = bus_type(config.kind).open(path, known | config.lone, baud=config.baud, clock=now)
     at_end.callback(bus.close)
     return OpenedBus(bus, faults)

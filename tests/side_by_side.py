@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 REAL_TIME = (
+    "tests/actuation/test_bus_load",
     "tests/actuation/test_dynamixel_bus",
     "tests/actuation/test_recovery",
     "tests/cli/test_servo",
@@ -10,6 +11,7 @@ REAL_TIME = (
     "tests/exposure/",
     "tests/faults/",
     "tests/net/",
+    "tests/robots/test_three_levels",
     "tests/runtime/test_apply_for_real",
     "tests/runtime/test_external_clock",
     "tests/runtime/test_lifeline",

@@ -12,9 +12,10 @@ from dynamixel_sdk import COMM_SUCCESS
 
 from rbxcompose.actuation.attention import Attention
 from rbxcompose.actuation.bus import FoundServo, ServoReading, ServoStatistics
-from rbxcompose.actuation.dynamixel_packets import Answer, NoAnswer, in_chunks, packets_by_protocol
+from rbxcompose.actuation.dynamixel_packets import Answer, NoAnswer, packets_by_protocol
 from rbxcompose.actuation.dynamixel_port import BlockingPort
 from rbxcompose.actuation.dynamixel_reads import GroupRead, ServoReader, in_other_order
+from rbxcompose.actuation.groups import FACTORY_DELAY, in_chunks
 from rbxcompose.actuation.port_errors import LostPortError
 from rbxcompose.actuation.serial_ports import latency_of, port_path
 from rbxcompose.actuation.servo_models import ServoModel
@@ -22,7 +23,6 @@ from rbxcompose.actuation.transfers import ReadPlan, Stretch, WritePlan, read_pl
 
 IDS = range(253)
 _SLACK = 0.001  # [s] beyond the latency timer of an adapter
-_FACTORY_DELAY = 0.0005  # [s] before a reply, of servos as they are sold
 _MODEL = Stretch(0, 2)  # where all tables have the model's number
 _NOBODY = b"\xff\xff\xfe\x04\x83\x00\x01\x79"  # a group write to no servo, for which nobody sends a reply
 
@@ -48,7 +48,7 @@ class DynamixelBus:
         baud: int = 1_000_000,
         timeout: float = 0.002,
         retries: int = 1,
-        return_delay: float = _FACTORY_DELAY,
+        return_delay: float = FACTORY_DELAY,
         is_fast: bool = False,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:

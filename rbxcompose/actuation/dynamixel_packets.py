@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
 from typing import NamedTuple
 
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, Protocol1PacketHandler, Protocol2PacketHandler
 
 from rbxcompose.actuation.dynamixel_port import BlockingPort
+from rbxcompose.actuation.groups import REPLY, ROOM
 from rbxcompose.actuation.transfers import Stretch
 
 _ALERT = 0x80  # bit of the error byte in 2.0 that tells of the servo, not of the request
@@ -34,7 +35,7 @@ class NoAnswer(Enum):
 class PacketsOne(Protocol1PacketHandler):  # type: ignore[misc]  # the SDK has no types
     """Protocol 1.0. It has no group read but that of MX servos, which read different stretches."""
 
-    head, reply, group = b"\xff\xff", 6, 230
+    head, reply, group = b"\xff\xff", REPLY[1], ROOM[1]
     """How packets begin; the length of a reply without data, and of what fits into one request [B]."""
 
     def receive(self, port: BlockingPort) -> Answer | NoAnswer:
@@ -65,7 +66,7 @@ class PacketsOne(Protocol1PacketHandler):  # type: ignore[misc]  # the SDK has n
 class PacketsTwo(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK has no types
     """Protocol 2.0."""
 
-    head, reply, group = b"\xff\xff\xfd", 11, 900
+    head, reply, group = b"\xff\xff\xfd", REPLY[2], ROOM[2]
     """As in protocol 1.0."""
 
     def addStuffing(self, packet: list[int]) -> list[int]:  # noqa: N802
@@ -119,13 +120,6 @@ Packets = PacketsOne | PacketsTwo
 def packets_by_protocol() -> dict[int, Packets]:
     """Return the packets of both protocols, by the number of the protocol."""
     return {1: PacketsOne(), 2: PacketsTwo()}
-
-
-def in_chunks(ids: Iterable[int], each: int, most: int) -> Iterator[list[int]]:
-    """Yield ids in groups of which each fits into one request of `most` bytes, at `each` [B] per id."""
-    whole, size = list(ids), max(1, most // each)
-    for start in range(0, len(whole), size):
-        yield whole[start : start + size]
 
 
 def _no_answer(port: BlockingPort, raw: Sequence[int], result: int, head: bytes) -> NoAnswer:

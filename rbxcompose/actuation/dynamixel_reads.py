@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from rbxcompose.actuation.bus import ServoReading
-from rbxcompose.actuation.dynamixel_packets import Answer, NoAnswer, Packets, PacketsTwo, in_chunks
+from rbxcompose.actuation.dynamixel_packets import Answer, NoAnswer, Packets, PacketsTwo
 from rbxcompose.actuation.dynamixel_port import BlockingPort
+from rbxcompose.actuation.groups import request_groups
 from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.actuation.transfers import ReadPlan, Stretch
-
-_REQUEST = 5  # [B] of one servo in a group request, at most
 
 
 class GroupRead:
@@ -60,7 +59,7 @@ class ServoReader:
         self, port: BlockingPort, read: GroupRead, models: Mapping[int, ServoModel], *, is_fast: bool = False
     ) -> None:
         """Ask servos once, by id, for all that they have not told yet; one that fails is not asked for the rest."""
-        for protocol, group in _groups(models):
+        for protocol, group in request_groups(models):
             wanted = read.next_of(group)
             while wanted:
                 found = self._exchange(port, protocol, wanted, read, is_fast=is_fast)
@@ -89,18 +88,6 @@ class ServoReader:
             return True
         self.strays += 1
         return False
-
-
-def _groups(models: Mapping[int, ServoModel]) -> Iterator[tuple[int, list[int]]]:
-    """Yield a protocol and the ids that one request can ask."""
-    two = [servo for servo, model in models.items() if model.protocol == 2]
-    for chunk in in_chunks(two, _REQUEST, PacketsTwo.group):
-        yield 2, chunk
-    one = [servo for servo, model in models.items() if model.protocol == 1]
-    bulk = [servo for servo in one if models[servo].family.has_bulk_read]
-    for chunk in in_chunks(bulk, _REQUEST, 200):
-        yield 1, chunk
-    yield from ((1, [servo]) for servo in one if servo not in bulk)
 
 
 def _plain(port: BlockingPort, packets: Packets, missing: Mapping[int, Stretch]) -> Iterator[Answer | NoAnswer]:

@@ -53,6 +53,8 @@ class JointDrive(ABC):
         self.voltage: float | None = None
         self.refused = ""
         """Why the last command was refused; empty after one that was not."""
+        self.clamped = ""
+        """How the last single command was changed; empty if it was not."""
         self.hindrance = ""
         """Why it takes no commands for a while; empty if it does."""
         self._positions: dict[int, float] = {}  # of each servo, as the joint counts

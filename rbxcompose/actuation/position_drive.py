@@ -33,7 +33,14 @@ class PositionDrive(JointDrive):
         if request.velocity is None and self.speed is not None:
             limits = replace(limits, velocity=min(self.speed, limits.speed))
         limiter.limits = limits
+        self._tell_clamped(request)
         return limiter.want(request.position, request.velocity or 0.0) or ""
+
+    def _tell_clamped(self, request: MoveTo) -> None:
+        """Note that a single command is beyond the limits; controllers tell that of theirs."""
+        inside = self.joint.limits.clamped(request.position)
+        is_beyond = request.velocity is None and abs(inside - request.position) > self.per_tick
+        self.clamped = f"a command for {request.position:g} is clamped to its limit, {inside:g}" if is_beyond else ""
 
     def _moved(self, dt: float) -> Iterator[Writes]:
         limiter = self.limiter

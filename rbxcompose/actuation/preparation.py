@@ -6,15 +6,19 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from rbxcompose.actuation.bus import ServoBus
 from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
+from rbxcompose.actuation.servo_models import EXTENDED
 
 WATCHDOG = "bus_watchdog"
 MODE = "operating_mode"
-_KEPT = (MODE, "min_position", "max_position")  # outlive the supply, and change without torque only
+DELAY = "return_delay"
+_KEPT = (MODE, DELAY, "min_position", "max_position")  # outlive the supply, and change without torque only
 _FIRED = -1  # what `bus_watchdog` reads after it has stopped a servo
 
 
-def prepare(bus: ServoBus, joints: Iterable[ServoJoint], watchdog: float) -> Iterator[str]:
+def prepare(bus: ServoBus, joints: Iterable[ServoJoint], watchdog: float, delay: float | None = None) -> Iterator[str]:
     """Set the modes of all servos that answer, and arm watchdogs [s]; yield sentences on what has changed for good.
+
+    With a `delay`, they pause so long before each reply [s].
 
     Raises:
         PortError: if the bus has gone.
@@ -24,7 +28,10 @@ def prepare(bus: ServoBus, joints: Iterable[ServoJoint], watchdog: float) -> Ite
             names = [name for name in _KEPT if name in servo.model.items]
             if (reading := bus.read([servo.id], names).get(servo.id)) is None:
                 continue
-            if changed := _changes(joint, servo, reading.values):
+            changed = _changes(joint, servo, reading.values)
+            if delay is not None and (raw := servo.model.to_raw(DELAY, delay)) != reading.values[DELAY]:
+                changed[DELAY] = raw
+            if changed:
                 bus.write({servo.id: {"torque_enable": 0}}, is_confirmed=True)
                 bus.write({servo.id: changed}, is_confirmed=True)
                 yield f"servo {servo.id} of joint '{joint.name}' now has {_told(changed)}"
@@ -60,8 +67,8 @@ def is_unarmed(values: Mapping[str, int]) -> bool:
 def _changes(joint: ServoJoint, servo: JointServo, values: Mapping[str, int]) -> dict[str, int]:
     """Return what differs from what the joint needs; ranges of positions that somebody has set are kept."""
     if modes := servo.model.family.modes:
-        is_endless = joint.is_continuous and "extended_position" in modes
-        wanted = "extended_position" if joint.mode == "position" and is_endless else joint.mode
+        is_endless = joint.is_continuous and servo.model.family.is_endless
+        wanted = EXTENDED if joint.mode == "position" and is_endless else joint.mode
         return {} if values.get(MODE) == modes[wanted] else {MODE: modes[wanted]}
     is_wheel = values.get("min_position") == values.get("max_position") == 0
     if joint.mode == "velocity":

@@ -8,18 +8,15 @@ from itertools import zip_longest
 from typing import Protocol
 
 from rbxcompose.actuation.bus import ServoBus
+from rbxcompose.actuation.cycle_items import FAST, SELDOM, slow_items
 from rbxcompose.actuation.joint_drive import JointDrive, Writes
 from rbxcompose.actuation.preparation import arm, has_fired, is_unarmed
 from rbxcompose.actuation.servo_items import ServoItem, use_next
 from rbxcompose.actuation.servo_joint import JointServo
 from rbxcompose.actuation.speed_limits import keep_speeds
-from rbxcompose.actuation.torque_limits import TorqueLimits
+from rbxcompose.actuation.torque_limits import LIMIT, TorqueLimits
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.joint_states import Relax
-
-FAST = ("present_position", "present_speed", "present_load")
-SLOW = ("present_temperature", "present_voltage")
-RARE = ("hardware_error", "bus_watchdog", "torque_limit")  # of models that have them
 
 
 class Leader(Protocol):
@@ -111,21 +108,31 @@ class ServoCycle:
             return
         for id_, reading in self.bus.read(list(drives), FAST).items():
             drives[id_].take(id_, reading)
-        id_ = list(drives)[self._turn % len(drives)]
         self._turn += 1
-        items = [*SLOW, *(name for name in RARE if name in drives[id_].joint.servo(id_).model.items)]
+        if self._turn % SELDOM == 0:
+            self._keep_torque(list(drives)[self._turn // SELDOM % len(drives)], drives)
+            return
+        id_ = list(drives)[self._turn % len(drives)]
+        items = slow_items(drives[id_].joint.servo(id_).model)
         if (slow := self.bus.read([id_], items).get(id_)) is not None:
             drives[id_].take(id_, slow)
             self._care(drives[id_], drives[id_].joint.servo(id_), slow.values)
 
+    def _keep_torque(self, id: int, drives: Mapping[int, JointDrive]) -> None:
+        """Write the torque limit of a servo again, if it has forgotten it without its supply."""
+        drive, servo = drives[id], drives[id].joint.servo(id)
+        if LIMIT not in servo.model.items or drive.hindrance or drive.error:
+            return
+        reading = self.bus.read([id], [LIMIT]).get(id)
+        if reading is not None and (note := self.torques.keep(self.bus, servo, reading.values)):
+            self.notes.append(note)
+
     def _care(self, drive: JointDrive, servo: JointServo, values: Mapping[str, int]) -> None:
-        """Give a servo back what it has forgotten without its supply, and arm a watchdog that has stopped it."""
+        """Arm a watchdog that has stopped a servo, or that it has forgotten without its supply."""
         if has_fired(values):
             drive.was_cut()
         if has_fired(values) or is_unarmed(values):
             arm(self.bus, servo, self.watchdog)
-        if not (drive.hindrance or drive.error) and (note := self.torques.keep(self.bus, servo, values)):
-            self.notes.append(note)
 
     def _mimic(self) -> None:
         """Let joints follow those which they mimic, with and without torque."""

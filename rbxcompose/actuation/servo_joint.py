@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -29,16 +30,22 @@ class JointServo:
         """Return the angle of one tick [rad], negative if the servo turns the other way round."""
         return -self.model.per_tick if self.is_inverted else self.model.per_tick
 
+    @property
+    def ends(self) -> tuple[int, int]:
+        """Return the first and the last tick of its range."""
+        family = self.model.family
+        first = family.centre - family.ticks // 2
+        return first, first + family.ticks - 1
+
     def angle(self, raw: int) -> float:
         """Return the angle of a tick [rad]."""
         return (raw - self.neutral) * self.per_tick
 
     def raw(self, angle: float, *, is_endless: bool = False) -> int:
         """Return the tick nearest to an angle [rad], within those of the servo unless it turns without end."""
-        family = self.model.family
-        first = family.centre - family.ticks // 2
+        first, last = self.ends
         ticks = self.neutral + round(angle / self.per_tick)
-        return ticks if is_endless and family.protocol == 2 else max(first, min(first + family.ticks - 1, ticks))
+        return ticks if is_endless and self.model.family.is_endless else max(first, min(last, ticks))
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +73,16 @@ class ServoJoint:
     def per_tick(self) -> float:
         """Return how far it moves for one tick of its first servo, in the middle of its range."""
         return abs(self.servos[0].model.per_tick * self.transmission.slope(0.0))
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Return the least and the greatest position that all of its servos reach; infinite if it turns without end."""
+        least, greatest = -math.inf, math.inf
+        for one in self.servos:
+            if not (self.is_continuous and one.model.family.is_endless):
+                ends = sorted(self.transmission.position(one.angle(tick)) for tick in one.ends)
+                least, greatest = max(least, ends[0]), min(greatest, ends[1])
+        return least, greatest
 
     @property
     def least_velocity(self) -> float:

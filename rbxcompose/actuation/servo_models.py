@@ -16,9 +16,12 @@ HARDWARE_ERRORS: Mapping[int, str] = MappingProxyType(
     {1: "input voltage", 4: "overheated", 8: "encoder", 16: "electric shock", 32: "overload"}
 )
 """Bits of `hardware_error` in protocol 2.0. In 1.0, those of voltage, heat and load have the same places."""
+EXTENDED = "extended_position"  # the mode without ends
 ONE_ERRORS = 1 | 4 | 32  # bits of the error byte in protocol 1.0 that tell of the servo, not of the request
 _ONE_BAUDS: Mapping[int, int] = MappingProxyType({250: 2_250_000, 251: 2_500_000, 252: 3_000_000})  # MX only
 _TWO_BAUDS = (9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
+COMMON_BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
+"""Rates that adapters and several models have [bit/s]."""
 _BAUD_TOLERANCE = 0.03  # of a UART
 
 
@@ -39,6 +42,11 @@ class ServoFamily:
     has_bulk_read: bool = True
     enables_at_goal: bool = False
     """Its firmware switches torque on when a goal position is written."""
+
+    @property
+    def is_endless(self) -> bool:
+        """Tell whether it can be given positions beyond one turn."""
+        return EXTENDED in self.modes
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +90,9 @@ class ServoModel:
     def baud_of(self, code: int) -> int | None:
         """Return the baud rate [bit/s] of a code of its item `baud`, None if there is none."""
         if self.protocol == 1:
-            return _ONE_BAUDS.get(code, 2_000_000 // (code + 1) if code < 250 else None)
+            if self.family.table == "MX 1.0":
+                return _ONE_BAUDS.get(code, 2_000_000 // (code + 1) if code < 250 else None)
+            return 2_000_000 // (code + 1) if 0 < code < 250 else None  # up to 1 Mbit/s
         codes = range(4) if self.family.table == "XL-320" else range(len(_TWO_BAUDS))
         return _TWO_BAUDS[code] if code in codes else None
 
@@ -93,7 +103,7 @@ class ServoModel:
 
 
 _TURN = 2 * math.pi
-_MODES_X = MappingProxyType({"velocity": 1, "position": 3, "extended_position": 4, "pwm": 16})
+_MODES_X = MappingProxyType({"velocity": 1, "position": 3, EXTENDED: 4, "pwm": 16})
 _MODES_CURRENT = MappingProxyType({"current": 0, "current_position": 5, **_MODES_X})
 _MODES_P = MappingProxyType({"current": 0, **_MODES_X})
 _AX = ServoFamily("AX", 1, 1024, math.radians(300), 512, has_bulk_read=False, enables_at_goal=True)
@@ -153,11 +163,16 @@ def model_of_number(number: int) -> ServoModel | None:
     return _by_number().get(number)
 
 
-def model_named(name: str) -> ServoModel | None:
+def find_model(name: str, models: Mapping[str, ServoModel]) -> ServoModel | None:
     """Return a model by its name; capitals, signs and the revision (`AX-12A`, `AX-12+`) do not matter."""
     folded = _folded(name)
-    known = {_folded(one.name): one for one in servo_models().values()}
+    known = {_folded(one.name): one for one in models.values()}
     return known.get(folded) or known.get(folded.removesuffix("a").removesuffix("f"))
+
+
+def model_named(name: str) -> ServoModel | None:
+    """Return a model of Dynamixel by its name."""
+    return find_model(name, servo_models())
 
 
 def _folded(name: str) -> str:

@@ -9,8 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-
+from rbxcompose.actuation.bus_types import bus_type
 from rbxcompose.actuation.joint_drive import JointDrive
 from rbxcompose.actuation.periods import Periods
 from rbxcompose.actuation.port_errors import PortError
@@ -25,11 +24,8 @@ from rbxcompose.control.joint_states import Enable, Hold, JointMode, MoveTo
 from rbxcompose.controller_interface import controller_type
 from rbxcompose.controller_manager import ControllerManager, ControllerSeat
 from rbxcompose.controller_requests import ControllerState, ListControllers, SwitchControllers
-from rbxcompose.levels import Level
 from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.msgs.stamps import to_time
-from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.requests import Refused, answers
 from rbxcompose.sdk import Component, Later, Out, Port, Serves, ServesAction, component
@@ -37,6 +33,7 @@ from rbxcompose.sdk.capabilities import Capability, NeedsExtra, OpensPort, Setti
 from rbxcompose.sdk.component import Context
 from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, item_of, joint_ports, mimics_of
 from rbxcompose.servo_bus_line import open_bus
+from rbxcompose.servo_report import joint_state, report
 from rbxcompose.twins.fault_script import InjectFault
 
 GONE = "the bus of servos has gone"
@@ -84,9 +81,10 @@ class ServoBusDriver(Component[ServoBusConfig]):
             for name, each in config.controllers.items()
             for one in controller_type(each.type).capabilities(name, each.config)
         )
-        package = NeedsExtra(Setting("dynamixel_sdk"), Setting("servos"))
+        kind, has_bytes = bus_type(config.kind), config.twin in ("", "pty")
+        packages = (NeedsExtra(Setting(kind.package), Setting(kind.extra)),) if kind.package and has_bytes else ()
         ports = () if config.twin else (OpensPort(Setting(config.port, "port")),)
-        return (*led, *(() if config.twin in ("ideal", "servo") else (package,)), *ports)
+        return (*led, *packages, *ports)
 
     def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
         """Give the ports of joints and controllers their methods."""
@@ -132,9 +130,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     def prepare(self, *drives: JointDrive) -> None:
         """Set the modes of the servos of some joints, or of all, and of those that controllers use."""
-        bus, drives = self.cycle.bus, drives or tuple(self.cycle.drives.values())
-        changed = prepare(bus, [drive.joint for drive in drives], self.config.watchdog)
-        for text in (*changed, *self.cycle.limit(drives), *set_up(self.cycle.items, bus)):
+        bus, config, drives = self.cycle.bus, self.config, drives or tuple(self.cycle.drives.values())
+        told = prepare(bus, [drive.joint for drive in drives], config.watchdog, config.return_delay)
+        for text in (*told, *self.cycle.limit(drives), *set_up(self.cycle.items, bus)):
             self.info(text)
 
     def activate(self) -> None:
@@ -149,7 +147,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.lose(error)
         if self.faults is not None:
             self.faults.start(self.now)
-        if not self.config.twin and (reason := be_prompt()):
+        is_real = not self.config.twin and isinstance(self.context.clock, MonotonicClock)
+        if is_real and (reason := be_prompt()):
             self.info(f"cycles may be late on a busy machine: no real-time priority ({reason})")
         self.wake()
 
@@ -310,34 +309,16 @@ class ServoBusDriver(Component[ServoBusConfig]):
 
     def publish(self) -> None:
         """Publish where the joints are, and what controllers know."""
-        known = [one for one in self.cycle.drives.values() if math.isfinite(one.measured.position)]
-        if known:
-            self.joint_states(
-                JointState(
-                    header=Header(stamp=to_time(self.stamp)),
-                    name=tuple(one.joint.name for one in known),
-                    position=np.array([one.measured.position for one in known]),
-                    velocity=np.array([one.measured.velocity for one in known]),
-                    effort=np.array([one.effort for one in known]),
-                )
-            )
+        if (message := joint_state(self.cycle.drives.values(), self.stamp)) is not None:
+            self.joint_states(message)
         for controller in self.controllers.leading:
             controller.publish()
 
     def tell(self) -> None:
         """Report to diagnostics."""
-        drives = self.cycle.drives
-        notes = {name: one.condition.note or one.refused for name, one in drives.items()}
-        notes |= {name: one.note for name, one in self.controllers.controllers.items()}
-        notes = {name: words for name, words in notes.items() if words}
-        bad = [name for name, one in drives.items() if one.mode in (JointMode.FAULT, JointMode.RESTING)]
-        level = Level.ERROR if bad or self.lost_at > -math.inf else Level.WARN if notes else Level.OK
-        message = "; ".join(f"{name}: {words}" for name, words in notes.items()) or f"{len(drives)} joints"
-        kept = {
-            "periods_met": f"{100 * self.periods.share_met:.2f} %",
-            "late": f"{1e3 * self.periods.late(0.99):.1f} ms",
-        }
-        self.status(level, message, **{name: one.mode for name, one in drives.items()}, **kept)
+        notes = {name: one.note for name, one in self.controllers.controllers.items()}
+        found = report(self.cycle.drives, notes, self.periods, is_lost=self.lost_at > -math.inf)
+        self.status(found.level, found.message, **found.values)
 
     # Stopping
 

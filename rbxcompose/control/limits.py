@@ -64,20 +64,20 @@ class Tightened:
 
     limits: MotionLimits | None
     """None if no position is within both ranges."""
-    notes: tuple[str, ...] = ()
-    """Sentences on what the second source would have widened."""
+    wider: tuple[str, ...] = ()
+    """The names of the limits that the second source would have widened."""
 
 
 def tightened(outer: MotionLimits, inner: MotionLimits) -> Tightened:
     """Return the limits `outer` (of the body) tightened by `inner` (of the manifest), which never widen them."""
-    notes: list[str] = []
-    for name in ("lower", "upper", "velocity", "acceleration", "effort"):
-        first, second = getattr(outer, name), getattr(inner, name)
-        if first is not None and second is not None and (second < first if name == "lower" else second > first):
-            notes.append(f"the limit '{name}' of {second:g} is wider than that of the body: {first:g} holds")
+    wider: list[str] = []
+    for field in fields(MotionLimits):
+        first, second = getattr(outer, field.name), getattr(inner, field.name)
+        if first is not None and second is not None and (second < first if field.name == "lower" else second > first):
+            wider.append(field.name)
     least, greatest = max(outer.least, inner.least), min(outer.greatest, inner.greatest)
     if least > greatest:
-        return Tightened(None, (f"no position is within both ranges: {_range(outer)} and {_range(inner)}",))
+        return Tightened(None, tuple(wider))
     tight = MotionLimits(
         least if math.isfinite(least) else None,
         greatest if math.isfinite(greatest) else None,
@@ -85,7 +85,7 @@ def tightened(outer: MotionLimits, inner: MotionLimits) -> Tightened:
         _smaller(outer.acceleration, inner.acceleration),
         _smaller(outer.effort, inner.effort),
     )
-    return Tightened(tight, tuple(notes))
+    return Tightened(tight, tuple(wider))
 
 
 def stopping_speed(distance: float, dt: float, acceleration: float | None) -> float:
@@ -208,7 +208,3 @@ def _clamp(value: float, limit: float) -> float:
 
 def _smaller(first: float | None, second: float | None) -> float | None:
     return min((one for one in (first, second) if one is not None), default=None)
-
-
-def _range(limits: MotionLimits) -> str:
-    return f"{limits.least:g} to {limits.greatest:g}"

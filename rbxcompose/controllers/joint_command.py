@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from pydantic import Field
@@ -10,8 +11,11 @@ from pydantic import Field
 from rbxcompose.config import JointName, Time
 from rbxcompose.control.curves import JointSample
 from rbxcompose.controller_interface import Controller, ControllerConfig, controller
+from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.std_msgs import Float64MultiArray
-from rbxcompose.sdk import In, Port
+from rbxcompose.sdk import ArrayEntries, In, Port, ServedGoal, ServesAction
+
+MOVE = "move"
 
 
 class JointCommandConfig(ControllerConfig):
@@ -35,7 +39,8 @@ class JointCommandController(Controller[JointCommandConfig]):
     """Leads joints to the positions on the topic `NAME/commands`, one for each joint, in their order [rad or m].
 
     Each joint goes as fast as its limits allow. From a command until all have arrived, no others are taken for single
-    joints. A command of another length, or with a number that is not finite, is refused as a whole.
+    joints. A command of another length, or with a number that is not finite, is refused as a whole. The action
+    `NAME/move` names some of the joints, and is the skill of missions; it has no duration.
 
     Example:
         gaze: {type: joint_command, joints: [pan_joint, tilt_joint], timeout: 0.5 s}
@@ -43,8 +48,12 @@ class JointCommandController(Controller[JointCommandConfig]):
 
     @classmethod
     def ports(cls, name: str, config: JointCommandConfig) -> dict[str, Port[Any]]:
-        """Return the topic."""
-        return {"commands": In(Float64MultiArray, f"{name}/commands", qos="command", is_open=True)}
+        """Return the topic and the action."""
+        entries = ArrayEntries("joints", "positions", config.dimensions)
+        return {
+            "commands": In(Float64MultiArray, f"{name}/commands", qos="command", is_open=True),
+            MOVE: ServesAction(MoveJoints, f"{name}/{MOVE}", claims=name, skill=name, entries=entries),
+        }
 
     @classmethod
     def mistake(cls, config: JointCommandConfig) -> tuple[str, str] | None:
@@ -57,6 +66,7 @@ class JointCommandController(Controller[JointCommandConfig]):
         self.wanted: dict[str, float] = {}  # positions of joints that have not arrived together
         self.commanded_at = -math.inf
         self.told = ""
+        self.goal: ServedGoal[Any, Any, Any] | None = None  # which asked for what is wanted
 
     @property
     def leads(self) -> bool:
@@ -70,18 +80,27 @@ class JointCommandController(Controller[JointCommandConfig]):
 
     def received(self, port: str, message: Float64MultiArray) -> None:
         """Take a command, or refuse it."""
-        positions, names = [float(one) for one in message.data], self.config.joints
-        self.told = self._objection(positions)
-        if self.told:
-            return
+        names, positions = self.config.joints, [float(one) for one in message.data]
+        self.told = self._objection(names, positions)
+        if not self.told:
+            self._end("replaced by a command")
+            self._want(dict(zip(names, positions, strict=True)))
+
+    def accept(self, port: str, goal: MoveJoints.Goal) -> str:
+        """Refuse what names joints that it does not lead, or none."""
+        odd = next((name for name in goal.joints if name not in self.config.joints), None)
+        if odd is not None or not goal.joints:
+            return f"it leads {', '.join(self.config.joints)}, not {odd or 'nothing'}"
+        return self._objection(goal.joints, [float(one) for one in goal.positions])
+
+    def _want(self, positions: Mapping[str, float]) -> None:
         self.wanted, self.commanded_at = {}, self.site.now
-        for name, position in zip(names, positions, strict=True):
+        for name, position in positions.items():
             self.wanted[name] = self.site.joints[name].rules.limits.clamped(position)
             if self.wanted[name] != position and not self.told:
                 self.told = f"joint '{name}' does not go to {position:g}: its limit is {self.wanted[name]:g}"
 
-    def _objection(self, positions: list[float]) -> str:
-        names = self.config.joints
+    def _objection(self, names: Sequence[str], positions: list[float]) -> str:
         if len(positions) != len(names):
             return f"a command had {len(positions)} positions, not {len(names)}: {', '.join(names)}"
         odd = next((name for name, one in zip(names, positions, strict=True) if not math.isfinite(one)), None)
@@ -89,19 +108,40 @@ class JointCommandController(Controller[JointCommandConfig]):
 
     def cycle(self, now: float, dt: float) -> None:
         """Lead the joints on, until they have arrived."""
+        self._take(now)
         if not self.wanted:
             return
         for name, joint in self.site.joints.items():
             if joint.blocked:
                 self.halt(now, f"joint '{name}': {joint.blocked}")
                 return
-        if 0.0 < self.config.timeout < now - self.commanded_at - dt / 2:
+        if self.goal is None and 0.0 < self.config.timeout < now - self.commanded_at - dt / 2:
             self.halt(now, f"no command for {self.config.timeout:g} s")
             return
         for name, position in self.wanted.items():
             self.site.joints[name].follow(JointSample(position))
         if all(self._has_arrived(name, dt) for name in self.wanted):
             self.wanted = {}
+            self._end("")
+
+    def _take(self, now: float) -> None:
+        """Take over a new goal, or the cancellation of the one that leads."""
+        goal = self.site.goal(MOVE)
+        if goal is not None and goal.cancel_requested:
+            self.goal = None
+            self.halt(now, "canceled")
+            goal.canceled(MoveJoints.Result(message="canceled"))
+        elif goal is not None and goal is not self.goal:
+            self.goal, self.told = goal, ""
+            self._want(dict(zip(goal.request.joints, map(float, goal.request.positions), strict=True)))
+
+    def _end(self, reason: str) -> None:
+        """End the goal, as failed if there is a reason."""
+        goal, self.goal = self.goal, None
+        if goal is not None and reason:
+            goal.aborted(reason, MoveJoints.Result(message=reason))
+        elif goal is not None:
+            goal.succeeded(MoveJoints.Result(message=self.told))
 
     def _has_arrived(self, name: str, dt: float) -> bool:
         joint = self.site.joints[name]
@@ -112,5 +152,6 @@ class JointCommandController(Controller[JointCommandConfig]):
         """Bring its joints to rest."""
         if self.wanted:
             self.wanted, self.told = {}, reason
+            self._end(reason)
             for joint in self.site.joints.values():
                 joint.hold()

@@ -15,6 +15,9 @@ from rbxcompose.msgs.control_msgs import SingleJointPosition as Move
 from rbxcompose.msgs.stamps import to_seconds, to_time
 from rbxcompose.msgs.std_msgs import Float64, Header
 from rbxcompose.sdk import In, Length, Port, ServedGoal, ServesAction, Speed, Time
+from rbxcompose.units import LENGTH, SPEED
+
+MEASURES = {"position": LENGTH, "max_velocity": SPEED}
 
 
 class LinearConfig(ControllerConfig):
@@ -56,7 +59,7 @@ class LinearController(Controller[LinearConfig]):
         """Return its topic and its action."""
         return {
             "command": In(Float64, f"{name}/command", qos="command", is_open=True),
-            "move": ServesAction(Move, f"{name}/move", claims=name, skill=name),
+            "move": ServesAction(Move, f"{name}/move", claims=name, skill=name, measures=MEASURES),
         }
 
     def prepare(self) -> None:

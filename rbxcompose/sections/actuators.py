@@ -7,12 +7,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from rbxcompose.actuation.servo_models import model_named, servo_models
+from rbxcompose.actuation.bus_types import DYNAMIXEL, BusType, bus_type, bus_type_names
+from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.config import Config, Name, Ratio
 from rbxcompose.findings import Finding, Related, Span, kind
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import Reading
-from rbxcompose.manifest.tree import key_span, value_span
+from rbxcompose.manifest.section import Contents, Reading
+from rbxcompose.manifest.tree import ScalarNode, at, key_span, value_span
 from rbxcompose.references import ACTUATOR, SERVO_BUS, Refers
 
 NO_MODEL = kind(
@@ -126,14 +127,27 @@ def actuators(reading: Reading[ActuatorModel]) -> dict[str, ActuatorModel]:
     """
     found = reading.entries()
     reading.report.extend([*_models(reading, found), *_ids(reading, found)])
-    return {name: one for name, one in found.items() if model_named(one.model) is not None}
+    return {name: one for name, one in found.items() if model_of(reading.contents, one) is not None}
+
+
+def type_of(contents: Contents, bus: str) -> BusType:
+    """Return the type of a bus as it is written; one that is not known is told where it stands."""
+    written = at(contents.root, ("buses", bus, "type"))
+    name = written.text if isinstance(written, ScalarNode) else ""
+    return bus_type(name if name in bus_type_names() else DYNAMIXEL)
+
+
+def model_of(contents: Contents, actuator: ActuatorModel) -> ServoModel | None:
+    """Return the model of a servo, None if its bus knows none of that name."""
+    return type_of(contents, actuator.bus).model(actuator.model)
 
 
 def _models(reading: Reading[ActuatorModel], found: Mapping[str, ActuatorModel]) -> Iterator[Finding]:
     for name, one in found.items():
-        if model_named(one.model) is None:
+        if model_of(reading.contents, one) is None:
+            known = type_of(reading.contents, one.bus).models()
             span = value_span(reading.contents.root, ("actuators", name, "model"))
-            yield NO_MODEL.misspelt(span, f"no servo is called '{one.model}'", one.model, servo_models(), "models")
+            yield NO_MODEL.misspelt(span, f"no servo is called '{one.model}'", one.model, known, "models")
 
 
 def _ids(reading: Reading[ActuatorModel], found: Mapping[str, ActuatorModel]) -> Iterator[Finding]:

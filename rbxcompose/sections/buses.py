@@ -6,16 +6,17 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, WithJsonSchema
 
+from rbxcompose.actuation.bus_types import bus_type_names
 from rbxcompose.actuation.torques import share_of
 from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.config import Angle, BitRate, Config, Frequency, Time
 from rbxcompose.controller_interface import ControllerConfig, controller_type
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, SetScope
-from rbxcompose.manifest.tree import KeyPath, key_span
-from rbxcompose.manifest.validate import MISSING_KEY
+from rbxcompose.manifest.tree import KeyPath, at, key_span, value_span
+from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.manifest.written import as_written
 from rbxcompose.references import DEVICE_PORT, SERVO_BUS, Refers
@@ -24,9 +25,10 @@ from rbxcompose.sections.body import body
 from rbxcompose.sections.controllers import controllers
 from rbxcompose.sections.devices import port_name
 from rbxcompose.sections.faults import buses_of_joints, faults_of
-from rbxcompose.sections.joints import JointModel, bounds_of, effort_of, joints, table_of, tighter
+from rbxcompose.sections.joints import JointModel, effort_of, held_limits, joints, table_of
 from rbxcompose.sections.safety import safety
-from rbxcompose.units import Quantity
+
+BusTypeName = Annotated[str, WithJsonSchema({"type": "string", "enum": bus_type_names()})]
 
 
 class TwinModel(Config):
@@ -41,7 +43,7 @@ class TwinModel(Config):
 class BusOfServosModel(Config):
     """A line of servos, driven by a process of its own."""
 
-    type: Literal["dynamixel"]
+    type: BusTypeName
     """What speaks on it."""
     port: Annotated[str, Refers(DEVICE_PORT)] = ""
     """The serial port, such as `/dev/ttyUSB0`, or `dev:NAME` of a device; simulated servos need none."""
@@ -51,11 +53,23 @@ class BusOfServosModel(Config):
     """How often all joints are read and written."""
     watchdog: Time = Field(0.2, ge=0)
     """Silence after which servos stop by themselves, if their model can; 0 is never."""
+    return_delay: Time | None = Field(None, ge=0, le=254 * 2e-6)
+    """Pause of servos before each reply, which is written into them; without it theirs stays: 500 us as they are sold.
+    """
     sim: Literal["ideal", "servo", "pty"] = "servo"
     """How true simulated servos are: `ideal` ones are at their goals at once, `servo` has motors; with `pty` they also
     answer by bytes on a pseudo-terminal, through the driver of real ones."""
     twin: TwinModel = TwinModel()
     """How what simulated servos measure differs from what is."""
+
+
+def _is_known(reading: Reading[BusOfServosModel], name: str, one: BusOfServosModel) -> bool:
+    if one.type in bus_type_names():
+        return True
+    path = ("buses", name, "type")
+    span, node = value_span(reading.contents.root, path), at(reading.contents.root, path)
+    reading.report.add(not_a_choice(span, "type", node, bus_type_names()))
+    return False
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
@@ -71,10 +85,12 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             continue
         config = {
             "name": name,
+            "kind": bus.type,
             "port": port_name(contents, bus.port),
             "baud": round(bus.baud),
             "rate": bus.rate,
             "watchdog": bus.watchdog,
+            "return_delay": bus.return_delay,
             "twin": bus.sim if contents.is_simulated else "",
             "noise": bus.twin.noise,
             "seed": bus.twin.seed,
@@ -130,8 +146,7 @@ def _servo(one: ActuatorModel) -> dict[str, object]:
 
 def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorModel]) -> dict[str, object]:
     """Return how a joint is driven, within the limits of the body."""
-    limits, outer = driven.limits, joint.limits if joint else None
-    lower, upper = bounds_of(joint, driven)
+    limits = held_limits(driven, joint)
     mimic = joint.mimic if joint else None
     return {
         "servos": [_servo(one) | {"torque": min(one.torque, _share(driven, servos))} for one in servos],
@@ -140,10 +155,10 @@ def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorMod
         "offset": driven.offset,
         "calibration": table_of(driven),
         "is_continuous": joint is not None and joint.kind == "continuous",
-        "lower": lower,
-        "upper": upper,
-        "velocity": tighter(min, outer.velocity if outer else None, _value(limits.velocity)),
-        "acceleration": _value(limits.acceleration),
+        "lower": limits.lower,
+        "upper": limits.upper,
+        "velocity": limits.velocity,
+        "acceleration": limits.acceleration,
         "mimic": mimic.joint if mimic else "",
         "multiplier": mimic.multiplier if mimic else 1.0,
         "mimic_offset": mimic.offset if mimic else 0.0,
@@ -154,10 +169,6 @@ def _share(driven: JointModel, servos: list[ActuatorModel]) -> float:
     """Return the share of their torque that the effort of their joint leaves to servos."""
     limit, most = driven.limits.effort, effort_of(driven, servos)
     return share_of(limit.value, most) if limit is not None and most is not None else 1.0
-
-
-def _value(quantity: Quantity | None) -> float | None:
-    return None if quantity is None else quantity.value
 
 
 @section(
@@ -180,7 +191,8 @@ def buses(reading: Reading[BusOfServosModel]) -> dict[str, BusOfServosModel]:
             port: /dev/ttyUSB0
             rate: 100 Hz
     """
-    found = reading.entries()
+    read = reading.entries()
+    found = {name: one for name, one in read.items() if _is_known(reading, name, one)}
     for name, one in found.items():
         if not one.port and not reading.contents.is_simulated:
             span = key_span(reading.contents.root, ("buses", name))

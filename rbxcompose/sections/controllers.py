@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 
 from rbxcompose.actuation.control_tables import OUTPUTS
-from rbxcompose.actuation.servo_models import model_named
 from rbxcompose.body.model import BodyJoint
 from rbxcompose.config import Config
 from rbxcompose.controller_interface import ControllerConfig, controller_names, controller_type
@@ -17,9 +16,9 @@ from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, a
 from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
 from rbxcompose.plugins import BROKEN, BrokenPluginError
 from rbxcompose.references import CONTROLLER
-from rbxcompose.sections.actuators import actuators
+from rbxcompose.sections.actuators import actuators, model_of
 from rbxcompose.sections.body import body
-from rbxcompose.sections.joints import bounds_of, joints
+from rbxcompose.sections.joints import held_limits, joints
 
 NOT_DRIVEN = kind(
     "RBX2215",
@@ -251,7 +250,7 @@ def _blind(reading: Reading[ControllerConfig], name: str, one: ControllerConfig)
     if controller_type(one.type).interface != "velocity":
         return
     for servo in (each for joint in one.led if joint in driven for each in driven[joint].servos if each in servos):
-        model = model_named(servos[servo].model)
+        model = model_of(reading.contents, servos[servo])
         if model is not None and model.family.span < math.tau - model.per_tick:
             degrees = round(math.degrees(model.family.span))
             message = f"'{name}' needs to know how far '{servo}' turns, and an {model.name} tells {degrees} of 360 deg"
@@ -268,21 +267,21 @@ def _beyond(reading: Reading[ControllerConfig], name: str, one: ControllerConfig
     for joint, (least, greatest) in controller_type(one.type).asks(one).items():
         if joint not in driven:
             continue
-        lower, upper = bounds_of(known.get(joint), driven[joint])
-        is_below = lower is not None and least < lower - _ROUNDING
-        is_above = upper is not None and greatest > upper + _ROUNDING
+        limits = held_limits(driven[joint], known.get(joint))
+        is_below = least < limits.least - _ROUNDING
+        is_above = greatest > limits.greatest + _ROUNDING
         if is_below or is_above:
             show = _shown(known.get(joint))
             message = f"the controller '{name}' moves '{joint}' from {show(least)} to {show(greatest)}"
-            limits = " to ".join("any" if end is None else show(end) for end in (lower, upper))
-            yield BEYOND_LIMITS.at(_place(reading, name, joint), f"{message}, beyond its limits: {limits}")
+            bounds = " to ".join("any" if end is None else show(end) for end in (limits.lower, limits.upper))
+            yield BEYOND_LIMITS.at(_place(reading, name, joint), f"{message}, beyond its limits: {bounds}")
 
 
 def _unknown_items(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
     """Yield findings on items that the model of a servo lacks, or that may not be switched."""
     servos = reading.contents.of(actuators)
     for used in one.used:
-        model = model_named(servos[used.actuator].model) if used.actuator in servos else None
+        model = model_of(reading.contents, servos[used.actuator]) if used.actuator in servos else None
         valid = [item for item in model.items if item in OUTPUTS or not used.is_written] if model else []
         if model is not None and used.item not in valid:
             span = value_span(reading.contents.root, ("controllers", name, used.field))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any
 
 from pydantic import PlainValidator, WithJsonSchema
@@ -13,10 +13,11 @@ from rbxcompose.actuation.torques import joint_effort, steepest
 from rbxcompose.body.model import BodyJoint
 from rbxcompose.config import Angle, Config, JointName, Length, Name
 from rbxcompose.control.calibration import Calibration
+from rbxcompose.control.limits import MotionLimits, Tightened, tightened
 from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Reading
-from rbxcompose.manifest.tree import KeyPath, key_span, value_span
+from rbxcompose.manifest.tree import KeyPath, MappingNode, key_span, value_span
 from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE
 from rbxcompose.references import ACTUATOR, Refers
 from rbxcompose.sections.actuators import ActuatorModel, actuators
@@ -34,6 +35,7 @@ from rbxcompose.units import (
     Quantity,
     UnitError,
     example,
+    format_quantity,
     parse_quantity,
 )
 
@@ -56,6 +58,17 @@ In the URDF the joint is fixed, or floats. Either another joint is meant, or the
 
 Bad: `camera_joint: {actuator: pan_servo}`, where the URDF has `<joint name="camera_joint" type="fixed">`.
 Good: `pan_joint: {actuator: pan_servo}`, where the URDF has `<joint name="pan_joint" type="revolute">`.
+""",
+)
+NOWHERE_TO_GO = kind(
+    "RBX2224",
+    """Limits that leave a joint no motion
+
+Its least position is above its greatest one, no position is within its limits and within those of the body, or its
+speed or acceleration is not above 0.
+
+Bad: `limits: {position: [120 deg, 150 deg]}`, where the URDF has `<limit lower="-1.5" upper="1.5" .../>`.
+Good: `limits: {position: [-60 deg, 60 deg]}`
 """,
 )
 
@@ -164,8 +177,23 @@ def _mistakes(
     if not one.servos:
         yield MISSING_KEY.at(at, f"joint '{name}' needs the key 'actuator'")
     yield from _servos(reading, name, one, users)
-    if joint is None:
-        return
+    for key, value in (("ratio", one.ratio), ("travel", one.travel)):
+        if value == 0.0:
+            yield NOT_TOGETHER.at(
+                value_span(root, ("joints", name, key)), f"with a {key} of 0, joint '{name}' never moves"
+            )
+    if joint is not None:
+        yield from _of_body(root, name, one, joint)
+    if one.calibration and (reason := _no_table(one)):
+        yield NOT_TOGETHER.at(key_span(root, ("joints", name, "calibration")), reason)
+    for key, reason, help_text in _no_motion(one, joint):
+        span = value_span(root, ("joints", name, "limits", key))
+        yield NOWHERE_TO_GO.at(span, f"joint '{name}' {reason}", help=help_text)
+
+
+def _of_body(root: MappingNode, name: str, one: JointModel, joint: BodyJoint) -> Iterator[Finding]:
+    """Yield what does not fit to the joint of the body."""
+    at = key_span(root, ("joints", name))
     if not joint.moves:
         yield DOES_NOT_MOVE.at(at, f"joint '{name}' is {joint.kind} in the body, so no servo can move it")
     slides = joint.slides
@@ -179,11 +207,54 @@ def _mistakes(
             words = "slides" if slides else "turns"
             span = value_span(root, ("joints", name, *path))
             yield WRONG_TYPE.at(span, f"joint '{name}' {words}, and this is {written.dimension.phrase}")
-    if one.calibration and (reason := _no_table(one)):
-        yield NOT_TOGETHER.at(key_span(root, ("joints", name, "calibration")), reason)
 
 
 _TURNING = (ANGLE, ANGULAR_SPEED, ANGULAR_ACCELERATION, TORQUE)
+
+
+def _no_motion(one: JointModel, joint: BodyJoint | None) -> Iterator[tuple[str, str, str]]:
+    """Yield the limits under which it cannot move: the key, why not, and what helps."""
+    limits, outer = one.limits, _body_limits(joint)
+    for key, value in (("velocity", limits.velocity), ("acceleration", limits.acceleration)):
+        if value is not None and value.value <= 0.0:
+            yield key, f"cannot move with a limit of {_shown(value)}", "a limit is above 0, for both directions"
+    if limits.position is None:
+        return
+    least, greatest = limits.position
+    if least.value > greatest.value:
+        words = f"has its limits the wrong way round: {_shown(least)}, {_shown(greatest)}"
+        yield "position", words, f"write '[{_shown(greatest)}, {_shown(least)}]'"
+    elif greatest.value < outer.least or least.value > outer.greatest:
+        dimension = least.dimension
+        bounds = " to ".join(format_quantity(bound, dimension) for bound in (outer.least, outer.greatest))
+        words = f"may go from {_shown(least)} to {_shown(greatest)}, but in the body from {bounds}"
+        yield "position", words, "give it a range that lies within that of the body"
+
+
+def _shown(quantity: Quantity) -> str:
+    return format_quantity(quantity.value, quantity.dimension)
+
+
+def _body_limits(joint: BodyJoint | None) -> MotionLimits:
+    outer = joint.limits if joint else None
+    if joint is None or outer is None:
+        return MotionLimits()
+    lower, upper = (None, None) if joint.kind == "continuous" else (outer.lower, outer.upper)
+    return MotionLimits(lower, upper, None if outer.velocity is None else abs(outer.velocity))
+
+
+def limits_of(one: JointModel, joint: BodyJoint | None) -> Tightened:
+    """Return the limits of the body, tightened by those of the manifest."""
+    own = one.limits
+    least, greatest = [each.value for each in own.position] if own.position else (None, None)
+    velocity = own.velocity.value if own.velocity else None
+    acceleration = own.acceleration.value if own.acceleration else None
+    return tightened(_body_limits(joint), MotionLimits(least, greatest, velocity, acceleration))
+
+
+def held_limits(one: JointModel, joint: BodyJoint | None) -> MotionLimits:
+    """Return the limits that hold; none for a joint whose limits are a mistake, which is told."""
+    return limits_of(one, joint).limits or MotionLimits()
 
 
 def _servos(
@@ -231,18 +302,3 @@ def effort_of(one: JointModel, servos: Iterable[ActuatorModel]) -> float | None:
     models = [model for servo in servos if (model := model_named(servo.model))]
     gear = math.tau / one.travel if one.travel else one.ratio
     return joint_effort(models, steepest(table_of(one)) if one.calibration else gear)
-
-
-def bounds_of(joint: BodyJoint | None, driven: JointModel) -> tuple[float | None, float | None]:
-    """Return the least and the greatest position: the tighter ones of the body and of what is written here."""
-    inner = driven.limits.position
-    outer = joint.limits if joint is not None and joint.kind != "continuous" else None
-    return (
-        tighter(max, outer.lower if outer else None, inner[0].value if inner else None),
-        tighter(min, outer.upper if outer else None, inner[1].value if inner else None),
-    )
-
-
-def tighter(pick: Callable[[float, float], float], outer: float | None, inner: float | None) -> float | None:
-    """Return the limit that `pick` prefers, None if there is none."""
-    return pick(outer, inner) if outer is not None and inner is not None else outer if inner is None else inner

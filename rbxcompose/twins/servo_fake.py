@@ -54,7 +54,7 @@ class FakeServo:
 
     def __init__(
         self,
-        model: str,
+        model: str | ServoModel,
         id: int,
         *,
         baud: int = 1_000_000,
@@ -63,7 +63,7 @@ class FakeServo:
         noise: float = 0.0,
         seed: int = 0,
     ) -> None:
-        self.model: ServoModel = servo_models()[model]
+        self.model = model if isinstance(model, ServoModel) else servo_models()[model]
         self.memory = bytearray(_SIZE)
         self.faults = ServoFaults()
         self.holds_on_enable = holds_on_enable

@@ -21,7 +21,7 @@ def twin_servos(
     """Return simulated servos by joint; `noise` [rad] is the standard deviation of the positions that they measure."""
     return {
         joint.name: [
-            FakeServo(one.model.name, one.id, is_ideal=is_ideal, noise=noise / one.model.per_tick, seed=seed)
+            FakeServo(one.model, one.id, is_ideal=is_ideal, noise=noise / one.model.per_tick, seed=seed)
             for one in joint.servos
         ]
         for joint in joints

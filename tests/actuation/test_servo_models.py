@@ -137,7 +137,9 @@ def test_codes_of_baud_rates_are_those_of_the_protocols() -> None:
     assert servo_models()["AX-12"].code_of(1_000_000) == 1
     assert servo_models()["MX-28"].code_of(57_600) == 34
     assert servo_models()["XL430-W250"].code_of(4_500_000) == 7
+    assert servo_models()["MX-28"].code_of(3_000_000) == 252
     assert servo_models()["XL-320"].code_of(2_000_000) is None
+    assert servo_models()["AX-12"].code_of(2_000_000) is None
 
 
 def test_an_item_that_a_model_lacks_is_told_with_a_similar_one() -> None:

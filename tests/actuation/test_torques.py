@@ -85,11 +85,11 @@ def test_a_servo_that_had_no_supply_gets_its_limit_and_its_watchdog_back(model: 
     driven.cycle.watchdog = 0.2
     joint = driven.drive.joint
     driven.drive.joint = replace(joint, servos=(replace(joint.servos[0], torque=0.5),))
-    driven.run(5)
+    driven.run(20)
     before = driven.servo.get("torque_limit")
     assert driven.servo.model.to_si("torque_limit", before) == pytest.approx(0.5, abs=1e-3)
     driven.servo.reboot()
-    driven.run(3)
+    driven.run(20)
     assert driven.servo.get("torque_limit") == before
     assert driven.cycle.notes == ["servo 1 had lost its torque limit: it is written again"]
     assert model == "AX-12" or driven.servo.get("bus_watchdog") == 10

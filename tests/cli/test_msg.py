@@ -52,7 +52,13 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
     assert main(["msg", "export", str(tmp_path)]) == 0
     folder = tmp_path / "rbxcompose_msgs"
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    own = {"action/MoveJoints.action", "action/Recharge.action", "srv/SetBatteryLevel.srv"}
+    own = {
+        "action/Grip.action",
+        "action/MoveJoints.action",
+        "action/Recharge.action",
+        "srv/SetBatteryLevel.srv",
+        "srv/SetSpeed.srv",
+    }
     assert written == {"package.xml", "CMakeLists.txt", *own}
     cmake = (folder / "CMakeLists.txt").read_text()
     assert all(f'"{name}"' in cmake for name in own)

@@ -64,3 +64,13 @@ def test_all_joints_are_relaxed_and_disabled_at_once(head: Head) -> None:
     head.robot.advance(1.0)
     assert {str(one.mode) for one in driver.cycle.drives.values()} == {"disabled"}
     assert head.at["pan"] == pytest.approx(0.3, abs=TICK)
+
+
+def test_a_command_beyond_the_limits_is_clamped_and_said(head: Head) -> None:
+    told = head.robot.statuses("servos")
+    head.commands["pan"](Float64(data=9.0))
+    head.robot.advance(2.5)
+    assert "pan: a command for 9 is clamped to its limit, 2" in told[-1].message
+    head.commands["pan"](Float64(data=0.0))
+    head.robot.advance(2.5)
+    assert "clamped" not in told[-1].message

@@ -11,10 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.controllers.joint_command import JointCommandConfig, JointCommandController
+from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64, Float64MultiArray
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.qos import Qos
+from rbxcompose.sdk.bound import Ended, Outcome
 from rbxcompose.testing import Bench, instance
 
 TICK = 0.00512  # [rad] of an AX-12
@@ -47,7 +49,7 @@ class Gaze:
         self.robot.advance(time)
 
 
-@settings(max_examples=15)
+@settings(max_examples=15, deadline=None)
 @given(tilt=st.floats(-3.0, 3.0), pan=st.floats(-3.0, 3.0))
 def test_joints_arrive_within_their_limits_and_are_free_then(tilt: float, pan: float) -> None:
     gaze = Gaze()
@@ -124,3 +126,51 @@ def test_a_joint_named_twice_is_a_mistake() -> None:
     assert JointCommandController.mistake(JointCommandConfig(joints=["a", "b"])) is None
     mistake = JointCommandController.mistake(JointCommandConfig(joints=["a", "b", "a"]))
     assert mistake == ("joints", "'a' is named twice")
+
+
+class Asked:
+    """Goals that name some of the joints, and how they ended."""
+
+    def __init__(self) -> None:
+        self.gaze = Gaze()
+        self.ended: list[Ended[MoveJoints.Result]] = []
+        self.goals = self.gaze.robot.bus.action_client("me", "/gaze/move", MoveJoints)
+
+    def move(self, time: float = 3.0, **positions: float) -> Any:
+        goal = MoveJoints.Goal(joints=tuple(positions), positions=np.array(list(positions.values())))
+        sent = self.goals(goal, self.ended.append)
+        self.gaze.robot.advance(time)
+        return sent
+
+    @property
+    def outcomes(self) -> list[Outcome]:
+        return [one.outcome for one in self.ended]
+
+
+def test_a_goal_names_some_joints_and_ends_when_they_have_arrived() -> None:
+    asked = Asked()
+    asked.move(pan=0.5)
+    assert asked.outcomes == [Outcome.SUCCEEDED]
+    assert asked.gaze.at == pytest.approx({"pan": 0.5, "tilt": 0.0}, abs=TICK)
+
+
+def test_a_goal_that_is_replaced_canceled_or_cannot_go_on_says_so() -> None:
+    asked = Asked()
+    asked.move(0.2, pan=1.0)
+    asked.gaze.command(0.0, 0.0, time=0.2)
+    assert asked.ended[-1].result == MoveJoints.Result(message="replaced by a command")
+    asked.move(0.2, tilt=1.0).cancel()
+    asked.gaze.robot.advance(0.5)
+    assert asked.outcomes[-1] is Outcome.CANCELED
+    asked.move(0.2, tilt=1.5)
+    client = asked.gaze.robot.bus.client("me", "/tilt/enable", SetBool)
+    client(SetBool.Request(data=False), lambda reply: None)
+    asked.gaze.robot.advance(0.5)
+    assert asked.ended[-1].result == MoveJoints.Result(message="joint 'tilt': it is disabled")
+
+
+@pytest.mark.parametrize("goal", [{}, {"roll": 1.0}, {"pan": math.nan}])
+def test_a_goal_that_makes_no_sense_is_refused(goal: dict[str, float]) -> None:
+    asked = Asked()
+    asked.move(0.5, **goal)
+    assert asked.outcomes == [Outcome.REJECTED]

@@ -124,7 +124,8 @@ def _in_a_cell(title: str) -> str:
 def _case(path: Path, kind: str) -> Case:
     name = f"{kind}/{path.stem}" if kind else path.stem
     if path.is_dir():
-        return Case(name, kind, {str(file.relative_to(path)): _text(file) for file in sorted(path.rglob("*.yaml"))})
+        files = (file for file in sorted(path.rglob("*")) if file.suffix in (".yaml", ".urdf"))
+        return Case(name, kind, {str(file.relative_to(path)): _text(file) for file in files})
     text = _text(path)
     if "\nkind: Mission\n" in text:
         return Case(name, kind, {ROBOT: _text(HERE / ROBOT) + (VALUES if "$bat" in text else ""), MISSION: text})

@@ -29,7 +29,7 @@ actuators:
   lift_servo: {bus: servos, model: AX-12, id: 1}
   pan_servo: {bus: servos, model: AX-12, id: 2}
 joints:
-  lift: {actuator: lift_servo, travel: 2 cm, limits: {acceleration: 1 m/s^2}}
+  lift: {actuator: lift_servo, travel: 3 m, limits: {acceleration: 1 m/s^2}}
   pan: {actuator: pan_servo, limits: {acceleration: 360 deg/s^2}}
 controllers:
   head: {type: joint_trajectory, joints: [lift, pan]}

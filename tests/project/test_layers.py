@@ -48,9 +48,9 @@ ABOVE = {
     "actuation": "control",
     "body": "",
     "bus": "sdk.bound",
+    "bus_types": "actuation",
     "check_runner": "missions.analysis model.robot",
-    "checks": "actuation.servo_models actuation.torques body.model check_runner composition "
-    "diagnostics.core missions model sdk sections",
+    "checks": "actuation body.model check_runner composition diagnostics.core missions model sdk sections",
     "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
     "importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "
     "scaffold schema.documents sdk sections",
@@ -60,7 +60,9 @@ ABOVE = {
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
     "components": "actuation body control controller_interface controller_manager controller_requests diagnostics "
-    "executive missions mux.core navigation.go_to sdk servo_bus_config servo_bus_line sim twins.fault_script",
+    "executive missions mux.core navigation.go_to sdk servo_bus_config servo_bus_line servo_report sim "
+    "twins.fault_script",
+    "servo_report": "actuation control",
     "composition": "body.description sections",
     "control": "",
     "diagnostics": "",
@@ -74,7 +76,7 @@ ABOVE = {
     "mission_tests": "compiler components.mission composition executive missions model plan.model sdk sections.faults "
     "testing.bench twins.fault_script twins.servo_faults",
     "missions": "",
-    "model": "body.model composition missions sdk sections",
+    "model": "actuation body.model composition missions sdk sections servo_bus_config",
     "mux": "",
     "navigation": "",
     "params": "",
@@ -86,8 +88,8 @@ ABOVE = {
     "scaffold": "actuation.servo_models composition missions sdk",
     "schema": "controller_interface missions sdk sections",
     "sdk": "",
-    "sections": "actuation.control_tables actuation.serial_ports actuation.servo_models actuation.torques body "
-    "control.calibration controller_interface sdk twins.servo_faults",
+    "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models "
+    "actuation.torques body control.calibration control.limits controller_interface sdk twins.servo_faults",
     "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",
     "servo_bus_line": "actuation servo_bus_config twins",
     "sim": "",

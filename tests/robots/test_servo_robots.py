@@ -24,9 +24,9 @@ FLAT = 0.006  # thickness of a finger [m]
 TICK = 0.00512  # [rad] of an AX-12
 
 
-def driver(name: str, profile: str = "", *, real: bool = False) -> Any:
+def driver(name: str, profile: str = "") -> Any:
     profiles = [profile] if profile else []
-    plan = compile_robot(str(ROOT / f"robots/{name}"), profiles=profiles, environment={}, real=real).plan
+    plan = compile_robot(str(ROOT / f"robots/{name}"), profiles=profiles, environment={}).plan
     assert plan
     [found] = [one for one in plan.instances if one.type == "servo_bus"]
     return found
@@ -50,12 +50,6 @@ def test_one_bus_has_all_joints_of_all_parts(name: str, profile: str, ids: dict[
     assert {joint: one.servos[0].id for joint, one in config.joints.items()} == ids
     led = [joint for one in config.controllers.values() for joint in one.config.led]
     assert sorted(led) == sorted(ids)
-
-
-def test_the_real_robot_differs_in_the_port_alone() -> None:
-    real, simulated = driver("head_only", real=True).config, driver("head_only").config
-    assert (real.twin, simulated.twin, real.port) == ("", "servo", "/dev/ttyUSB0")
-    assert real.model_copy(update={"twin": "servo"}) == simulated
 
 
 def test_the_arm_goes_where_it_is_commanded() -> None:

@@ -28,7 +28,7 @@ actuators:
 joints:
   pan_joint:
     actuator: pan
-    limits: {position: [-90 deg, 30 deg], velocity: 60 deg/s}
+    limits: {position: [-50 deg, 30 deg], velocity: 60 deg/s}
   tilt_joint: {actuator: tilt}
 controllers:
   head: {type: joint_trajectory, joints: [pan_joint, tilt_joint]}
@@ -52,6 +52,11 @@ WRONG = {
     "a joint that no servo drives": SERVOS.replace("  tilt_joint: {actuator: tilt}\n", ""),
     "an unknown model": SERVOS.replace("AX-12", "AX-21"),
     "one id twice": SERVOS.replace("id: 2", "id: 1"),
+    "a range the wrong way round": SERVOS.replace("[-50 deg, 30 deg]", "[30 deg, -50 deg]"),
+    "a range outside of the body's": SERVOS.replace("[-50 deg, 30 deg]", "[90 deg, 120 deg]"),
+    "a speed of nothing": SERVOS.replace("velocity: 60 deg/s", "velocity: 0 deg/s"),
+    "an acceleration below 0": SERVOS.replace("velocity: 60 deg/s", "acceleration: -60 deg/s^2"),
+    "a gear of nothing": SERVOS.replace("{actuator: tilt}", "{actuator: tilt, ratio: 0}"),
     "a bus that does not exist": SERVOS.replace("{bus: servos, model: AX", "{bus: servoes, model: AX"),
     "faults of nothing": SERVOS
     + "faults:\n  one: {at: 1 s, fault: mute}\n  two: {at: 1 s, fault: mute, joint: pan_joint, bus: servos}\n",
@@ -87,7 +92,7 @@ def test_a_bus_drives_its_joints_within_the_tighter_limits(tmp_path: Path) -> No
     config = driver_of(checked)
     assert (config.rate, config.twin, list(config.controllers)) == (50.0, "servo", ["head"])
     pan, tilt = config.joints["pan_joint"], config.joints["tilt_joint"]
-    assert (pan.lower, pan.upper, pan.velocity) == pytest.approx((-1.0, 0.5236, 1.0472), abs=1e-4)
+    assert (pan.lower, pan.upper, pan.velocity) == pytest.approx((-0.8727, 0.5236, 1.0472), abs=1e-4)
     assert (tilt.lower, tilt.upper, tilt.velocity, tilt.servos[0].invert) == (-1.0, 1.0, 2.0, True)
 
 

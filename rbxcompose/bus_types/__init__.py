@@ -1,0 +1,1 @@
+"""Types of buses of servos, one file each."""

@@ -1,0 +1,17 @@
+"""Dynamixel servos, of both protocols on one line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from rbxcompose.actuation.bus import ServoBus
+from rbxcompose.actuation.bus_types import DYNAMIXEL, bus_type_declared
+from rbxcompose.actuation.servo_models import ServoModel, servo_models
+
+
+@bus_type_declared(DYNAMIXEL, servo_models, package="dynamixel_sdk", extra="servos")
+def open_dynamixel(path: str, servos: Mapping[int, ServoModel], *, baud: int, clock: Callable[[], float]) -> ServoBus:
+    """Open the port."""
+    from rbxcompose.actuation.dynamixel_bus import DynamixelBus  # its SDK is an extra
+
+    return DynamixelBus(path, servos, baud=baud, clock=clock)

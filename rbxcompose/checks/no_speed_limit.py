@@ -1,0 +1,30 @@
+"""A joint that may move as fast as its servo can."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.check_runner import check
+from rbxcompose.findings import Finding, Severity
+from rbxcompose.model.driven_joints import driven_joints
+from rbxcompose.model.robot import Robot
+from rbxcompose.units import ANGULAR_SPEED, SPEED, example
+
+
+@check("RBX2229", Severity.WARNING)
+def no_speed_limit(robot: Robot) -> Iterator[Finding]:
+    """A joint has no limit of its speed
+
+    Neither the body nor the manifest has one. A single command, or a trajectory with a point at 0 s, then moves the
+    joint as fast as its servo can.
+
+    Bad: `pan_joint: {actuator: pan_servo}`, where the URDF has no `velocity` for it.
+    Good: `pan_joint: {actuator: pan_servo, limits: {velocity: 90 deg/s}}`
+    """
+    for one in driven_joints(robot):
+        if one.joint.mode == "position" and one.joint.limits.velocity is None and not one.mimics:
+            yield no_speed_limit.at(
+                one.key(),
+                f"'{one.name}' has no limit of its speed: it moves as fast as its servo can",
+                help=f"add one: 'limits: {{velocity: {example(SPEED if one.slides else ANGULAR_SPEED)}}}'",
+            )

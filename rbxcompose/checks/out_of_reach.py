@@ -1,0 +1,67 @@
+"""A position of a joint that its servos do not reach."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from rbxcompose.check_runner import check
+from rbxcompose.findings import Finding, Related, Severity, Span
+from rbxcompose.manifest.tree import at
+from rbxcompose.model.driven_joints import DrivenJoint, driven_joints
+from rbxcompose.model.robot import Robot
+
+_SCALES = ("calibration", "travel", "ratio", "offset")
+_TICK = 1.01  # ticks that a limit may lie outside: that of 150 deg is one beyond the last tick of an AX-12
+
+
+@check("RBX2225", Severity.WARNING)
+def out_of_reach(robot: Robot) -> Iterator[Finding]:
+    """A joint may go where its servo cannot
+
+    The ticks of a servo end: an AX-12 turns 150 deg to each side of its middle. The tick at which the joint is at 0
+    (`neutral`, `offset`), a gear (`ratio`, `travel`) or a `calibration` shift and scale that. The servo stops at its
+    end, whatever is commanded, and a trajectory that leads beyond fails.
+
+    Bad: `limits: {position: [-180 deg, 180 deg]}` of a joint with an AX-12.
+    Good: `limits: {position: [-150 deg, 149 deg]}`
+    """
+    for one in driven_joints(robot):
+        if one.joint.mode == "position":
+            yield from _told(one)
+
+
+def _told(one: DrivenJoint) -> Iterator[Finding]:
+    joint, limits = one.joint, one.joint.limits
+    (first, last), slack = joint.reach, _TICK * joint.per_tick
+    is_below = limits.least < first - slack and (limits.lower is not None or joint.is_continuous)
+    is_above = limits.greatest > last + slack and (limits.upper is not None or joint.is_continuous)
+    if not (is_below or is_above):
+        return
+    is_free = limits.lower is None and limits.upper is None
+    bounds = f"{one.position(limits.least)} to {one.position(limits.greatest)}"
+    wanted = "turns without end" if is_free else f"may go from {bounds}"
+    servo = "its servo reaches" if len(joint.servos) == 1 else "its servos reach"
+    body = one.body.limits if one.body else None
+    yield out_of_reach.at(
+        _place(one),
+        f"'{one.name}' {wanted}, but {servo} {one.position(first)} to {one.position(last)}",
+        help=_remedy(one, max(first, limits.least), min(last, limits.greatest)),
+        related=[Related(body.span, "its limits in the body")] if body else [],
+    )
+
+
+def _place(one: DrivenJoint) -> Span:
+    """Return where the range is written, else what shifts or scales it."""
+    own = (("joints", one.name, *path) for path in (("limits", "position"), *((key,) for key in _SCALES)))
+    neutral = (("actuators", name, "neutral") for name in one.written.servos)
+    paths = [path for path in (*own, *neutral) if at(one.robot.manifest.root, path) is not None]
+    return one.robot.key(*paths[0]) if paths else one.key()
+
+
+def _remedy(one: DrivenJoint, least: float, greatest: float) -> str:
+    if least >= greatest:
+        return "check 'neutral', 'offset' and 'invert': no position is within both"
+    unit, per = ("mm", 0.001) if one.slides else ("deg", math.pi / 180)
+    lower, upper = math.ceil(least / per - 1e-6), math.floor(greatest / per + 1e-6)
+    return f"limit it: 'position: [{lower} {unit}, {upper} {unit}]' below its 'limits'"
