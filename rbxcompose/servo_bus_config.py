@@ -183,9 +183,9 @@ def joint_ports(config: ServoBusConfig) -> dict[str, Port[Any]]:
     for name, one in config.joints.items():
         if one.mode == "position" and not one.mimic:
             found[f"{name}_command"] = In(Float64, f"{name}/command", qos="command", is_open=True)
-            found[f"{name}_set_speed"] = Serves(SetSpeed, f"{name}/set_speed")
-        found[f"{name}_relax"] = Serves(Trigger, f"{name}/relax")
-        found[f"{name}_enable"] = Serves(SetBool, f"{name}/enable")
+            found[f"{name}_set_speed"] = Serves(SetSpeed, f"{name}/set_speed", skill=f"set_speed_{name}")
+        found[f"{name}_relax"] = Serves(Trigger, f"{name}/relax", skill=f"relax_{name}")
+        found[f"{name}_enable"] = Serves(SetBool, f"{name}/enable", skill=f"enable_{name}")
         found[f"{name}_reboot"] = Serves(Trigger, f"{name}/reboot", skill=f"reboot_{name}")
     return found
 

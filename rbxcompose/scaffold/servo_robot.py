@@ -7,12 +7,14 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rbxcompose.actuation.bus_load import cycle_load
 from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.scaffold.texts import render, yaml_text
 
 _PLAIN_PATH = re.compile(r"/[\w./:-]*\w")
 _STEP = 1e-4  # [rad], to which limits are rounded
 _APART = 0.1  # [m] between the joints of the drawing
+_USUAL = 100  # [Hz] of a bus
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,12 @@ class ServoRobotAnswers:
     baud: int
     servos: Sequence[NewServo]
 
+    @property
+    def rate(self) -> int:
+        """Return how often all of them can be read and written [Hz], 100 at most."""
+        load = cycle_load({one.id: (one.model, "position") for one in self.servos})
+        return max(1, min(_USUAL, math.floor(1.0 / load.time(self.baud))))
+
 
 def servo_robot_paths(name: str) -> tuple[str, str]:
     """Return the paths of the robot's file and of its body."""
@@ -57,8 +65,9 @@ def servo_robot_files(answers: ServoRobotAnswers) -> dict[str, str]:
     placed = [(servo, f"{index * _APART:.2f}") for index, servo in enumerate(answers.servos)]
     width = f"{len(placed) * _APART:.2f}"
     middle = f"{(len(placed) - 1) * _APART / 2:.2f}"
+    told = {"name": answers.name, "port": port, "baud": answers.baud, "rate": answers.rate, "servos": answers.servos}
     return {
-        robot: render("servo_robot.yaml.j2", name=answers.name, port=port, baud=answers.baud, servos=answers.servos),
+        robot: render("servo_robot.yaml.j2", **told),
         body: render("servo_robot.urdf.j2", name=answers.name, placed=placed, width=width, middle=middle),
     }
 

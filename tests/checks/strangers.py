@@ -166,7 +166,7 @@ class ScannerConfig(Config):
     """Its port."""
 
 
-@component("toy_scanner")
+@component("toy_sonar")
 class Scanner(Component[ScannerConfig]):
     """A device on a serial port."""
 

@@ -82,4 +82,4 @@ def test_the_drivers_of_others_are_looked_at_like_ours(tmp_path: Path, capsys: p
     assert main(["up", "robot.yaml"]) == 1
     told = capsys.readouterr().err
     assert "error[RBX2253]: 'scanner' needs the package 'toy_scanner_sdk'" in told
-    assert "error[RBX2201]: /nowhere/ttyUSB0 does not exist\n  --> robot.yaml:5:40" in told
+    assert "error[RBX2201]: /nowhere/ttyUSB0 does not exist\n  --> robot.yaml:5:38" in told

@@ -17,12 +17,12 @@ PORTS = (
     SerialPort("/dev/ttyUSB2", (), UsbDevice("1a86", "7523")),
 )
 SEEN = "/dev/serial/by-id/usb-FT4 (/dev/ttyUSB0, 0403:6014 FT4), /dev/ttyUSB1 (1a86:7523), /dev/ttyUSB2 (1a86:7523)"
-SCANNER = "rbx: 1\nkind: Robot\nname: cart\ncomponents:\n  scanner:\n    type: toy_scanner\n    device: {}\n"
+SCANNER = "rbx: 1\nkind: Robot\nname: cart\ncomponents:\n  scanner:\n    type: toy_sonar\n    device: {}\n"
 
 
 def told(folder: Path, name: str, file: PortFile, ports: tuple[SerialPort, ...] = PORTS) -> list[tuple[str, str, str]]:
     """Return the code, the words and the help of each finding; all are at the line of the port."""
-    assert strangers.Scanner.type_name == "toy_scanner"
+    assert strangers.Scanner.type_name == "toy_sonar"
     robot = check_text(SCANNER.format(name), folder).compilation.robot
     assert robot is not None
     found = list(port_findings(robot, ports, lambda path: file))
