@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from rbxcompose.actuation.bus_load import cycle_load
 from rbxcompose.actuation.servo_models import ServoModel
+from rbxcompose.actuation.torques import stall_torque
 from rbxcompose.scaffold.texts import render, yaml_text
 
 _PLAIN_PATH = re.compile(r"/[\w./:-]*\w")
@@ -35,6 +36,11 @@ class NewServo:
         """Return the greatest position of its joint [rad]."""
         centre = self.model.family.centre or self.model.family.ticks // 2
         return _within((self.model.family.ticks - 1 - centre) * self.model.per_tick)
+
+    @property
+    def effort(self) -> float:
+        """Return the greatest torque of its joint [Nm]: all that its servo has, 0 if that is not known."""
+        return stall_torque(self.model) or 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -149,7 +149,7 @@ def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorMod
     limits = held_limits(driven, joint)
     mimic = joint.mimic if joint else None
     return {
-        "servos": [_servo(one) | {"torque": min(one.torque, _share(driven, servos))} for one in servos],
+        "servos": [_servo(one) | {"torque": min(one.torque, _share(driven, servos, joint))} for one in servos],
         "mode": servos[0].mode,
         "ratio": math.tau / driven.travel if driven.travel else driven.ratio,
         "offset": driven.offset,
@@ -165,10 +165,12 @@ def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorMod
     }
 
 
-def _share(driven: JointModel, servos: list[ActuatorModel]) -> float:
-    """Return the share of their torque that the effort of their joint leaves to servos."""
-    limit, most = driven.limits.effort, effort_of(driven, servos)
-    return share_of(limit.value, most) if limit is not None and most is not None else 1.0
+def _share(driven: JointModel, servos: list[ActuatorModel], joint: BodyJoint | None) -> float:
+    """Return the share of their torque that the effort of their joint leaves to servos; 0 in the body is none."""
+    own, most = driven.limits.effort, effort_of(driven, servos)
+    outer = joint.limits.effort if joint and joint.limits else None
+    limits = [*([own.value] if own is not None else []), *([outer] if outer is not None and outer > 0.0 else [])]
+    return share_of(min(limits), most) if limits and most is not None else 1.0
 
 
 @section(

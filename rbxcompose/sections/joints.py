@@ -102,7 +102,7 @@ class DrivenLimitsModel(Config):
     acceleration: JointAcceleration | None = None
     """Largest acceleration."""
     effort: JointEffort | None = None
-    """Largest torque or force; those of the body's URDF are often fillers, and are not enforced."""
+    """Largest torque or force; that of the body holds, too, unless it is 0."""
 
 
 class CalibrationPointModel(Config):
@@ -299,6 +299,9 @@ def table_of(one: JointModel) -> tuple[tuple[float, float], ...]:
 
 def effort_of(one: JointModel, servos: Iterable[ActuatorModel]) -> float | None:
     """Return the most that its servos exert on a joint [Nm or N], None if that is not known of one of them."""
-    models = [model for servo in servos if (model := model_named(servo.model))]
+    models = [model_named(servo.model) for servo in servos]
+    known = [model for model in models if model is not None]
+    if not known or len(known) < len(models):  # those of other types of buses
+        return None
     gear = math.tau / one.travel if one.travel else one.ratio
-    return joint_effort(models, steepest(table_of(one)) if one.calibration else gear)
+    return joint_effort(known, steepest(table_of(one)) if one.calibration else gear)

@@ -85,7 +85,7 @@ ABOVE = {
     "rendering": "",
     "replay": "bus plan.model recording runtime.process_group runtime.records sdk",
     "runtime": "body.transform_errors body.transforms bus missions.program.sources params plan recording sdk",
-    "scaffold": "actuation.bus_load actuation.servo_models composition missions sdk",
+    "scaffold": "actuation.bus_load actuation.servo_models actuation.torques composition missions sdk",
     "schema": "controller_interface missions sdk sections",
     "sdk": "",
     "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models "

@@ -99,12 +99,13 @@ def test_a_bus_drives_its_joints_within_the_tighter_limits(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("actuator", "joint", "share"),
     [
-        ("", "", 1.0),  # the effort of the body's URDF is not enforced
+        ("", "", 1.0 / 1.5),  # the effort of the URDF, of the 1.5 Nm that the servo has
         (", torque: 60 %", "", 0.6),
         ("", ", limits: {effort: 0.3 Nm}", 0.2),
         ("", ", ratio: 2, limits: {effort: 0.3 Nm}", 0.1),
         (", torque: 10 %", ", limits: {effort: 0.3 Nm}", 0.1),
-        ("", ", limits: {effort: 1.5 Nm}", 1.0),
+        ("", ", limits: {effort: 1.5 Nm}", 1.0 / 1.5),  # that of the URDF is smaller
+        ("", ", ratio: 3", 1.0 / 4.5),
     ],
 )
 def test_effort_becomes_a_share_of_the_torque_of_servos(
