@@ -38,12 +38,12 @@ def prepare(bus: ServoBus, joints: Iterable[ServoJoint], watchdog: float, delay:
             arm(bus, servo, watchdog)
 
 
-def with_torque(bus: ServoBus, joints: Iterable[ServoJoint]) -> set[str]:
-    """Return the joints whose servos all have torque now."""
+def with_torque(bus: ServoBus, joints: Iterable[ServoJoint]) -> dict[str, bool]:
+    """Return whether all servos of a joint have torque now, of the joints whose servos have all answered."""
     joints = list(joints)
     found = bus.read([id_ for joint in joints for id_ in joint.ids], ["torque_enable"])
     held = {id_ for id_, reading in found.items() if reading.values["torque_enable"]}
-    return {joint.name for joint in joints if held.issuperset(joint.ids)}
+    return {joint.name: held.issuperset(joint.ids) for joint in joints if found.keys() >= set(joint.ids)}
 
 
 def arm(bus: ServoBus, servo: JointServo, watchdog: float) -> None:

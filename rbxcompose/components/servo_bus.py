@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 from rbxcompose.actuation.bus_types import bus_type
 from rbxcompose.actuation.joint_drive import JointDrive
@@ -140,9 +140,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
         try:
             self.prepare()
             if self.config.on_shutdown != "relax":
-                for name in with_torque(self.cycle.bus, [drive.joint for drive in self.cycle.drives.values()]):
-                    drive = self.cycle.drives[name]
-                    drive.policy = replace(drive.policy, on_start="hold")
+                for name in self.cycle.drives:
+                    self.start_by(name, "wait")
+                self.keep_torque()
         except PortError as error:
             self.lose(error)
         if self.faults is not None:
@@ -151,6 +151,17 @@ class ServoBusDriver(Component[ServoBusConfig]):
         if is_real and (reason := be_prompt()):
             self.info(f"cycles may be late on a busy machine: no real-time priority ({reason})")
         self.wake()
+
+    def keep_torque(self) -> None:
+        """Let joints hold that have torque, as soon as their servos have told whether they have."""
+        waiting = [one.joint for one in self.cycle.drives.values() if one.policy.on_start == "wait"]
+        for name, is_held in with_torque(self.cycle.bus, waiting).items() if waiting else ():
+            self.start_by(name, "hold" if is_held else self.config.on_start)
+
+    def start_by(self, name: str, how: Literal["relax", "hold", "wait"]) -> None:
+        """Set what a joint does at its first measurement."""
+        drive = self.cycle.drives[name]
+        drive.policy = replace(drive.policy, on_start=how)
 
     def wake(self) -> None:
         """Run one cycle, and prepare the next, on a grid."""
@@ -172,10 +183,12 @@ class ServoBusDriver(Component[ServoBusConfig]):
                 return
             self.cycle.bus.reopen()
             for drive in self.cycle.drives.values():  # their servos have no torque now, and may be elsewhere
+                self.start_by(drive.joint.name, "relax")
                 drive.relax()
             self.prepare()
             self.info("the bus of servos is back")
             self.lost_at = -math.inf
+        self.keep_torque()
         self.periods.begin(self.now)
         self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.leading)
         self.reboots.step(self.now)

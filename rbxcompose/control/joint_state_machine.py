@@ -128,7 +128,7 @@ class _Cycle:
     def _start(self, how: str) -> None:
         if how == "hold":
             self._hold()
-        else:
+        elif how == "relax":
             self.actions.append(TorqueOff())
             self._become(JointMode.RELAXED)
 

@@ -54,8 +54,8 @@ class JointPolicy:
     """A measurement older than this many cycles is stale: the joint holds and refuses commands."""
     fault_after: float = 0.5
     """A measurement older than this [s] is a fault."""
-    on_start: Literal["relax", "hold"] = "relax"
-    """What to do at the first measurement; nobody knows then whether the servo has torque."""
+    on_start: Literal["relax", "hold", "wait"] = "relax"
+    """What to do at the first measurement; nobody knows then whether the servo has torque. `wait` leaves that as is."""
     thermal: ThermalPolicy = ThermalPolicy()
 
     def __post_init__(self) -> None:

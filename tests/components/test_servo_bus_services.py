@@ -66,6 +66,18 @@ def test_all_joints_are_relaxed_and_disabled_at_once(head: Head) -> None:
     assert head.at["pan"] == pytest.approx(0.3, abs=TICK)
 
 
+def test_a_joint_that_holds_goes_on_holding_although_its_servo_tells_late_that_it_does() -> None:
+    mute = {"late": {"at": 0.0, "fault": "mute", "joint": "pan", "lasts": 0.4}}
+    head = Head(on_shutdown="hold", faults=mute)
+    driver: Any = head.robot.component("servos")
+    servo = driver.cycle.bus.line[1]
+    driver.start_by("pan", "wait")  # it did not tell at the start
+    servo.set("torque_enable", 1)  # by an earlier driver
+    head.robot.advance(0.6)
+    assert [str(one.mode) for one in driver.cycle.drives.values()] == ["holding", "relaxed"]
+    assert servo.get("torque_enable") == 1
+
+
 def test_a_command_beyond_the_limits_is_clamped_and_said(head: Head) -> None:
     told = head.robot.statuses("servos")
     head.commands["pan"](Float64(data=9.0))
