@@ -116,6 +116,8 @@ class ServoBusConfig(Config):
     """Bits per second."""
     rate: float = 100.0
     """Cycles per second."""
+    fast: bool = False
+    """Whether servos may answer together in one packet."""
     watchdog: float = 0.2
     """Silence of the bus after which servos stop by themselves, if they can [s]; 0 is never."""
     return_delay: float | None = None

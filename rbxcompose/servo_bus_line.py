@@ -52,6 +52,6 @@ def open_bus(
             return OpenedBus(twin, faults, note)
         path = str(twin.path)
     known = {servo.id: servo.model for joint in joints for servo in joint.servos}
-    bus = bus_type(config.kind).open(path, known | config.lone, baud=config.baud, clock=now)
+    bus = bus_type(config.kind).open(path, known | config.lone, baud=config.baud, clock=now, is_fast=config.fast)
     at_end.callback(bus.close)
     return OpenedBus(bus, faults)

@@ -18,9 +18,9 @@ class OpensBus(Protocol):
     """Opens a bus at the path of a port, for servos by id."""
 
     def __call__(
-        self, path: str, servos: Mapping[int, ServoModel], *, baud: int, clock: Callable[[], float]
+        self, path: str, servos: Mapping[int, ServoModel], *, baud: int, clock: Callable[[], float], is_fast: bool
     ) -> ServoBus:
-        """Return the bus. PortError if there is no such port."""
+        """Return the bus; `is_fast` if it may use what old firmware lacks. PortError if there is no such port."""
         ...
 
 

@@ -10,8 +10,10 @@ from rbxcompose.actuation.servo_models import ServoModel, servo_models
 
 
 @bus_type_declared(DYNAMIXEL, servo_models, package="dynamixel_sdk", extra="servos")
-def open_dynamixel(path: str, servos: Mapping[int, ServoModel], *, baud: int, clock: Callable[[], float]) -> ServoBus:
+def open_dynamixel(
+    path: str, servos: Mapping[int, ServoModel], *, baud: int, clock: Callable[[], float], is_fast: bool
+) -> ServoBus:
     """Open the port."""
     from rbxcompose.actuation.dynamixel_bus import DynamixelBus  # its SDK is an extra
 
-    return DynamixelBus(path, servos, baud=baud, clock=clock)
+    return DynamixelBus(path, servos, baud=baud, clock=clock, is_fast=is_fast)

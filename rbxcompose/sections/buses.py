@@ -51,6 +51,8 @@ class BusOfServosModel(Config):
     """Bits per second."""
     rate: Frequency = Field(100.0, gt=0, le=1000)
     """How often all joints are read and written."""
+    fast: bool = False
+    """Whether servos of protocol 2.0 answer together in one packet (fast sync read), which old firmware cannot."""
     watchdog: Time = Field(0.2, ge=0)
     """Silence after which servos stop by themselves, if their model can; 0 is never."""
     return_delay: Time | None = Field(None, ge=0, le=254 * 2e-6)
@@ -89,6 +91,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             "port": port_name(contents, bus.port),
             "baud": round(bus.baud),
             "rate": bus.rate,
+            "fast": bus.fast,
             "watchdog": bus.watchdog,
             "return_delay": bus.return_delay,
             "twin": bus.sim if contents.is_simulated else "",

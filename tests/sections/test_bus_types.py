@@ -19,7 +19,7 @@ from tests.sections.test_servo_sections import BODY, HEAD, SERVOS
 
 TOYS = {"TOY-1": replace(servo_models()["XL430-W250"], name="TOY-1", number=9999)}
 CHANGES = {
-    "type: dynamixel": "type: toy_bus, port: /dev/toys",
+    "type: dynamixel": "type: toy_bus, port: /dev/toys, fast: true",
     "XL430-W250": "TOY-1",
     "AX-12": "toy 1",
     "neutral: 500": "neutral: 2000",
@@ -33,7 +33,10 @@ def opened() -> Iterator[list[str]]:
     paths: list[str] = []
 
     @bus_types.bus_type_declared("toy_bus", lambda: TOYS)
-    def open_toys(path: str, servos: Mapping[int, ServoModel], *, baud: int, clock: Callable[[], float]) -> ServoBus:
+    def open_toys(
+        path: str, servos: Mapping[int, ServoModel], *, baud: int, clock: Callable[[], float], is_fast: bool
+    ) -> ServoBus:
+        assert is_fast
         paths.append(path)
         return TwinBus([FakeServo(model, id_) for id_, model in servos.items()], clock)
 
