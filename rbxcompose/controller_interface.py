@@ -48,7 +48,7 @@ class ControllerConfig(Config):
     _sliding: frozenset[str] = PrivateAttr(default=frozenset())
 
     @property
-    def led(self) -> tuple[str, ...]:
+    def claimed(self) -> tuple[str, ...]:
         """Return the joints that it leads."""
         raise NotImplementedError
 
@@ -60,7 +60,7 @@ class ControllerConfig(Config):
     @property
     def dimensions(self) -> dict[str, Dimension]:
         """Return what the positions of its joints measure: angles, or lengths of those that slide."""
-        return {joint: LENGTH if joint in self._sliding else ANGLE for joint in self.led}
+        return {joint: LENGTH if joint in self._sliding else ANGLE for joint in self.claimed}
 
     def with_sliding(self, joints: Iterable[str]) -> Self:
         """Return it for a robot of whose joints these slide."""
@@ -73,7 +73,7 @@ C = TypeVar("C", bound=ControllerConfig)
 T = TypeVar("T", bound="type[Controller[Any]]")
 
 
-class LedJoint(Protocol):
+class ControlledJoint(Protocol):
     """A joint as a controller sees it; positions are [rad], or [m] if it slides."""
 
     rules: JointRules
@@ -132,7 +132,7 @@ class ControllerSite(Protocol):
         """Return the time for message headers [ns]."""
 
     @property
-    def joints(self) -> Mapping[str, LedJoint]:
+    def joints(self) -> Mapping[str, ControlledJoint]:
         """Return its joints by name."""
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Protocol
 
-from rbxcompose.controller_interface import Controller, ControllerConfig, ItemOfServo, LedJoint
+from rbxcompose.controller_interface import ControlledJoint, Controller, ControllerConfig, ItemOfServo
 from rbxcompose.sdk.bound import ActionServer, ServedGoal
 
 
@@ -25,14 +25,14 @@ class ControllerManager:
     @property
     def leading(self) -> list[Controller[ControllerConfig]]:
         """Return the active controllers, and those that still bring joints to rest that nobody else leads."""
-        taken = {joint for one in self.active for joint in one.config.led}
+        taken = {joint for one in self.active for joint in one.config.claimed}
         self._leaving = {
             name for name in self._leaving if self.controllers[name].leads and not taken & {*self._led(name)}
         }
         return [one for name, one in self.controllers.items() if name in self._active | self._leaving]
 
     def _led(self, name: str) -> tuple[str, ...]:
-        return self.controllers[name].config.led
+        return self.controllers[name].config.claimed
 
     def is_active(self, name: str) -> bool:
         """Return whether a controller leads its joints."""
@@ -40,12 +40,12 @@ class ControllerManager:
 
     def leader(self, joint: str) -> str:
         """Return the active controller that moves a joint now, or nothing."""
-        return next((one.name for one in self.leading if joint in one.config.led and one.leads), "")
+        return next((one.name for one in self.leading if joint in one.config.claimed and one.leads), "")
 
     def let_go(self, joint: str, now: float, reason: str) -> None:
         """Have a joint left alone, which has lost its torque."""
         for one in self.active:
-            if joint in one.config.led:
+            if joint in one.config.claimed:
                 one.let_go(joint, now, reason)
 
     def objection(self, on: Iterable[str], off: Iterable[str]) -> str:
@@ -58,7 +58,7 @@ class ControllerManager:
         wanted = (self._active - set(off)) | set(on)
         owners: dict[str, str] = {}
         for name in self.controllers:
-            for joint in self.controllers[name].config.led if name in wanted else ():
+            for joint in self.controllers[name].config.claimed if name in wanted else ():
                 if (other := owners.setdefault(joint, name)) != name:
                     return f"controllers '{other}' and '{name}' both lead joint '{joint}': switch one of them off"
         return ""
@@ -107,7 +107,7 @@ class ControllerHost(Protocol):
 class ControllerSeat:
     """What a controller uses of its bus: see `ControllerSite`."""
 
-    def __init__(self, bus: ControllerHost, name: str, joints: Mapping[str, LedJoint]) -> None:
+    def __init__(self, bus: ControllerHost, name: str, joints: Mapping[str, ControlledJoint]) -> None:
         self._bus, self._name = bus, name
         self.joints = joints
 

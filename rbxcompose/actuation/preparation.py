@@ -47,9 +47,11 @@ def with_torque(bus: ServoBus, joints: Iterable[ServoJoint]) -> dict[str, bool]:
 
 
 def arm(bus: ServoBus, servo: JointServo, watchdog: float) -> None:
-    """Let a servo stop after a silence of the bus [s], if its model can; one that has done so goes on."""
-    if (item := servo.model.items.get(WATCHDOG)) is not None and watchdog > 0:
-        bus.write({servo.id: {WATCHDOG: 0}}, is_confirmed=True)
+    """Let a servo stop after a silence of the bus [s], 0 is never, if its model can; one that has done so goes on."""
+    if (item := servo.model.items.get(WATCHDOG)) is None:
+        return
+    bus.write({servo.id: {WATCHDOG: 0}}, is_confirmed=True)
+    if watchdog > 0:
         raw = max(1, min(item.most, item.to_raw(watchdog)))
         bus.write({servo.id: {WATCHDOG: raw}}, is_confirmed=True)
 

@@ -52,7 +52,9 @@ class ServoCycle:
     """The torque limits of the servos."""
     notes: list[str] = field(default_factory=list)
     """What has happened to servos, for people; whoever tells it clears it."""
+    _count: int = 0  # of cycles
     _turn: int = 0  # whose slow items are read next
+    _keep: int = 0  # whose torque limit is read next
 
     @property
     def ids(self) -> list[int]:
@@ -108,11 +110,13 @@ class ServoCycle:
             return
         for id_, reading in self.bus.read(list(drives), FAST).items():
             drives[id_].take(id_, reading)
-        self._turn += 1
-        if self._turn % SELDOM == 0:
-            self._keep_torque(list(drives)[self._turn // SELDOM % len(drives)], drives)
+        ids, self._count = list(drives), self._count + 1
+        if self._count % SELDOM == 0:  # turns of their own: no number of servos keeps one of them from its turn
+            self._keep_torque(ids[self._keep % len(ids)], drives)
+            self._keep += 1
             return
-        id_ = list(drives)[self._turn % len(drives)]
+        id_ = ids[self._turn % len(ids)]
+        self._turn += 1
         items = slow_items(drives[id_].joint.servo(id_).model)
         if (slow := self.bus.read([id_], items).get(id_)) is not None:
             drives[id_].take(id_, slow)
@@ -131,7 +135,7 @@ class ServoCycle:
         """Arm a watchdog that has stopped a servo, or that it has forgotten without its supply."""
         if has_fired(values):
             drive.was_cut()
-        if has_fired(values) or is_unarmed(values):
+        if has_fired(values) or (is_unarmed(values) and self.watchdog > 0):
             arm(self.bus, servo, self.watchdog)
 
     def _mimic(self) -> None:

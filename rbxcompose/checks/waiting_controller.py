@@ -24,9 +24,9 @@ def waiting_controller(robot: Robot) -> Iterator[Finding]:
     Good: `wheels: {type: diff_drive, ...}`
     """
     known = robot.manifest.contents.of(controllers)
-    led = {joint for one in known.values() if one.start == "active" for joint in one.led}
+    led = {joint for one in known.values() if one.start == "active" for joint in one.claimed}
     for name, one in known.items():
-        if one.start == "active" or led & {*one.led}:
+        if one.start == "active" or led & {*one.claimed}:
             continue
         if who := next((sender for end in _ends(robot, name) for sender in _senders(robot, end)), None):
             yield waiting_controller.at(

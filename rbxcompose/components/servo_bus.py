@@ -118,7 +118,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.cycle = ServoCycle(opened.bus, drives, mimics, config.watchdog, config.thermal.scope == "bus")
         self.reboots = Reboots(opened.bus, self.prepare)
         seats = {
-            name: ControllerSeat(self, name, {joint: drives[joint] for joint in one.config.led})
+            name: ControllerSeat(self, name, {joint: drives[joint] for joint in one.config.claimed})
             for name, one in config.controllers.items()
         }
         self.controllers = ControllerManager(
@@ -212,7 +212,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
     def listed(self, request: ListControllers) -> tuple[ControllerState, ...]:
         """Return all controllers."""
         return tuple(
-            ControllerState(name, one.type_name, self.controllers.is_active(name), one.config.led, one.note)
+            ControllerState(name, one.type_name, self.controllers.is_active(name), one.config.claimed, one.note)
             for name, one in self.controllers.controllers.items()
         )
 

@@ -13,7 +13,7 @@ from pydantic import Field
 from rbxcompose.config import AngularJerk, Config, Jerk, JointName, LinkName
 from rbxcompose.control.diff_drive import ABSURD, BaseLimits, WheelDrive, WheelGeometry
 from rbxcompose.control.odometry import OdometryPolicy, WheelOdometry
-from rbxcompose.controller_interface import Controller, ControllerConfig, LedJoint, controller
+from rbxcompose.controller_interface import ControlledJoint, Controller, ControllerConfig, controller
 from rbxcompose.geometry import Transform3, Velocity2
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.msgs import geometry_msgs as geometry
@@ -95,7 +95,7 @@ class DiffDriveConfig(ControllerConfig):
     """What is told of its way."""
 
     @property
-    def led(self) -> tuple[str, ...]:
+    def claimed(self) -> tuple[str, ...]:
         """Return the joints that it leads."""
         return self.left, self.right
 
@@ -168,7 +168,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
     def prepare(self) -> None:
         """Set up limits and odometry."""
         config, joints = self.config, self.site.joints
-        self.wheels: tuple[LedJoint, LedJoint] = (joints[config.left], joints[config.right])
+        self.wheels: tuple[ControlledJoint, ControlledJoint] = (joints[config.left], joints[config.right])
         tick = self.wheels[0].per_tick
         radius = config.wheel_radius or 1.0 / ((config.ticks_per_metre or math.nan) * tick)
         rolling = WheelGeometry.of_radius(radius, config.wheel_distance)

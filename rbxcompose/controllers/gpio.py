@@ -33,7 +33,7 @@ class GpioConfig(ControllerConfig):
     """What an input port does without a signal, or that it measures a voltage; without it, the port is as it was."""
 
     @property
-    def led(self) -> tuple[str, ...]:
+    def claimed(self) -> tuple[str, ...]:
         """Return nothing: it leads no joint."""
         return ()
 

@@ -111,7 +111,7 @@ class GripperConfig(ControllerConfig):
     """Largest speed of the opening; without it, as fast as the joints may."""
 
     @property
-    def led(self) -> tuple[str, ...]:
+    def claimed(self) -> tuple[str, ...]:
         """Return the joints that it leads."""
         return tuple(name for name in (self.joint, self.left, self.right) if name is not None)
 
@@ -178,14 +178,14 @@ class GripperController(Controller[GripperConfig]):
         """Return the range of angles of each joint."""
         model = model_of(config)
         ends = zip(*(model.angles(opening) for opening in model.openings), strict=True)
-        return {name: (min(pair), max(pair)) for name, pair in zip(config.led, ends, strict=True)}
+        return {name: (min(pair), max(pair)) for name, pair in zip(config.claimed, ends, strict=True)}
 
     def prepare(self) -> None:
         """Set up the model."""
         config = self.config
         self.model = model_of(config)
         self.policy = GripPolicy(config.tolerance, config.stall.progress, config.stall.window, config.on_stall)
-        self.joints = [self.site.joints[name] for name in config.led]
+        self.joints = [self.site.joints[name] for name in config.claimed]
         self.goal: ServedGoal[Any, Any, Any] | None = None  # that of the attempt
         self.port, self.wanted, self.at = GRIP, 0.0, 0.0  # the last two are openings [m]
         self.attempt = GripAttempt(self.model, self.model.openings[0], self.policy)

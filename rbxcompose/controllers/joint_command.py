@@ -29,7 +29,7 @@ class JointCommandConfig(ControllerConfig):
     """Without a new command for this long, the joints come to rest before they have arrived; 0 is never."""
 
     @property
-    def led(self) -> tuple[str, ...]:
+    def claimed(self) -> tuple[str, ...]:
         """Return the joints that it leads."""
         return tuple(self.joints)
 

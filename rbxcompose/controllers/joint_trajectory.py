@@ -58,7 +58,7 @@ class JointTrajectoryConfig(ControllerConfig):
     """When a trajectory has failed."""
 
     @property
-    def led(self) -> tuple[str, ...]:
+    def claimed(self) -> tuple[str, ...]:
         """Return the joints that it leads."""
         return tuple(self.joints)
 

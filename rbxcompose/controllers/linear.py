@@ -35,7 +35,7 @@ class LinearConfig(ControllerConfig):
     """Without progress for this long, it gives up."""
 
     @property
-    def led(self) -> tuple[str, ...]:
+    def claimed(self) -> tuple[str, ...]:
         """Return the joint that it leads."""
         return (self.joint,)
 

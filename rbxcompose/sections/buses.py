@@ -28,6 +28,7 @@ from rbxcompose.sections.faults import buses_of_joints, faults_of
 from rbxcompose.sections.joints import JointModel, effort_of, held_limits, joints, table_of
 from rbxcompose.sections.safety import safety
 
+WATCHED = 4  # cycles that may be late before servos stop by themselves
 BusTypeName = Annotated[str, WithJsonSchema({"type": "string", "enum": bus_type_names()})]
 
 
@@ -54,7 +55,7 @@ class BusOfServosModel(Config):
     fast: bool = False
     """Whether servos of protocol 2.0 answer together in one packet (fast sync read), which old firmware cannot."""
     watchdog: Time = Field(0.2, ge=0)
-    """Silence after which servos stop by themselves, if their model can; 0 is never."""
+    """Silence after which servos stop by themselves, if their model can, and four cycles at least; 0 is never."""
     return_delay: Time | None = Field(None, ge=0, le=254 * 2e-6)
     """Pause of servos before each reply, which is written into them; without it theirs stays: 500 us as they are sold.
     """
@@ -92,7 +93,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             "baud": round(bus.baud),
             "rate": bus.rate,
             "fast": bus.fast,
-            "watchdog": bus.watchdog,
+            "watchdog": max(bus.watchdog, WATCHED / bus.rate) if bus.watchdog else 0.0,
             "return_delay": bus.return_delay,
             "twin": bus.sim if contents.is_simulated else "",
             "noise": bus.twin.noise,
@@ -112,7 +113,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
                 key: {
                     "type": one.type,
                     "settings": as_written(one),
-                    "sliding": [joint for joint in one.led if joint in known.joints and known.joints[joint].slides],
+                    "sliding": [joint for joint in one.claimed if joint in known.joints and known.joints[joint].slides],
                 }
                 for key, one in led.items()
             },
@@ -140,7 +141,7 @@ def _is_led(
 ) -> bool:
     """Return whether all that a controller leads and uses is on a bus."""
     places = [item.actuator in servos and servos[item.actuator].bus == bus for item in one.used]
-    return set(one.led) <= joints.keys() and all(places) and bool(one.led or places)
+    return set(one.claimed) <= joints.keys() and all(places) and bool(one.claimed or places)
 
 
 def _servo(one: ActuatorModel) -> dict[str, object]:

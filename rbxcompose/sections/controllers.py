@@ -24,7 +24,8 @@ NOT_DRIVEN = kind(
     "RBX2215",
     """A controller leads a joint that it cannot drive
 
-Each joint of a controller has a servo of the right mode, and the servos of one controller are on one bus.
+Each joint of a controller has a servo of the right mode, and the servos of one controller are on one bus. A joint that
+mimics another one in the URDF follows that one, and nothing else.
 
 Bad: a controller with the joint `tilt_joint`, which `joints:` does not have.
 Good: `tilt_joint: {actuator: tilt_servo}` under `joints:`.
@@ -120,7 +121,7 @@ def _models(node: TreeNode) -> Iterator[type[Config]]:
 
 
 def _details(read: Mapping[str, ControllerConfig]) -> dict[str, str]:
-    return {name: f"{one.type} of {', '.join(one.led)}" for name, one in read.items()}
+    return {name: f"{one.type} of {', '.join(one.claimed)}" for name, one in read.items()}
 
 
 @section(
@@ -189,6 +190,7 @@ def _mistakes(
     root = reading.contents.root
     here, cls = key_span(root, ("controllers", name)), controller_type(one.type)
     yield from _undriven(reading, name, one)
+    yield from _following(reading, name, one)
     yield from _unfit(reading, name, one)
     yield from _blind(reading, name, one)
     if name in reading.contents.of(joints):
@@ -199,7 +201,7 @@ def _mistakes(
     else:
         yield from _beyond(reading, name, one)
         yield from _unknown_items(reading, name, one)
-    for joint in one.led if one.start == "active" else ():
+    for joint in one.claimed if one.start == "active" else ():
         other, span = owners.setdefault(joint, (name, here))
         if other != name:
             message = f"controllers '{other}' and '{name}' both lead '{joint}' from the start"
@@ -212,7 +214,7 @@ def _undriven(reading: Reading[ControllerConfig], name: str, one: ControllerConf
     if not driven and "joints" in reading.contents.root:
         return  # they have mistakes, which are told
     wanted, buses = controller_type(one.type).interface, set[str]()
-    for joint in one.led:
+    for joint in one.claimed:
         span = _place(reading, name, joint)
         if joint not in driven:
             if joint in _written(reading):
@@ -232,11 +234,22 @@ def _undriven(reading: Reading[ControllerConfig], name: str, one: ControllerConf
             )
 
 
+def _following(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
+    """Yield a finding for each joint that already follows another one."""
+    description = reading.contents.of(body)
+    known = description.body.joints if description else {}
+    for joint in one.claimed:
+        if joint in known and (mimic := known[joint].mimic) is not None:
+            message = f"'{joint}' mimics '{mimic.joint}' in the body, so the controller '{name}' cannot lead it"
+            related = [Related(known[joint].span, "the joint")]
+            yield NOT_DRIVEN.at(_place(reading, name, joint), message, help=f"lead '{mimic.joint}'", related=related)
+
+
 def _unfit(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
     """Yield a finding for each joint whose kind the controller cannot lead."""
     description, wanted = reading.contents.of(body), controller_type(one.type).kinds
     known = description.body.joints if description else {}
-    for joint in one.led if wanted else ():
+    for joint in one.claimed if wanted else ():
         if joint in known and known[joint].kind not in wanted:
             kinds = " or ".join(sorted(wanted))
             message = f"'{joint}' is {known[joint].kind} in the body, and '{name}' leads joints that are {kinds}"
@@ -249,7 +262,7 @@ def _blind(reading: Reading[ControllerConfig], name: str, one: ControllerConfig)
     driven, servos = reading.contents.of(joints), reading.contents.of(actuators)
     if controller_type(one.type).interface != "velocity":
         return
-    for servo in (each for joint in one.led if joint in driven for each in driven[joint].servos if each in servos):
+    for servo in (each for joint in one.claimed if joint in driven for each in driven[joint].servos if each in servos):
         model = model_of(reading.contents, servos[servo])
         if model is not None and model.family.span < math.tau - model.per_tick:
             degrees = round(math.degrees(model.family.span))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
 from typing import Annotated, Any
 
 from pydantic import PlainValidator, WithJsonSchema
@@ -44,7 +45,8 @@ NOT_TOGETHER = kind(
     """Servos and their joint do not fit together
 
 A joint that slides needs to know how far it goes for each turn of its servo: `travel`, or a `calibration`. Servos that
-drive one joint together are on one bus and have one mode, and no servo drives two joints.
+drive one joint together are on one bus and have one mode, and no servo drives two joints. A joint that mimics another
+one in the URDF follows it by positions, on the same bus.
 
 Bad: `lift_joint: {actuator: lift_servo}`, where `lift_joint` slides.
 Good: `lift_joint: {actuator: lift_servo, travel: 8 mm}`
@@ -162,8 +164,9 @@ def joints(reading: Reading[dict[str, JointModel]]) -> dict[str, JointModel]:
     wrong: dict[str, Finding] = {}
     users: dict[str, str] = {}
     for name, one in found.items():
-        finding = next(_mistakes(reading, name, one, there.get(name), users), None)
-        if finding is not None:
+        own = there.get(name)
+        mistakes = chain(_mistakes(reading, name, one, own, users), _follows(reading, found, name, own))
+        if (finding := next(mistakes, None)) is not None:
             wrong[name] = finding
     reading.report.extend(wrong.values())
     return {name: one for name, one in found.items() if name not in wrong}
@@ -207,6 +210,24 @@ def _of_body(root: MappingNode, name: str, one: JointModel, joint: BodyJoint) ->
             words = "slides" if slides else "turns"
             span = value_span(root, ("joints", name, *path))
             yield WRONG_TYPE.at(span, f"joint '{name}' {words}, and this is {written.dimension.phrase}")
+
+
+def _follows(
+    reading: Reading[dict[str, JointModel]], found: Mapping[str, JointModel], name: str, joint: BodyJoint | None
+) -> Iterator[Finding]:
+    """Yield why a joint cannot follow the one that it mimics in the body."""
+    if joint is None or joint.mimic is None:
+        return
+    leader, known = joint.mimic.joint, reading.contents.of(actuators)
+    at = key_span(reading.contents.root, ("joints", name))
+    if leader not in found:
+        yield NOT_TOGETHER.at(at, f"joint '{name}' mimics '{leader}' in the body, which no servo drives")
+        return
+    servos = [known[servo] for one in (name, leader) for servo in found[one].servos if servo in known]
+    if len({servo.bus for servo in servos}) > 1:
+        yield NOT_TOGETHER.at(at, f"joint '{name}' mimics '{leader}' in the body, whose servo is on another bus")
+    if any(servo.mode == "velocity" for servo in servos):
+        yield NOT_TOGETHER.at(at, f"joint '{name}' mimics '{leader}' in the body, but servos with velocities do not")
 
 
 _TURNING = (ANGLE, ANGULAR_SPEED, ANGULAR_ACCELERATION, TORQUE)

@@ -52,7 +52,7 @@ def test_no_joint_is_led_by_two_whatever_is_switched(wanted: list[tuple[list[str
             assert [one.name for one in manager.active] == before
             continue
         list(manager.switch(on, off, 0.0))
-        led = [joint for one in manager.active for joint in one.config.led]
+        led = [joint for one in manager.active for joint in one.config.claimed]
         assert len(led) == len(set(led))
         assert set(on) <= {one.name for one in manager.active}
         assert not set(off) & {one.name for one in manager.active}

@@ -48,7 +48,7 @@ def driver(name: str, profile: str = "") -> Any:
 def test_one_bus_has_all_joints_of_all_parts(name: str, profile: str, ids: dict[str, int]) -> None:
     config = driver(name, profile).config
     assert {joint: one.servos[0].id for joint, one in config.joints.items()} == ids
-    led = [joint for one in config.controllers.values() for joint in one.config.led]
+    led = [joint for one in config.controllers.values() for joint in one.config.claimed]
     assert sorted(led) == sorted(ids)
 
 

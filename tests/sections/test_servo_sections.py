@@ -77,8 +77,22 @@ WRONG = {
 }
 
 
-def check(folder: Path, text: str) -> Checked:
-    return check_text(HEAD + text, folder, others={"head.urdf": BODY})
+MIMIC = BODY.replace('<parent link="neck"/>', '<mimic joint="pan_joint"/><parent link="neck"/>')
+FOLLOWING = SERVOS.replace(", tilt_joint]", "]")
+WRONG_MIMICS = {
+    "a controller of a joint that mimics another one": SERVOS,
+    "a joint that mimics one that no servo drives": "\n".join(
+        line for line in FOLLOWING.splitlines()[:-2] if "pan" not in line and "limits" not in line
+    ),
+    "a joint that mimics one of another bus": FOLLOWING.replace(
+        "  servos: {", "  more: {type: dynamixel}\n  servos: {"
+    ).replace("{bus: servos, model: XL", "{bus: more, model: XL"),
+    "a joint that mimics another one with velocities": FOLLOWING.replace("invert: true", "mode: velocity"),
+}
+
+
+def check(folder: Path, text: str, body: str = BODY) -> Checked:
+    return check_text(HEAD + text, folder, others={"head.urdf": body})
 
 
 def driver_of(checked: Checked) -> Any:
@@ -173,7 +187,7 @@ def test_two_instances_of_a_part_bring_their_joints_to_one_bus(tmp_path: Path) -
         "left_pan_joint": 1,
         "right_pan_joint": 2,
     }
-    assert {name: one.config.led for name, one in config.controllers.items()} == {
+    assert {name: one.config.claimed for name, one in config.controllers.items()} == {
         "left_look": ("left_pan_joint",),
         "right_look": ("right_pan_joint",),
     }
@@ -182,6 +196,7 @@ def test_two_instances_of_a_part_bring_their_joints_to_one_bus(tmp_path: Path) -
 def test_each_mistake_is_told_at_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, golden: Golden) -> None:
     monkeypatch.chdir(tmp_path)
     told = {name: check(tmp_path, text).text for name, text in WRONG.items()}
+    told |= {name: check(tmp_path, text, MIMIC).text for name, text in WRONG_MIMICS.items()}
     golden.check("servo_sections.txt", "\n".join(f"--- {name}\n{text}" for name, text in told.items()))
 
 
