@@ -30,6 +30,7 @@ from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
 from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
+from rbxcompose.runtime.process_group.turns import Turns
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.testing.bench import instance
 
@@ -44,24 +45,29 @@ DOUBLE = 3  # the type of a parameter
 
 
 class Ours:
-    """A process as the runtime has it: one thread that turns the scheduler, woken by what arrives."""
+    """A process as the runtime has it: one thread that turns the scheduler, and lends turns while it rests."""
 
     def __init__(self, port: int) -> None:
-        self.clock, self.scheduler, self._inbox = MonotonicClock(), Scheduler(), CallbackInbox()
+        self.clock, self.scheduler, self.inbox = MonotonicClock(), Scheduler(), CallbackInbox()
+        self.turns = Turns(self.scheduler, self.clock, self.inbox)
         self.bus = Bus(
             self.scheduler,
             self.clock,
-            transport=ZenohTransport(open_peer(f"tcp/127.0.0.1:{port}"), self._inbox.put),
+            transport=ZenohTransport(open_peer(f"tcp/127.0.0.1:{port}"), self.inbox.put, self.turns),
             log=lambda owner, text: None,
         )
         self._selector = selectors.SelectSelector()
-        self._selector.register(self._inbox, selectors.EVENT_READ)
+        self._selector.register(self.inbox, selectors.EVENT_READ)
+        self.turns.open()
 
     def turn(self, *also: Any) -> bool:
         """Wait for something and do it; return whether one of the files `also` can be read."""
         due = self.scheduler.next_due()
-        ready = self._selector.select(QUIET if due is None else max(0.0, min(QUIET, due - self.clock.now())))
-        self._inbox.drain(self.scheduler)
+        longest = QUIET if due is None else max(0.0, min(QUIET, due - self.clock.now()))
+        self.turns.rest(self.clock.now() + longest)
+        ready = self._selector.select(longest)
+        self.turns.resume()
+        self.inbox.drain(self.scheduler)
         self.scheduler.advance(self.clock.now())
         return any(key.fileobj is sys.stdin for key, _ in ready)
 
@@ -104,7 +110,7 @@ class OurAsker(Ours):
         self._back: list[float] = []
         self._handled: list[float] = []
         self._ping = self.bus.publisher("asker", "ping", Twist, Qos.COMMAND)
-        self.bus.subscribe("asker", "pong", Twist, Qos.COMMAND, lambda one: self._back.append(time.perf_counter()))
+        self.bus.subscribe("asker", "pong", Twist, Qos.COMMAND, lambda one: self._note_back())
         self._flood = self.bus.subscribe(
             "asker", "flood", Twist, Qos.EVENT, lambda one: self._handled.append(time.perf_counter())
         )
@@ -140,7 +146,11 @@ class OurAsker(Ours):
     def _note(self, reply: Any) -> None:
         if reply.response is None:
             raise ValueError(reply.error)
+        self._note_back()
+
+    def _note_back(self) -> None:
         self._back.append(time.perf_counter())
+        self.inbox.wake()  # this thread waits for it, which no component would
 
     def _timed(self, send: Callable[[], object], pause: float) -> float:
         self._back.clear()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
 from itertools import count
 
@@ -24,6 +24,7 @@ class ScheduledCallback:
     """A callback that is due; `cancel` discards it."""
 
     callback: Callback | None
+    is_light: bool = False
 
     def cancel(self) -> None:
         """Drop the callback; the event then does nothing."""
@@ -59,6 +60,12 @@ class Scheduler:
         """Run `callback` for `owner` at the present instant, after the callback that is running now."""
         return self.at(self.now, owner, callback)
 
+    def post_light(self, owner: str, callback: Callback) -> ScheduledCallback:
+        """Post a callback that any thread may run which has been lent the scheduler's turn."""
+        event = self.post(owner, callback)
+        event.is_light = True
+        return event
+
     def every(self, period: float, owner: str, callback: Callable[[float], None]) -> Periodic:
         """Run `callback(dt)` every `period` [s] on a grid that starts now."""
         return Periodic(self, period, owner, callback)
@@ -75,13 +82,28 @@ class Scheduler:
             heapq.heappop(self._events)
         return self._events[0][0] if self._events else None
 
+    def begin(self, t: float) -> None:
+        """Set the time to `t` [s] without running anything."""
+        self.now = max(self.now, t)
+
+    def take_light(self, without: Container[str]) -> tuple[str, Callback] | None:
+        """Take out the next event and return its owner and callback, if it is due, light, and not of these owners."""
+        due = self.next_due()
+        if due is None or due > self.now:
+            return None
+        _, owner, _, event = self._events[0]
+        if event.callback is None or not event.is_light or owner in without:
+            return None
+        heapq.heappop(self._events)
+        return owner, event.callback
+
     def advance(self, t: float) -> None:
         """Run everything that is due until `t` [s], including events added meanwhile.
 
         Raises:
             RuntimeError: if the events at one instant do not end.
         """
-        self.now = max(self.now, t)
+        self.begin(t)
         for _ in range(MOST_AT_ONCE):
             due = self.next_due()
             if due is None or due > self.now:

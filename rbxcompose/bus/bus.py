@@ -83,14 +83,16 @@ class Bus:
         max_rate: float | None = None,
         waits: bool = False,
         is_patient: bool = False,
+        is_light: bool = True,
     ) -> Subscription[M]:
         """Call `handler` with each message of a topic; with `waits`, not before `open`.
 
         Takes at most `max_rate` [Hz] from each publisher of another process (all messages if infinite); None means the
-        limit of the QoS class. A patient subscription is for topics that are published often and read rarely.
+        limit of the QoS class. A patient subscription is for topics that are published often and read rarely. A light
+        handler may run in the thread that brings a message.
         """
         node = self._node(owner)
-        kinds = {"waits": waits, "is_patient": is_patient}
+        kinds = {"waits": waits, "is_patient": is_patient, "is_light": is_light}
         return _kept(node, Subscription(self._topics, node, topic, message, qos, handler, max_rate, **kinds))
 
     def serve(self, owner: str, name: str, service: type[Service[Q, R]], handler: Callable[[Q], R]) -> None:

@@ -62,6 +62,10 @@ class RenewableTransport:
         """Let the scheduler run `callback` for `owner`; any thread may call this."""
         self._first.wake(owner, callback)
 
+    def bring(self, owner: str, callback: Callable[[], None]) -> None:
+        """Do the same, at once and in the calling thread if the scheduler rests; any thread may call this."""
+        self._first.bring(owner, callback)
+
     def publisher(self, key: str, qos: Qos) -> RemotePublisher:
         """Declare a publisher; a latched one keeps its last message for late subscribers."""
         return self._keep(_Publisher(self._entries, key, qos))

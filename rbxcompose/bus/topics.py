@@ -32,6 +32,9 @@ class Delivery(NamedTuple, Generic[M]):
     source: Attachment
 
 
+_Received = tuple[float, Delivery[M] | Arrival, Attachment | None]  # when [s], what, and its origin if it is known
+
+
 @dataclass(frozen=True, slots=True)
 class Topics:
     """The publishers and subscriptions of one process."""
@@ -103,11 +106,12 @@ class Subscription(Generic[M]):
         waits: bool = False,
         listens: bool = True,
         is_patient: bool = False,
+        is_light: bool = True,
     ) -> None:
         """With `waits`, hold messages until the node is open; unless it `listens`, ignore other processes.
 
-        A patient subscription takes their messages when half of its queue is full, or at `catch_up`: the process is not
-        woken for each message.
+        A light handler may run in the thread that brings a message. A patient subscription takes messages of other
+        processes when half of its queue is full, or at `catch_up`: the process is not woken for each message.
         """
         endpoint = node.endpoint(EntityKind.SUBSCRIPTION, topic, message, ros_qos(qos))
         self.route, self.gid, self.owner = endpoint.route, endpoint.gid, node.owner
@@ -122,9 +126,11 @@ class Subscription(Generic[M]):
         self._arrived = -math.inf  # [s] of robot time
         self._patience = queue_depth(qos) // 2 if is_patient else 1  # messages that may wait for each other
         self._has_complained = False  # in the log; diagnostics continue to count
-        self._inbox: Inbox[tuple[float, Delivery[M] | Arrival]] = Inbox(
-            node.owner, queue_depth(qos), self._take, node.process.scheduler.post
-        )
+        process = node.process
+        is_lent = is_light and qos not in (Qos.LATCHED, Qos.BULK)
+        self._post = process.scheduler.post_light if is_lent else process.scheduler.post
+        self._bring = process.transport.bring if is_lent else process.transport.wake
+        self._inbox: Inbox[_Received[M]] = Inbox(node.owner, queue_depth(qos), self._take, self._post)
         if waits:
             self._inbox.hold()
             node.when_open(self._inbox.go_on)
@@ -175,7 +181,7 @@ class Subscription(Generic[M]):
 
     def deliver(self, delivery: Delivery[M]) -> None:
         """Queue a message from this process; it is handled at the same instant."""
-        self._inbox.put((self._process.clock.now(), delivery), self._process.scheduler.post)
+        self._inbox.put((self._process.clock.now(), delivery, None), self._post)
 
     def close(self) -> None:
         """Withdraw the subscription and drop its waiting messages."""
@@ -194,32 +200,32 @@ class Subscription(Generic[M]):
         # In a thread of the transport: age is measured from here, however busy the scheduler is.
         if not self.is_wanted():
             return
-        now = self._process.clock.now()
-        if self._allowances is None or self._is_allowed(self._allowances, arrival, now):
-            self._inbox.put((now, arrival), self._process.transport.wake, at=self._patience)
+        now, source = self._process.clock.now(), None
+        if self._allowances is None or (source := self._allowed(self._allowances, arrival, now)) is not None:
+            self._inbox.put((now, arrival, source), self._bring, at=self._patience)
 
-    def _is_allowed(self, allowances: Allowances, arrival: Arrival, now: float) -> bool:
+    def _allowed(self, allowances: Allowances, arrival: Arrival, now: float) -> Attachment | None:
         # Diagnostics report what is refused here: it displaces nothing and does not even wake the scheduler.
         try:
             source = decode_attachment(arrival.attachment)
         except AttachmentError:
             self.refusals.add(RefusalReason.ATTACHMENT)
-            return False
+            return None
         if not allowances.takes(source.gid, now):
             self.refusals.add(RefusalReason.TOO_MANY)
-            return False
-        return True
+            return None
+        return source
 
-    def _take(self, item: tuple[float, Delivery[M] | Arrival]) -> None:
-        arrived, content = item
-        delivery = content if isinstance(content, Delivery) else self._read(content)
+    def _take(self, item: _Received[M]) -> None:
+        arrived, content, source = item
+        delivery = content if isinstance(content, Delivery) else self._read(content, source)
         if delivery is not None:
             self._arrived, self.value, self.source = arrived, delivery.message, delivery.source
             self._handler(delivery.message)
 
-    def _read(self, arrival: Arrival) -> Delivery[M] | None:
+    def _read(self, arrival: Arrival, source: Attachment | None) -> Delivery[M] | None:
         try:
-            source = decode_attachment(arrival.attachment)
+            source = source or decode_attachment(arrival.attachment)
             if self._qos is Qos.LATCHED and self._topics.published_here(self, source):
                 return None  # the history of a latched topic brings our own messages back
             message = decode(self._message, arrival.payload)

@@ -1,6 +1,6 @@
 """The interface of a transport between processes, and the transport that reaches no other process.
 
-A transport calls its callbacks in its own threads: they may only put items into an inbox.
+A transport calls its callbacks in its own threads: they may only put items into an inbox, or bring them in.
 """
 
 from __future__ import annotations
@@ -71,12 +71,16 @@ class RemotePublisher(Closable, Protocol):
 
 
 class Transport(Protocol):
-    """Carries messages between processes. Everything but `wake` is called from the scheduler's thread only."""
+    """Carries messages between processes. All but `wake` and `bring` is called only by whoever runs the scheduler."""
 
     session: str  # identifies this process among all
 
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
         """Let the scheduler run `callback` for `owner`; any thread may call this."""
+        ...
+
+    def bring(self, owner: str, callback: Callable[[], None]) -> None:
+        """Do the same, at once and in the calling thread if the scheduler rests; any thread may call this."""
         ...
 
     def publisher(self, key: str, qos: Qos) -> RemotePublisher:
@@ -129,6 +133,8 @@ class NoTransport:
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
         """Refuse: without other processes nothing arrives."""
         raise RuntimeError(f"something arrived for '{owner}' from nowhere")
+
+    bring = wake
 
     def publisher(self, key: str, qos: Qos) -> NoTransport:
         """Declare a publisher without subscribers."""

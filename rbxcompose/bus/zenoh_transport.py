@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Protocol
 
 import zenoh
@@ -19,25 +20,53 @@ HEARTBEAT = 0.5  # [s] after a latched message until its sequence number is repe
 ZENOH_EXPIRED = "Timeout"  # Zenoh's answer in place of a server's
 GONE = "the server is gone"
 
+OnOwn = Callable[[Callable[[], None]], None]
+
+
+class LendsTurns(Protocol):
+    """Lets threads that bring messages run components while the scheduler's own thread rests."""
+
+    def bring(self, owner: str, callback: Callable[[], None], /) -> None:
+        """Run `callback` for `owner`, in the calling thread if it gets the turn."""
+        ...
+
+    def on_own(self, callback: Callable[[], None], /) -> None:
+        """Run `callback` at once or, within a lent turn, in the scheduler's own thread afterwards."""
+        ...
+
 
 class ZenohTransport:
-    """Everything that one process declares on its session."""
+    """Everything that one process declares on its session.
 
-    def __init__(self, session: zenoh.Session, wake: Post) -> None:
+    In Zenoh's threads, nothing may be declared or withdrawn, and nothing sent that waits for a congested link: two
+    processes whose receiving threads wait for each other would wait for ever. Within a lent turn, that is left to the
+    scheduler's own thread.
+    """
+
+    def __init__(self, session: zenoh.Session, wake: Post, turns: LendsTurns | None = None) -> None:
+        """Without `turns`, none are lent."""
         self.session = str(session.zid())
         self._session, self._wake = session, wake
+        self._bring = wake if turns is None else turns.bring
+        self._on_own = _at_once if turns is None else turns.on_own
         self._declared: dict[_Declared, None] = {}  # an ordered set
 
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
         """Let the scheduler run `callback` for `owner`."""
         self._wake(owner, callback)
 
+    def bring(self, owner: str, callback: Callable[[], None]) -> None:
+        """Do the same, at once and in the calling thread if the scheduler rests."""
+        self._bring(owner, callback)
+
     def publisher(self, key: str, qos: Qos) -> RemotePublisher:
         """Declare a publisher; a latched one keeps its last message for late subscribers."""
         options = _options(sending(qos))
         if qos is not Qos.LATCHED:
-            return _Publisher(self._declared, self._session.declare_publisher(key, **options))
-        latched = ext.declare_advanced_publisher(
+            declare = partial(self._session.declare_publisher, key, **options)
+            return _Publisher(self._declared, declare, self._on_own, blocks=sending(qos).blocks)
+        declare_latched = partial(
+            ext.declare_advanced_publisher,
             self._session,
             key,
             cache=ext.CacheConfig(1),
@@ -45,30 +74,28 @@ class ZenohTransport:
             sample_miss_detection=ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=HEARTBEAT),
             **options,
         )
-        return _LatchedPublisher(self._declared, latched)
+        return _LatchedPublisher(self._declared, declare_latched, self._on_own)
 
     def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Closable:
         """Receive what other processes publish; if latched, also what they published last."""
         handler = _direct(lambda sample: arrived(_Arrival(sample)))
         if qos is not Qos.LATCHED:
-            return self._keep(self._session.declare_subscriber(key, handler, allowed_origin=zenoh.Locality.REMOTE))
+            return self._keep(self._session.declare_subscriber, key, handler, allowed_origin=zenoh.Locality.REMOTE)
         return self._keep(
-            ext.declare_advanced_subscriber(
-                self._session,
-                key,
-                handler,
-                allowed_origin=zenoh.Locality.REMOTE,
-                history=ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
-                recovery=ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
-            )
+            ext.declare_advanced_subscriber,
+            self._session,
+            key,
+            handler,
+            allowed_origin=zenoh.Locality.REMOTE,
+            history=ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
+            recovery=ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
         )
 
     def serve(self, key: str, asked: Callable[[Question], None]) -> Closable:
         """Receive the requests of other processes."""
-        handler = _direct(lambda query: asked(_Question(key, query)))
-        return self._keep(
-            self._session.declare_queryable(key, handler, complete=True, allowed_origin=zenoh.Locality.REMOTE)
-        )
+        handler = _direct(lambda query: asked(_Question(key, query, self._on_own)))
+        remote = zenoh.Locality.REMOTE
+        return self._keep(self._session.declare_queryable, key, handler, complete=True, allowed_origin=remote)
 
     def ask(
         self,
@@ -84,7 +111,8 @@ class ZenohTransport:
         token = zenoh.CancellationToken()
         # The query ends with `drop`: after an answer, that means nothing; without one, the server is gone.
         handler = _direct(lambda reply: answered(_answer(reply)), lambda: answered(TransportReply(error=GONE)))
-        self._session.get(
+        get: Callable[[], Any] = partial(
+            self._session.get,
             key,
             handler,
             payload=payload,
@@ -95,16 +123,17 @@ class ZenohTransport:
             cancellation_token=token,
             **_options(SERVICE_SENDING, "reliability"),
         )
-        return _Asked(token)
+        self._on_own(get)
+        return _Asked(token, self._on_own)
 
     def announce(self, token: str) -> Closable:
         """Show a token until it is closed or this process ends."""
-        return self._keep(self._session.liveliness().declare_token(token))
+        return self._keep(self._session.liveliness().declare_token, token)
 
     def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Closable:
         """Report matching tokens: those that exist now or appear (True), and those that go (False)."""
         handler = _direct(lambda sample: changed(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
-        return self._keep(self._session.liveliness().declare_subscriber(pattern, handler, history=True))
+        return self._keep(self._session.liveliness().declare_subscriber, pattern, handler, history=True)
 
     def close(self) -> None:
         """Withdraw everything and close the session, which would hang if a latched subscription were left."""
@@ -112,8 +141,8 @@ class ZenohTransport:
             declared.close()
         self._session.close()  # type: ignore[no-untyped-call]
 
-    def _keep(self, entity: _Entity) -> Closable:
-        return _Declared(self._declared, entity)
+    def _keep(self, declare: Callable[..., _Entity], *words: Any, **options: Any) -> Closable:
+        return _Declared(self._declared, partial(declare, *words, **options), self._on_own)
 
 
 class _Entity(Protocol):
@@ -123,30 +152,54 @@ class _Entity(Protocol):
 class _Declared:
     """Something that lives on the session until it is closed."""
 
-    def __init__(self, declared: dict[_Declared, None], entity: _Entity) -> None:
-        self._declared, self._entity = declared, entity
+    def __init__(self, declared: dict[_Declared, None], declare: Callable[[], Any], on_own: OnOwn) -> None:
+        self._declared, self._on_own = declared, on_own
+        self._entity: Any = None  # until the scheduler's own thread has declared it
         declared[self] = None
+        on_own(partial(self._declare, declare))
 
     def close(self) -> None:
         if self in self._declared:
             del self._declared[self]
+            self._on_own(self._withdraw)
+
+    def _declare(self, declare: Callable[[], _Entity]) -> None:
+        if self in self._declared:
+            self._entity = declare()
+
+    def _withdraw(self) -> None:
+        if self._entity is not None:
             self._entity.undeclare()
 
 
 class _Publisher(_Declared):
-    def __init__(self, declared: dict[_Declared, None], publisher: zenoh.Publisher) -> None:
-        super().__init__(declared, publisher)
+    def __init__(
+        self, declared: dict[_Declared, None], declare: Callable[[], Any], on_own: OnOwn, *, blocks: bool
+    ) -> None:
         self.has_match = False
-        self._publisher = publisher
+        self._blocks = blocks
+        super().__init__(declared, declare, on_own)
+
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        if self._blocks or self._entity is None:
+            self._on_own(partial(self._put, payload, attachment))
+        else:
+            self._entity.put(payload, attachment=attachment)
+
+    def _put(self, payload: bytes, attachment: bytes) -> None:
+        if self in self._declared:
+            self._entity.put(payload, attachment=attachment)
+
+    def _declare(self, declare: Callable[[], Any]) -> None:
+        super()._declare(declare)
+        if (publisher := self._entity) is None:
+            return
         # A listener, since querying the status costs as much as sending. It reports only changes; and contrary to its
         # type stub, the status is an object, which is always true.
         publisher.declare_matching_listener(_direct(self._match))
         status: Any = publisher.matching_status
         if status.matching:
             self.has_match = True
-
-    def put(self, payload: bytes, attachment: bytes) -> None:
-        self._publisher.put(payload, attachment=attachment)
 
     def _match(self, status: zenoh.MatchingStatus) -> None:
         self.has_match = status.matching
@@ -155,12 +208,8 @@ class _Publisher(_Declared):
 class _LatchedPublisher(_Declared):
     has_match = True  # if nobody now, then somebody later
 
-    def __init__(self, declared: dict[_Declared, None], publisher: ext.AdvancedPublisher) -> None:
-        super().__init__(declared, publisher)
-        self._publisher = publisher
-
     def put(self, payload: bytes, attachment: bytes) -> None:
-        self._publisher.put(payload, attachment=attachment)
+        self._on_own(lambda: self._entity.put(payload, attachment=attachment))
 
 
 class _Arrival:
@@ -183,27 +232,29 @@ class _Arrival:
 
 
 class _Question(_Arrival):
-    __slots__ = ("_key", "_query")
+    __slots__ = ("_key", "_on_own", "_query")
 
-    def __init__(self, key: str, query: zenoh.Query) -> None:
+    def __init__(self, key: str, query: zenoh.Query, on_own: OnOwn) -> None:
         super().__init__(query)
-        self._key, self._query = key, query
+        self._key, self._query, self._on_own = key, query, on_own
 
     def reply(self, payload: bytes, attachment: bytes) -> None:
-        with self._query:  # leaving the block ends the query for the client
-            self._query.reply(self._key, payload, attachment=attachment)
+        self._on_own(lambda: self._end(lambda query: query.reply(self._key, payload, attachment=attachment)))
 
     def fail(self, error: str) -> None:
-        with self._query:
-            self._query.reply_err(error)
+        self._on_own(lambda: self._end(lambda query: query.reply_err(error)))
+
+    def _end(self, how: Callable[[zenoh.Query], None]) -> None:
+        with self._query as query:  # leaving the block ends the query for the client
+            how(query)
 
 
 class _Asked:
-    def __init__(self, token: zenoh.CancellationToken) -> None:
-        self._token = token
+    def __init__(self, token: zenoh.CancellationToken, on_own: OnOwn) -> None:
+        self._token, self._on_own = token, on_own
 
     def close(self) -> None:
-        self._token.cancel()  # type: ignore[no-untyped-call]
+        self._on_own(self._token.cancel)
 
 
 def _answer(reply: zenoh.Reply) -> TransportReply:
@@ -211,6 +262,10 @@ def _answer(reply: zenoh.Reply) -> TransportReply:
         return TransportReply(reply.ok.payload.to_bytes())
     error = reply.err.payload.to_string() if reply.err is not None else GONE
     return TransportReply(error=EXPIRED if error == ZENOH_EXPIRED else error)
+
+
+def _at_once(callback: Callable[[], None]) -> None:
+    callback()
 
 
 def _direct(callback: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Callback[Any]:

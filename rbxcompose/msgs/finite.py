@@ -25,7 +25,10 @@ def is_finite(message: Message) -> bool:
     tests = _tests.get(type(message))
     if tests is None:
         tests = _tests[type(message)] = _tests_of(type(message))
-    return all(test(get(message)) for get, test in tests)
+    for get, test in tests:  # noqa: SIM110 - a generator takes twice as long
+        if not test(get(message)):
+            return False
+    return True
 
 
 def require_finite(message: Message) -> None:
@@ -73,7 +76,7 @@ def _test_of_many(type_: FieldType) -> Test | None:
 
 
 def _all_finite(values: tuple[float, ...]) -> bool:
-    return all(map(isfinite, values))
+    return isfinite(sum(values)) or all(map(isfinite, values))  # the sum of finite numbers may not be finite
 
 
 def _is_finite_array(values: Any) -> bool:

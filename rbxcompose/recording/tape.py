@@ -106,6 +106,9 @@ class _Taped:
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
         self._inner.wake(owner, callback)
 
+    def bring(self, owner: str, callback: Callable[[], None]) -> None:
+        self._inner.bring(owner, callback)
+
     def publisher(self, key: str, qos: Qos) -> RemotePublisher:
         if key.startswith(ADMIN):  # what tools look at is not part of the robot's behaviour
             return self._inner.publisher(key, qos)

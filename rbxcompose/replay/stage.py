@@ -49,6 +49,8 @@ class ReplayStage(NoTransport):
         """Let the scheduler run the callback at this instant."""
         self.scheduler.post(owner, callback)
 
+    bring = wake
+
     def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> NoTransport:
         """Receive the recorded messages."""
         self.subscribers.setdefault(key, []).append(arrived)

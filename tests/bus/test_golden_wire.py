@@ -111,6 +111,8 @@ class Wire:
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
         self.scheduler.post(owner, callback)
 
+    bring = wake
+
     def publisher(self, key: str, qos: Qos) -> Declared:
         return Declared(self, key)
 

@@ -23,6 +23,8 @@ class Link:
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
         callback()
 
+    bring = wake
+
     def publisher(self, key: str, qos: Qos) -> End:
         return self._declare(f"publish {key}")
 

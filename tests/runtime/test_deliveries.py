@@ -43,6 +43,8 @@ class Wire(NoTransport):
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
         self._scheduler.post(owner, callback)
 
+    bring = wake
+
     def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> NoTransport:
         self.arrived = arrived
         return self

@@ -11,6 +11,7 @@ from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import Channel
 from rbxcompose.runtime.process_group.driver import RealTimeDriver, SteppedDriver
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
+from rbxcompose.runtime.process_group.turns import Turns
 from rbxcompose.scheduler import Scheduler
 
 
@@ -163,7 +164,8 @@ def test_in_real_time_events_run_at_or_after_their_time() -> None:
     ran: list[float] = []
     for due in (0.02, 0.01, 0.03):
         scheduler.at(due, "x", lambda due=due: ran.append(clock.now() - due))  # type: ignore[misc]
-    RealTimeDriver(scheduler, clock, inbox, Channel(theirs), Driven(lambda: len(ran) == 3)).run()
+    turns = Turns(scheduler, clock, inbox)
+    RealTimeDriver(scheduler, clock, inbox, turns, Channel(theirs), Driven(lambda: len(ran) == 3)).run()
     assert all(lateness >= 0 for lateness in ran)
     inbox.close()
     ours.close()

@@ -53,6 +53,8 @@ class World(NoTransport):
         self.woken += 1
         self.scheduler.post(owner, callback)
 
+    bring = wake
+
     def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> NoTransport:
         if "/tf/" in key:
             self.arrived.append(arrived)

@@ -313,6 +313,8 @@ class SimulatedTransport:
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
         self._post(owner, callback)
 
+    bring = wake
+
     def publisher(self, key: str, qos: Qos) -> _Publisher:
         self.publishers.append(_Publisher(self, key, qos))
         return self.publishers[-1]

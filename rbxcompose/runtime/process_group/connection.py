@@ -16,6 +16,7 @@ from rbxcompose.clock import Clock
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.lifeline import Lifeline
+from rbxcompose.runtime.process_group.turns import Turns
 from rbxcompose.scheduler import Scheduler
 
 if TYPE_CHECKING:
@@ -37,13 +38,14 @@ def open_bus(
     scheduler: Scheduler,
     clock: Clock,
     inbox: CallbackInbox,
+    turns: Turns,
     log: Callable[[str, str], None],
     tape: Tape | None = None,
 ) -> Connection:
     """Open a Zenoh session that finds the robot's other processes at `router`, and the bus over it."""
 
     def opened() -> ZenohTransport:
-        return ZenohTransport(open_peer(router), inbox.put)
+        return ZenohTransport(open_peer(router), inbox.put, turns)
 
     if reason := shared_memory.problem():
         log("robot", f"large messages are sent without shared memory: {reason}")

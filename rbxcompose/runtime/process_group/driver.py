@@ -10,6 +10,7 @@ from typing import Protocol
 from rbxcompose.clock import Clock, ExternalClock, MonotonicClock, SteppedClock, Turn
 from rbxcompose.runtime.channel import Channel, ChannelMessage
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
+from rbxcompose.runtime.process_group.turns import Turns
 from rbxcompose.scheduler import Scheduler
 
 BEAT = 0.25  # [s] of real time between signs of life
@@ -79,10 +80,14 @@ class Driver:
             self._driven.beat()
             self._next_beat = time.monotonic() + BEAT
             until_beat = BEAT
-        ready = self._selector.select(max(0.0, min(pause, until_beat)))
+        ready = self._wait(max(0.0, min(pause, until_beat)))
         self._inbox.drain(self._scheduler)
         if any(key.fileobj is self._channel for key, _ in ready):
             self._hear(self._channel.receive())
+
+    def _wait(self, longest: float) -> list[tuple[selectors.SelectorKey, int]]:
+        """Wait for channel and inbox, `longest` [s] at most, and return which of them can be read."""
+        return self._selector.select(longest)
 
     def _hear(self, messages: Sequence[ChannelMessage]) -> None:
         for message in messages:
@@ -97,10 +102,23 @@ class RealTimeDriver(Driver):
     """Robot time is the monotonic clock; deadlines are absolute, so that lateness does not add up."""
 
     def __init__(
-        self, scheduler: Scheduler, clock: MonotonicClock, inbox: CallbackInbox, channel: Channel, driven: Driven
+        self,
+        scheduler: Scheduler,
+        clock: MonotonicClock,
+        inbox: CallbackInbox,
+        turns: Turns,
+        channel: Channel,
+        driven: Driven,
     ) -> None:
         super().__init__(scheduler, inbox, channel, driven)
-        self._clock = clock
+        self._clock, self._turns = clock, turns
+
+    def _wait(self, longest: float) -> list[tuple[selectors.SelectorKey, int]]:
+        self._turns.rest(self._clock.now() + longest)
+        try:
+            return super()._wait(longest)
+        finally:
+            self._turns.resume()
 
     def _pause(self) -> float:
         due = self._scheduler.next_due()

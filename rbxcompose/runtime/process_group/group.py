@@ -32,6 +32,7 @@ from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.lifeline import Lifeline
 from rbxcompose.runtime.process_group.stop_line import open_stop_line
+from rbxcompose.runtime.process_group.turns import Turns
 from rbxcompose.runtime.process_group.watchdog import HANG, Watchdog
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
@@ -79,6 +80,7 @@ class ProcessGroup:
         self._clock = self._made_clock(start)
         self._scheduler = Scheduler()
         self._inbox = CallbackInbox()
+        self._turns = Turns(self._scheduler, self._clock, self._inbox)
         self._watchdog = Watchdog()
         self._bus: Bus | None = None
         self._lifeline: Lifeline | None = None
@@ -192,7 +194,9 @@ class ProcessGroup:
                 self._options.record, self._plan, self._clock, lambda text: self._complain("robot", text)
             )
         tape = self._taping.tape if self._taping else None
-        connection = open_bus(self._plan, router, self._scheduler, self._clock, self._inbox, self._complain, tape)
+        connection = open_bus(
+            self._plan, router, self._scheduler, self._clock, self._inbox, self._turns, self._complain, tape
+        )
         self._bus, self._lifeline = connection.bus, connection.lifeline
         open_stop_line(connection.transport, self._plan.robot, self._name, self._stop_by_bus, self._inbox.put)
         self._host = Host(
@@ -225,6 +229,8 @@ class ProcessGroup:
         self._made_host().start()
         if isinstance(self._driver, SteppedDriver):
             self._driver.go(self._options.duration)
+        if isinstance(self._driver, RealTimeDriver):
+            self._turns.open()
 
     def _answer(self, host: Host, asked: say.Ask) -> say.Answered | say.Refusal:
         try:
@@ -249,6 +255,7 @@ class ProcessGroup:
         self._watch(HANG)
 
     def _shutdown(self) -> None:
+        self._turns.close()
         if not self._options.is_stepped:
             faulthandler.dump_traceback_later(LONGEST_CLOSE, exit=True)  # nothing moves any more: end a hang by force
         if self._host is not None:
@@ -272,6 +279,7 @@ class ProcessGroup:
         return is_counting and duration is not None and self._clock.now() >= duration
 
     def _brake(self, host: Host) -> None:
+        self._turns.close()  # from now on, each callback is followed by a look for rest
         host.brake()
         bound = max(host.rest_time, STEPPED_REST_BOUND if self._options.is_stepped else 0.0)
         self._rest_deadline = self._clock.now() + bound
@@ -329,7 +337,7 @@ class ProcessGroup:
         if isinstance(self._clock, SteppedClock):
             rate = self._options.rate
             return SteppedDriver(self._scheduler, self._clock, self._inbox, self._channel, self, rate=rate)
-        return RealTimeDriver(self._scheduler, self._clock, self._inbox, self._channel, self)
+        return RealTimeDriver(self._scheduler, self._clock, self._inbox, self._turns, self._channel, self)
 
     def _made_host(self) -> Host:
         if self._host is None:

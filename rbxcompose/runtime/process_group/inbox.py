@@ -21,9 +21,18 @@ class CallbackInbox:
         """Return the descriptor that is readable when something has arrived."""
         return self._descriptor
 
+    @property
+    def has_some(self) -> bool:
+        """Return whether callbacks are waiting."""
+        return bool(self._callbacks)
+
     def put(self, owner: str, callback: Callable[[], None]) -> None:
         """Run `callback` for `owner` on the scheduler's thread. May be called from any thread."""
         self._callbacks.append((owner, callback))
+        self.wake()
+
+    def wake(self) -> None:
+        """Wake the thread that waits for the descriptor. May be called from any thread."""
         if not self._is_signalled:  # one system call per wake, not per sample
             self._is_signalled = True
             os.eventfd_write(self._descriptor, 1)

@@ -80,7 +80,10 @@ def _end(
         case In():
             topic, handler = instance.topic(name), _on_message(component, name, port, handling)
             waits = isinstance(port, ServesTopic)  # like goals: a sender that waits for a listener relies on it
-            return bus.subscribe(owner, topic, interface, port.qos, handler, max_rate=port.max_rate, waits=waits)
+            is_light = handling.worker is None
+            return bus.subscribe(
+                owner, topic, interface, port.qos, handler, max_rate=port.max_rate, waits=waits, is_light=is_light
+            )
         case Serves():
             serve = _on_request(component, name, port, handling)
             bus.serve_later(owner, instance.topic(name), interface, serve, waits=True)

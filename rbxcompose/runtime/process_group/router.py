@@ -18,6 +18,7 @@ from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.process_group.driver import RealTimeDriver
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.lifeline import answer
+from rbxcompose.runtime.process_group.turns import Turns
 from rbxcompose.runtime.process_group.watchdog import Watchdog
 from rbxcompose.scheduler import Scheduler
 
@@ -41,7 +42,9 @@ class Router:
         """Run until it is over."""
         signal.signal(signal.SIGTERM, _end)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGTERM])
-        RealTimeDriver(Scheduler(), self._clock, self._inbox, self._channel, self).run()
+        scheduler = Scheduler()
+        turns = Turns(scheduler, self._clock, self._inbox)
+        RealTimeDriver(scheduler, self._clock, self._inbox, turns, self._channel, self).run()
         if self._transport is not None:
             self._transport.close()
 
