@@ -100,6 +100,7 @@ class Robot:
             services=self.services,
             unread=self.unread,
             is_complete=self.written <= self.components.keys(),
+            events=frozenset(name for name, source in self.values.items() if source.is_event),
         )
 
     @cached_property

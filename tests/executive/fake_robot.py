@@ -172,7 +172,10 @@ class Robot:
         config = MissionConfig(
             programs=programs,
             start=start,
-            values={"battery": ValueSource("battery_level", "std_msgs/msg/Float32", "data", 1, 100, TYPES["ratio"])},
+            values={
+                "battery": ValueSource("battery_level", "std_msgs/msg/Float32", "data", 1, 100, TYPES["ratio"]),
+                "confirmed": ValueSource("button", "std_msgs/msg/Bool", "data", type=FLAG, is_event=True),
+            },
             places=PLACES,
             skills={
                 "go_to": SkillSource(

@@ -113,7 +113,7 @@ class RepeatStep(Loop):
         """Read the number of rounds, `do`, `until` and `every`."""
         rounds = reader.count_or_forever(reader.key)
         reader.child("do")
-        until = reader.condition("until") if reader.has("until") else None
+        until = reader.watched("until") if reader.has("until") else None
         return cls(rounds, until, reader.duration("every") if reader.has("every") else None)
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:

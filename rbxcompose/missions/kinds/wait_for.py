@@ -68,7 +68,7 @@ class WaitForStep(LeafStep):
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
         """Read the condition."""
-        return cls(reader.condition(reader.key))
+        return cls(reader.watched(reader.key))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it succeeds; only a condition that cannot be evaluated is a failure."""

@@ -75,7 +75,7 @@ class AsLongAs(Cutting):
     @classmethod
     def read(cls, reader: NodeReader, key: str) -> Self:
         """Read a condition."""
-        return cls(reader.condition(key))
+        return cls(reader.watched(key))
 
 
 class TimeoutTask(Decorator):
