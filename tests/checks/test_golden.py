@@ -10,6 +10,7 @@ from rbxcompose.check_runner import Check, all_checks
 from rbxcompose.compiler import compile_robot
 from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
+from tests.checks import strangers
 
 FOLDER = Path(__file__).parent / "golden"
 
@@ -22,6 +23,10 @@ def test_what_a_check_says_is_its_golden_text(check: Check, golden: Golden, monk
     out = compile_robot(str(robot), real=real, environment={})
     assert {finding.code for finding in out.report} == {check.code}
     golden.check(f"{check.code}.txt", render_text(out.report, out.sources))
+
+
+def test_the_types_of_others_are_known() -> None:
+    assert strangers.Surveyor.type_name == "toy_surveyor"
 
 
 def test_every_golden_robot_belongs_to_a_check() -> None:
