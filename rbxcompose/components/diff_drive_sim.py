@@ -106,7 +106,8 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
         at = Transform3.from_pose2(self.core.pose)
         x, y, z = at.translation
         turn = geometry.Quaternion(*at.rotation)
-        self.odom(self.odometry(header, geometry.Pose(position=geometry.Point(x, y, z), orientation=turn)))
+        if self.odom.is_wanted:
+            self.odom(self.odometry(header, geometry.Pose(position=geometry.Point(x, y, z), orientation=turn)))
         placed = geometry.Transform(translation=geometry.Vector3(x, y, z), rotation=turn)
         link = geometry.TransformStamped(header=header, child_frame_id=BASE, transform=placed)
         self.tf(TFMessage(transforms=(link,)))
