@@ -24,6 +24,8 @@ from rbxcompose.qos import Qos
 
 M = TypeVar("M", bound=Message)
 
+PATIENT_QUEUE = 50  # messages; half a second of poses at 50 Hz wakes the process once
+
 
 class Delivery(NamedTuple, Generic[M]):
     """A message on its way within the process, and its origin."""
@@ -64,6 +66,11 @@ class Publisher(Generic[M]):
     def has_match(self) -> bool:
         """Return whether anything in another process would receive it, now or (if latched) later."""
         return self._remote.has_match
+
+    @property
+    def is_wanted(self) -> bool:
+        """Return whether anything, in this process or another, would receive it."""
+        return self._remote.has_match or self._qos is Qos.LATCHED or bool(self._topics.subscriptions.at(self.route))
 
     def __call__(self, message: M) -> None:
         """Publish `message`."""
@@ -124,13 +131,14 @@ class Subscription(Generic[M]):
         rate = max_rate or most_per_second(qos)
         self._allowances = None if rate is None or math.isinf(rate) else Allowances(rate)
         self._arrived = -math.inf  # [s] of robot time
-        self._patience = queue_depth(qos) // 2 if is_patient else 1  # messages that may wait for each other
+        depth = max(PATIENT_QUEUE, queue_depth(qos)) if is_patient else queue_depth(qos)
+        self._patience = depth // 2 if is_patient else 1  # messages that may wait for each other
         self._has_complained = False  # in the log; diagnostics continue to count
         process = node.process
         is_lent = is_light and qos not in (Qos.LATCHED, Qos.BULK)
         self._post = process.scheduler.post_light if is_lent else process.scheduler.post
         self._bring = process.transport.bring if is_lent else process.transport.wake
-        self._inbox: Inbox[_Received[M]] = Inbox(node.owner, queue_depth(qos), self._take, self._post)
+        self._inbox: Inbox[_Received[M]] = Inbox(node.owner, depth, self._take, self._post)
         if waits:
             self._inbox.hold()
             node.when_open(self._inbox.go_on)

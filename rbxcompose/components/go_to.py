@@ -56,6 +56,7 @@ class GoTo(Component[GoToConfig]):
     """
 
     rate = 20.0
+    steps_for_goals = True
     cmd_vel = Out(Twist, "cmd_vel", qos="command")
     pose = Looks(source="base_footprint", target=MAP)
     go_to = ServesAction(NavigateToPose, "go_to", claims="base")

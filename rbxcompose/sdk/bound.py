@@ -24,6 +24,11 @@ F_contra = TypeVar("F_contra", contravariant=True)
 class Sender(Protocol[M_contra]):
     """Publishes one message per call."""
 
+    @property
+    def is_wanted(self) -> bool:
+        """Return whether anything would receive a message now; a costly one need not be made for nobody."""
+        ...
+
     def __call__(self, message: M_contra, /) -> None:
         """Publish `message`."""
         ...

@@ -87,6 +87,8 @@ class DiffDriveCore:
         self._follow(AT_REST, dt - driven)
 
     def _follow(self, target: Velocity2, duration: float) -> None:
+        if self.velocity == target == AT_REST:
+            return
         elapsed = 0.0
         for until in self._corners(target, duration):
             dt = until - elapsed
