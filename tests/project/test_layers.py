@@ -60,7 +60,7 @@ ABOVE = {
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
     "components": "actuation body control controller_interface controller_manager controller_requests diagnostics "
-    "executive missions mux.core navigation.go_to sdk servo_bus_config servo_bus_line servo_report sim "
+    "executive missions mux.core navigation sdk servo_bus_config servo_bus_line servo_report sim "
     "twins.fault_script",
     "servo_report": "actuation control",
     "composition": "body.description sections",
