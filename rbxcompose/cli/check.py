@@ -13,7 +13,7 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rbxcompose.cli.output.console import FINDINGS, has_colour, tell
+from rbxcompose.cli.output.console import FINDINGS, good, has_colour, tell
 from rbxcompose.cli.project.fixes import fix, only_ours
 from rbxcompose.cli.project.robot_options import add_layer_options, compiled
 from rbxcompose.cli.project.targets import Targets, projects_of, targets
@@ -95,7 +95,8 @@ def _written(checked: CheckedRobots, form: str) -> str:
     if any(checked.report) or form not in FOR_PEOPLE:
         return renderer(form)(checked.report, checked.sources, has_colour(sys.stdout))
     lines = [f"{plan.robot} is fine: {extent(len(plan.instances), len(plan.groups))}" for plan in checked.fine]
-    return "\n".join([*lines, *(f"the test {name} is fine" for name in checked.tests)])
+    lines += [f"the test {name} is fine" for name in checked.tests]
+    return "\n".join(map(good, lines))
 
 
 def _whisper(text: str) -> None:

@@ -80,6 +80,11 @@ def has_colour(stream: TextIO) -> bool:
     return stream.isatty() and not os.environ.get("NO_COLOR")
 
 
+def good(text: str) -> str:
+    """Return a line of good news, green where stdout shows colours."""
+    return f"\x1b[32m{text}\x1b[0m" if has_colour(sys.stdout) else text
+
+
 def tell(text: str) -> None:
     """Write lines to stdout and flush."""
     output().has_begun = True
