@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from rbxcompose.config import Name, Time
+from rbxcompose.field_docs import field_docs
 from rbxcompose.manifest.test_file import SECTIONS, TEST, TrialFile
 from rbxcompose.schema.robot import document, or_empty
 from rbxcompose.schema.scalars import Schema
@@ -36,7 +37,7 @@ def trial_schema(types: Iterable[str]) -> Schema:
 
 def _description(name: str) -> str:
     fields = TrialFile.model_fields
-    return next(field.description or "" for key, field in fields.items() if name in (key, field.alias))
+    return next(field_docs(TrialFile)[key] for key, field in fields.items() if name in (key, field.alias))
 
 
 def _step(time: Schema) -> Schema:

@@ -15,11 +15,12 @@ PACKAGE = Path(__file__).parents[2] / "rbxcompose"
 GROUND = {
     "atomic_files": "",
     "clock": "",
-    "config": "references units",
+    "config": "field_docs references units",
     "edits": "findings",
     "endpoints": "",
     "expressions": "findings units",
     "fence": "",
+    "field_docs": "",
     "findings": "per_compile",
     "formats": "findings plugins",
     "geometry": "",
