@@ -13,8 +13,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
 NEGLIGIBLE = 1e-13  # a coefficient of the highest power that is smaller than this times the greatest one
 Coefficients = tuple[float, ...]  # of 1, t, t^2 and so on, up to t^5
 
@@ -223,4 +221,6 @@ def _roots(polynomial: Coefficients) -> list[float]:
         return []
     if len(kept) == 2:
         return [-kept[0] / kept[1]]
+    import numpy as np  # a tenth of the time of `check`, and plans of most robots need no roots
+
     return [float(root.real) for root in np.roots(kept[::-1]) if abs(root.imag) <= 1e-6]
