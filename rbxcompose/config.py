@@ -5,7 +5,6 @@ Inside, all is SI and ratios are 0 to 1. A field's docstring becomes its descrip
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import (
@@ -20,6 +19,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from rbxcompose import units
+from rbxcompose.dataclass import dataclass
 from rbxcompose.field_docs import field_docs
 from rbxcompose.references import JOINT, LINK, PLACE, Refers
 from rbxcompose.units import Dimension, to_si

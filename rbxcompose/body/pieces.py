@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from rbxcompose.body.attachment import PieceAttachment
 from rbxcompose.body.xml_reader import XmlElement
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Span, kind
 
 NOT_ATTACHED = kind(

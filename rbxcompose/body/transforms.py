@@ -7,7 +7,6 @@ was *measured* at its stamp [ns], by the clock of who sent it: look-ups at a tim
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from rbxcompose.body.pose_history import PoseHistory
 from rbxcompose.body.transform_errors import (
@@ -18,6 +17,7 @@ from rbxcompose.body.transform_errors import (
     TransformError,
     UnknownFrameError,
 )
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3, composed
 
 MOST_FRAMES = 10_000  # names come from outside; a tree must not grow without bound

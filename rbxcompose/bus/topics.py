@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import count
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -17,6 +17,7 @@ from rbxcompose.bus.refusals import RefusalReason, Refusals
 from rbxcompose.bus.tokens import EntityKind
 from rbxcompose.bus.transport import Arrival, Closable
 from rbxcompose.bus.writers import TopicReader
+from rbxcompose.dataclass import dataclass
 from rbxcompose.msgs.cdr import CdrError, CdrLengthError, decode, encode
 from rbxcompose.msgs.finite import NotFiniteError, require_finite
 from rbxcompose.msgs.types import Message

@@ -10,8 +10,10 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
+
+from rbxcompose.dataclass import dataclass
 
 NEGLIGIBLE = 1e-13  # a coefficient of the highest power that is smaller than this times the greatest one
 Coefficients = tuple[float, ...]  # of 1, t, t^2 and so on, up to t^5

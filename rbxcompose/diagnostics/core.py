@@ -7,9 +7,10 @@ All times are robot time [s] at which a status reached the aggregator.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.diagnostics.status import Status
 from rbxcompose.levels import Level, combined
 

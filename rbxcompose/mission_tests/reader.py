@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
 from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import resolve, shown_name

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
@@ -15,6 +14,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from rbxcompose.config import Config, Dimensioned, Live
+from rbxcompose.dataclass import dataclass
 from rbxcompose.field_docs import field_docs
 from rbxcompose.findings import suggest
 from rbxcompose.msgs.rcl_interfaces import (

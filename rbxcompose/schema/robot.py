@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.field_docs import field_docs
 from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.header import ManifestHeader

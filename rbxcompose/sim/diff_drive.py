@@ -6,8 +6,8 @@ All times are robot time [s].
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import AT_REST, Pose2, Velocity2
 
 ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast

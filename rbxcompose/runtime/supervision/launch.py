@@ -7,7 +7,7 @@ import os
 import select
 import signal
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import FrameType
 from typing import NoReturn, TextIO, get_args
 
@@ -15,6 +15,7 @@ import setproctitle
 
 from rbxcompose.bus import shared_memory
 from rbxcompose.clock import MonotonicClock
+from rbxcompose.dataclass import dataclass
 from rbxcompose.endpoints import unix_endpoint
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan
