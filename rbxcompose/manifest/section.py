@@ -31,7 +31,7 @@ M = TypeVar("M")
 R = TypeVar("R")
 T = TypeVar("T")
 
-ROBOT, PART, OVERLAY = "Robot", "Part", "Overlay"
+ROBOT, PART, OVERLAY, TEST = "Robot", "Part", "Overlay", "Test"
 EVERYWHERE = (ROBOT, PART, OVERLAY)
 ANY = "*"
 """Any key, in a path of `Section.shared`."""

@@ -7,7 +7,8 @@ from typing import Any
 
 from rbxcompose.config import Name, Time
 from rbxcompose.field_docs import field_docs
-from rbxcompose.manifest.test_file import SECTIONS, TEST, TrialFile
+from rbxcompose.manifest.section import TEST
+from rbxcompose.manifest.test_file import SECTIONS, TrialFile
 from rbxcompose.schema.robot import document, or_empty
 from rbxcompose.schema.scalars import Schema
 from rbxcompose.schema.settle import opened, schemas_of

@@ -11,7 +11,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Severity, Span, kind
 from rbxcompose.manifest.files import ROBOT_FILE, find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
-from rbxcompose.manifest.test_file import TEST
+from rbxcompose.manifest.section import TEST
 from rbxcompose.regular_files import open_regular
 
 UNUSED = kind(
