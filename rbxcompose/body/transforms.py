@@ -186,7 +186,8 @@ class TransformTree:
     def _refusal(self, parent: str, child: str, transform: Transform3) -> str:
         if not parent or not child:
             return "a frame needs a name"
-        if not all(map(math.isfinite, (*transform.translation, *transform.rotation))):
+        numbers = (*transform.translation, *transform.rotation)
+        if not math.isfinite(sum(numbers)) and not all(map(math.isfinite, numbers)):
             return f"the transform of '{child}' contains a number that is not finite"
         if abs(math.hypot(*transform.rotation) - 1.0) > UNIT_TOLERANCE:
             return f"the rotation of '{child}' is not a unit quaternion"

@@ -87,7 +87,7 @@ class DiffDriveCore:
         self._follow(AT_REST, dt - driven)
 
     def _follow(self, target: Velocity2, duration: float) -> None:
-        if self.velocity == target == AT_REST:
+        if duration <= 0.0 or self.velocity == target == AT_REST:
             return
         elapsed = 0.0
         for until in self._corners(target, duration):

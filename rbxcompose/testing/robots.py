@@ -31,5 +31,12 @@ class Ran:
 def run_robot(plan: Plan, *, most: float = LONGEST) -> Ran:
     """Run a robot until its mission has ended, at most `most` [s] of robot time."""
     bench = Bench(plan=plan)
-    bench.run_until(lambda: any(isinstance(event, MissionOver) for event in bench.events), most)
+    seen = 0
+
+    def is_over() -> bool:
+        nonlocal seen  # asked after each instant, so only new events are looked at
+        news, seen = bench.events[seen:], len(bench.events)
+        return any(isinstance(event, MissionOver) for event in news)
+
+    bench.run_until(is_over, most)
     return Ran(bench)
