@@ -75,14 +75,17 @@ class Publisher(Generic[M]):
 
     def __call__(self, message: M) -> None:
         """Publish `message`."""
-        process = self._process
-        source = Attachment(next(self._sequence), process.clock.stamp(), self.gid)
+        number, here = next(self._sequence), self._topics.subscriptions.at(self.route)
+        has_match, is_latched = self._remote.has_match, self._qos is Qos.LATCHED
+        if not (here or has_match or is_latched):
+            return  # nobody listens
+        source = Attachment(number, self._process.clock.stamp(), self.gid)
         delivery = Delivery(message, source)
-        if self._qos is Qos.LATCHED:
+        if is_latched:
             self.kept = delivery
-        for subscription in self._topics.subscriptions.at(self.route):
+        for subscription in here:
             subscription.deliver(delivery)
-        if self._remote.has_match:
+        if has_match:
             self._remote.put(encode(message), source.encode())
 
     def look_again(self) -> None:

@@ -105,6 +105,8 @@ class DiffDriveCore:
     def _corners(self, target: Velocity2, duration: float) -> list[float]:
         """Return the moments up to `duration` between which both velocities are linear and keep their signs [s]."""
         now, limits = self.velocity, self.settings
+        if now == target:
+            return [duration]
         corners = (
             abs(now.linear) / limits.acceleration,
             abs(target.linear - now.linear) / limits.acceleration,

@@ -35,6 +35,8 @@ def run_robot(plan: Plan, *, most: float = LONGEST) -> Ran:
 
     def is_over() -> bool:
         nonlocal seen  # asked after each instant, so only new events are looked at
+        if len(bench.events) == seen:
+            return False
         news, seen = bench.events[seen:], len(bench.events)
         return any(isinstance(event, MissionOver) for event in news)
 
