@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+import tempfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,8 +17,6 @@ def replace_file(path: Path, data: bytes, *, mode: int | None = None) -> None:
     Raises:
         OSError: if it cannot be written; the old file is then unchanged.
     """
-    import tempfile  # brings random numbers and hashes, and few commands write files
-
     mode = _mode_of(path) if mode is None else mode
     descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=TEMPORARY, dir=path.parent)
     try:

@@ -144,7 +144,7 @@ class Mux(Component[MuxConfig]):
     def settle(self) -> None:
         """Schedule the next deadline, and report changes in which source is let through and which are locked out."""
         deadline = self.core.next_deadline()
-        if deadline is not None and deadline < self.wakes_at:  # each message puts it off; a wake looks at it again
+        if deadline is not None and not self.now <= self.wakes_at <= deadline:  # each message puts off the deadline
             self.wakes_at = deadline
             self.context.wake_at(deadline)
         active = "stop" if self.core.stopped else self.core.active
