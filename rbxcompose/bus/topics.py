@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import count
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -17,6 +17,7 @@ from rbxcompose.bus.refusals import RefusalReason, Refusals
 from rbxcompose.bus.tokens import EntityKind
 from rbxcompose.bus.transport import Arrival, Closable
 from rbxcompose.bus.writers import TopicReader
+from rbxcompose.dataclass import dataclass
 from rbxcompose.msgs.cdr import CdrError, CdrLengthError, decode, encode
 from rbxcompose.msgs.finite import NotFiniteError, require_finite
 from rbxcompose.msgs.types import Message
@@ -74,14 +75,17 @@ class Publisher(Generic[M]):
 
     def __call__(self, message: M) -> None:
         """Publish `message`."""
-        process = self._process
-        source = Attachment(next(self._sequence), process.clock.stamp(), self.gid)
+        number, here = next(self._sequence), self._topics.subscriptions.at(self.route)
+        has_match, is_latched = self._remote.has_match, self._qos is Qos.LATCHED
+        if not (here or has_match or is_latched):
+            return  # nobody listens
+        source = Attachment(number, self._process.clock.stamp(), self.gid)
         delivery = Delivery(message, source)
-        if self._qos is Qos.LATCHED:
+        if is_latched:
             self.kept = delivery
-        for subscription in self._topics.subscriptions.at(self.route):
+        for subscription in here:
             subscription.deliver(delivery)
-        if self._remote.has_match:
+        if has_match:
             self._remote.put(encode(message), source.encode())
 
     def look_again(self) -> None:

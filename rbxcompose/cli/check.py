@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, good, has_colour, tell
@@ -18,6 +18,7 @@ from rbxcompose.cli.project.fixes import fix, only_ours
 from rbxcompose.cli.project.robot_options import add_layer_options, compiled
 from rbxcompose.cli.project.targets import Targets, projects_of, targets
 from rbxcompose.compiler import Compilation
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report
 from rbxcompose.formats import format_names, renderer
 from rbxcompose.plan.model import Plan, extent

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.project.new_mission import MistakenRobotError, find_home
 from rbxcompose.cli.project.questions import Asker, CancelledError
+from rbxcompose.dataclass import dataclass
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.printable import plain
 from rbxcompose.scaffold import component, mission, part, robot

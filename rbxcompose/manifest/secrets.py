@@ -6,10 +6,10 @@ import errno
 import os
 import stat
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from rbxcompose.config import Secret
+from rbxcompose.dataclass import dataclass
 from rbxcompose.manifest.limits import SECRET
 from rbxcompose.regular_files import NotRegularError, open_regular
 

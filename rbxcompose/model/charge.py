@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.tree import Comparison, Variable
 from rbxcompose.geometry import Pose2
 from rbxcompose.missions.analysis.facts import Constants, constants_of, number_in

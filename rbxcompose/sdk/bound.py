@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Generic, Protocol, TypeVar
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Pose2, Transform3
 
 M = TypeVar("M")

@@ -7,10 +7,11 @@ text in a capability is the name of a port of the component; everything else is 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any, Generic, TypeVar
 
 from rbxcompose.config import Config, Place
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Pose2
 
 T_co = TypeVar("T_co", covariant=True)

@@ -12,9 +12,10 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, NoReturn, TextIO
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report, Severity, Sources
 from rbxcompose.rendering.text import render_text
 

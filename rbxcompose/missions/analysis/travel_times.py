@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from rbxcompose.config import Place
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Pose2
 from rbxcompose.missions.analysis.facts import Constants, goal_place, items_of, number_of
 from rbxcompose.missions.program.answers import NodeFlow

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import ClassVar, Protocol, Self
 
 from rbxcompose.config import Place
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.check import StaticScope
 from rbxcompose.expressions.text import parse_template
 from rbxcompose.expressions.tree import Expression

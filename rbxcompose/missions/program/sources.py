@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.missions.program.program import Skill
 

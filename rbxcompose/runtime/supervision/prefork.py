@@ -18,12 +18,13 @@ import socket
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import setproctitle
 
 from rbxcompose.clock import MonotonicClock
+from rbxcompose.dataclass import dataclass
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.channel import Channel
 from rbxcompose.runtime.folder import RobotFolder, title
