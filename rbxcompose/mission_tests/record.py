@@ -92,7 +92,7 @@ class TrialRecord:
             case Published(topic=topic, fields=fields):
                 self.published.append((topic, fields))
             case Logged(text=told) | Reported(message=told):
-                self.reports.append(told)
+                self.reports += [told, text]  # alone, and as the trace shows it
             case MissionEnded():
                 self.end = event
 

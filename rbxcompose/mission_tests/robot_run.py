@@ -81,7 +81,7 @@ class RobotRun:
         if self.bench.host.hosted[self.name].component is not self.executive:
             failed = [one.text for one in self.bench.records if one.source == self.name]
             self.record.trouble = f"the executive failed: {failed[-1] if failed else 'without a word'}"
-        elif not self.events and self.now > BEGINS_WITHIN:
+        elif not self.events and self.now > BEGINS_WITHIN and self.trial.expect.until is None:
             run = self.executive.missions.runs[self.trial.mission]
             if run.began is None and (missing := run.missing()):
                 names = ", ".join(f"${name}" for name in missing)

@@ -117,6 +117,16 @@ def test_a_mission_that_cannot_begin_is_told_with_what_it_waits_for(trying: Tryi
     assert problem == "the mission does not start: nothing has arrived for $door"
 
 
+def test_a_mission_that_waits_for_its_first_value_can_be_what_a_test_expects(trying: Trying) -> None:
+    assert trying.problems("expect:\n  outcome: running\n  for: 5 s\n", "waiting") == []
+
+
+def test_what_a_mission_waits_for_is_told_though_the_test_sets_another_value(trying: Trying) -> None:
+    text = "events:\n  - at: 1 s\n    set:\n      battery: 20 %\nexpect:\n  outcome: success\n"
+    (problem,) = trying.problems(text, "waiting")
+    assert problem == "the mission does not start: nothing has arrived for $door"
+
+
 def test_what_the_robot_refuses_is_told(trying: Trying) -> None:
     text = "events:\n  - at: 30 s\n    pause: true\nexpect:\n  for: 40 s\n"
     verdict = trying.verdict(text.replace("events:", "mocks:\n  go_to: failure\nevents:"), "states")

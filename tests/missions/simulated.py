@@ -9,18 +9,16 @@ from dataclasses import dataclass, field, replace
 from rbxcompose.config import Place
 from rbxcompose.expressions.types import FLAG, POSE, TEXT, TYPES, quantity_of
 from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
-from rbxcompose.findings import Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
-from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
 from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, Settings
-from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
 from rbxcompose.missions.program.results import Result
 from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING
+from rbxcompose.testing import compile_mission
 from rbxcompose.units import LENGTH
 
 PLACES = {name: Place(name, float(x), 0.0, 0.0) for x, name in enumerate(("dock", "kitchen", "corner_1", "corner_2"))}
@@ -52,10 +50,7 @@ def tree(text: str, file: str = "mission.yaml") -> MappingNode:
 
 def program_of(text: str, robot: RobotNames = ROBOT) -> Program:
     """Return the program of a mission without mistakes; the head of the file may be left out."""
-    report = Report()
-    program = read_program(tree(text), report)
-    if program:
-        report.extend(check_program(program, robot))
+    program, report = compile_mission(text, robot)
     assert not report.has_errors, list(report)
     assert program is not None
     return program
