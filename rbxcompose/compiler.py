@@ -113,7 +113,7 @@ def _steps_to_read(sources: Mapping[str, str]) -> int:
 
 
 def _tell_profile(profile: Span, tried: Compilation, out: Compilation, above: Set[str]) -> None:
-    """Add the findings that only a profile causes: those in its own text, and errors in the robot's files.
+    """Add the findings that only a profile causes, in its own text or in the robot's files.
 
     `above` names the layers that override profiles: their values were chosen without this profile.
     """
@@ -124,6 +124,6 @@ def _tell_profile(profile: Span, tried: Compilation, out: Compilation, above: Se
             continue
         if profile.contains(span):
             out.report.add(finding)
-        elif finding.severity is Severity.ERROR:
+        else:
             related = (*finding.related, Related(profile, "with this profile"))
             out.report.add(replace(finding, related=related, fix=None))
