@@ -17,7 +17,6 @@ from rbxcompose.composition.robot_file import load_robot
 from rbxcompose.findings import Related, Report, Severity, Span, kind
 from rbxcompose.manifest.limits import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES, STEP_VALUES
 from rbxcompose.manifest.reader import ParsedText, Texts
-from rbxcompose.manifest.walk import TWICE
 from rbxcompose.model.build import build_robot
 from rbxcompose.model.robot import Robot
 from rbxcompose.per_compile import one_compile
@@ -86,8 +85,7 @@ def compile_robot(
         if manifest is None:
             return out
         out.robot = build_robot(manifest, environment=environment, report=out.report, sources=out.sources)
-        if not any(finding.code == TWICE.code for finding in out.report):  # otherwise half of it is missing
-            run_checks(out.robot, out.report)
+        run_checks(out.robot, out.report)
         out.report.findings = manifest.inclusions.told(out.report.findings)
         return out
 

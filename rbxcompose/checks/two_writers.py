@@ -11,6 +11,7 @@ from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import PortEnd
 from rbxcompose.qos import Qos
+from rbxcompose.rules import NAMES, WIRING
 from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import Out
 
@@ -20,7 +21,7 @@ def is_command(end: PortEnd) -> bool:
     return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND
 
 
-@check("RBX3001")
+@check("RBX3001", closed=(WIRING, NAMES))
 def two_writers(robot: Robot) -> Iterator[Finding]:
     """Two components write commands on one topic without a mux
 

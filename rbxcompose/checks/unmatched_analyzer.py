@@ -9,11 +9,12 @@ from rbxcompose.diagnostics.core import Analyzer, is_glob
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import NAMES
 
 _MOST_COMPARED = 200_000  # of patterns with names
 
 
-@check("RBX5001", is_fixable=True)
+@check("RBX5001", is_fixable=True, closed=(NAMES,))
 def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
     """A pattern of an analyzer matches no component
 

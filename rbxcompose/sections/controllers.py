@@ -129,6 +129,7 @@ def _details(read: Mapping[str, ControllerConfig]) -> dict[str, str]:
     ControllerConfig,
     order=34,
     names=CONTROLLER,
+    wires=True,
     entry="controller",
     needs="type",
     models=_models,

@@ -140,7 +140,7 @@ class JointModel(Config):
         return [*([self.actuator] if self.actuator else []), *self.actuators]
 
 
-@section("joints", dict[JointName, JointModel], order=33, shared=((),))
+@section("joints", dict[JointName, JointModel], order=33, wires=True, shared=((),))
 def joints(reading: Reading[dict[str, JointModel]]) -> dict[str, JointModel]:
     """Which joints of the body are driven, by their names in the URDF: the servos of each, and its limits.
 

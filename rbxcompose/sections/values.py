@@ -35,4 +35,4 @@ def values(reading: Reading[ValueModel]) -> dict[str, ValueModel]:
             topic: door/state
             type: text
     """
-    return reading.entries()
+    return reading.readable_entries()

@@ -11,9 +11,10 @@ from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.branches import ALL, Branches
 from rbxcompose.missions.program.outcomes import SUCCEEDS
 from rbxcompose.missions.program.program import MissionNode, Program
+from rbxcompose.rules import OWN
 
 
-@mission_check("RBX4138", Severity.WARNING)
+@mission_check("RBX4138", Severity.WARNING, closed=(OWN,))
 def endless_branch(mission: Examined) -> Iterator[Finding]:
     """A parallel waits for a branch that never succeeds
 

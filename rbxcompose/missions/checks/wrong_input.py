@@ -38,6 +38,6 @@ def _given(view: View, name: str, program: Program) -> Iterator[Finding]:
 def _missing(view: View, mission: str, program: Program) -> Iterator[Finding]:
     given = {argument.name for argument in view.node.step.arguments}
     for name, declared in program.inputs.items():
-        if declared.default is None and name not in given:
+        if declared.must_be_given and name not in given:
             message = f"the input '{name}' of the mission '{mission}' needs a value"
             yield WRONG_INPUT.at(view.node.span, message, help=f"write it under 'with': '{name}: ...'")
